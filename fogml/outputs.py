@@ -1,0 +1,77 @@
+"""Outputs that appear whole or not at all: written beside, then renamed."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fogml.errors import InputError
+
+
+@contextmanager
+def whole_file(path: str | Path) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it to `path` if the block succeeds.
+
+    The temporary name keeps the suffix of `path`, so writers that look at it behave.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or can't be written.
+    """
+    path = Path(path)
+    staging = _staging_folder(path.parent)
+    try:
+        partial = staging / path.name
+        yield partial
+        os.replace(partial, path)
+    except PermissionError as error:
+        raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+@contextmanager
+def whole_folder(path: str | Path) -> Iterator[Path]:
+    """Yield an empty staging folder; move its content into `path` if the block succeeds.
+
+    `path` is created, with its parents, only at the end. Entries of the same name that
+    are there already are replaced; others stay.
+
+    Raises
+    ------
+    InputError
+        If `path` is a file or its nearest existing parent can't be written.
+    """
+    path = Path(path)
+    if path.exists() and not path.is_dir():
+        raise InputError(f"{path}: is a file, a folder was expected; choose another --out")
+    home = path
+    while not home.exists():
+        home = home.parent
+    staging = _staging_folder(home)
+    try:
+        yield staging
+        path.mkdir(parents=True, exist_ok=True)
+        for entry in sorted(staging.iterdir()):
+            target = path / entry.name
+            if target.is_dir() and not target.is_symlink():
+                shutil.rmtree(target)
+            os.replace(entry, target)
+    finally:
+        shutil.rmtree(staging, ignore_errors=True)
+
+
+def _staging_folder(home: Path) -> Path:
+    if not home.is_dir():
+        raise InputError(f"{home}: no such folder; create it first")
+    if not os.access(home, os.W_OK | os.X_OK):
+        raise InputError(f"{home}: no permission to write here; choose another place")
+    try:
+        return Path(tempfile.mkdtemp(prefix=".partial-", dir=home))
+    except OSError as error:
+        raise InputError(f"{home}: cannot be written ({error.strerror}); choose another place") from error

@@ -1,0 +1,154 @@
+"""The columns of a run: their names, accepted units, and conversion to the internal unit."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.errors import InputError
+
+
+@dataclass(frozen=True)
+class ColumnSpec:
+    """What run-format says of a column.
+
+    `units` maps each accepted unit to (factor, offset): internal = value * factor + offset.
+    """
+
+    name: str
+    internal: str
+    units: Mapping[str, tuple[float, float]]
+    meaning: str
+
+
+_TIME = {
+    "s": (1.0, 0.0),
+    "ms": (1e-3, 0.0),
+    "us": (1e-6, 0.0),
+    "ns": (1e-9, 0.0),
+    "min": (60.0, 0.0),
+    "h": (3600.0, 0.0),
+}
+_DEGREE_PER_RADIAN = 180.0 / np.pi
+_GYRO = {
+    "deg/h": (1.0, 0.0),
+    "deg/s": (3600.0, 0.0),
+    "rad/s": (3600.0 * _DEGREE_PER_RADIAN, 0.0),
+    "count": (1.0, 0.0),
+}
+_TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
+_RATE = {"deg/s": (1.0, 0.0), "deg/h": (1.0 / 3600.0, 0.0), "rad/s": (_DEGREE_PER_RADIAN, 0.0)}
+_ANGLE = {"deg": (1.0, 0.0), "rad": (_DEGREE_PER_RADIAN, 0.0)}
+_DUTY = {"%": (0.01, 0.0), "0/1": (1.0, 0.0)}
+_FIELD = {"uT": (1.0, 0.0), "G": (100.0, 0.0)}
+
+
+def _specs() -> dict[str, ColumnSpec]:
+    temperature = "degC"
+    rows = [
+        ColumnSpec("time", "s", _TIME, "since the start of the recording"),
+        ColumnSpec("gyro", "deg/h", _GYRO, "gyro output, positive about the input axis"),
+        ColumnSpec("T_in", temperature, _TEMPERATURE, "inner face of the fibre coil"),
+        ColumnSpec("T_out", temperature, _TEMPERATURE, "outer face of the fibre coil"),
+        ColumnSpec("T", temperature, _TEMPERATURE, "the only temperature sensor"),
+        ColumnSpec("T_chamber", temperature, _TEMPERATURE, "chamber air"),
+        ColumnSpec("T_case", temperature, _TEMPERATURE, "case"),
+        ColumnSpec("T_electronics", temperature, _TEMPERATURE, "electronics"),
+        ColumnSpec("rate", "deg/s", _RATE, "table rate about the input axis, Earth rate not included"),
+        ColumnSpec("angle", "deg", _ANGLE, "table angle"),
+        ColumnSpec("power", "W", {"W": (1.0, 0.0)}, "electrical power"),
+        ColumnSpec("supply", "V", {"V": (1.0, 0.0)}, "supply voltage"),
+        ColumnSpec("humidity", "%", {"%": (1.0, 0.0)}, "relative humidity"),
+        ColumnSpec("vibration", "g", {"g": (1.0, 0.0)}, "rms vibration"),
+        ColumnSpec("compressor", "0/1", _DUTY, "duty of the compressor"),
+        ColumnSpec("heater", "0/1", _DUTY, "duty of the heater"),
+        ColumnSpec("fan", "0/1", _DUTY, "duty of the fan"),
+        ColumnSpec("B_x", "uT", _FIELD, "magnetic field in the gyro frame"),
+        ColumnSpec("B_y", "uT", _FIELD, "magnetic field in the gyro frame"),
+        ColumnSpec("B_z", "uT", _FIELD, "magnetic field in the gyro frame"),
+    ]
+    return {row.name: row for row in rows}
+
+
+KNOWN = _specs()
+_COIL_SENSOR = re.compile(r"T([1-9]\d*)\Z")
+_HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\]\s*)?\Z")
+# Spellings that loggers and spreadsheets use for the same unit.
+_ALIASES = {
+    "°C": "degC",
+    "C": "degC",
+    "°/h": "deg/h",
+    "°/s": "deg/s",
+    "°": "deg",
+    "µs": "us",
+    "μs": "us",
+    "µT": "uT",
+    "μT": "uT",
+    "sec": "s",
+    "counts": "count",
+    "1": "0/1",
+}
+
+
+def coil_sensor_number(name: str) -> int | None:
+    """The n of a coil sensor ``Tn``, else None."""
+    match = _COIL_SENSOR.match(name)
+    return int(match[1]) if match else None
+
+
+def column_spec(name: str) -> ColumnSpec | None:
+    """The specification of a column, or None for a name that run-format does not know."""
+    if name in KNOWN:
+        return KNOWN[name]
+    if coil_sensor_number(name) is not None:
+        return ColumnSpec(name, "degC", _TEMPERATURE, "coil sensor: odd on the inner face, even on the outer")
+    return None
+
+
+def is_temperature(name: str) -> bool:
+    """Whether a column name is a temperature of the run format."""
+    spec = column_spec(name)
+    return spec is not None and spec.internal == "degC"
+
+
+def parse_header(cell: str) -> tuple[str, str | None]:
+    """Split a header cell ``name [unit]`` into its name and its unit (None if absent)."""
+    match = _HEADER.match(cell)
+    if match is None:
+        return cell.strip(), None
+    unit = match["unit"]
+    return match["name"], _ALIASES.get(unit, unit) if unit is not None else None
+
+
+def header(name: str, unit: str | None = None) -> str:
+    """The header cell of a column, in its internal unit unless `unit` says otherwise."""
+    spec = column_spec(name)
+    unit = unit or (spec.internal if spec else None)
+    return f"{name} [{unit}]" if unit else name
+
+
+def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
+    """Factor and offset that bring a column to its internal unit.
+
+    Raises
+    ------
+    InputError
+        If the unit of a known column is missing or not accepted; the message lists what is.
+    """
+    spec = column_spec(name)
+    if spec is None:
+        return 1.0, 0.0
+    accepted = ", ".join(spec.units)
+    if unit is None:
+        raise InputError(
+            f"{file}: column '{name}' states no unit; write '{name} [{spec.internal}]' "
+            f"in the header (accepted: {accepted})"
+        )
+    if unit not in spec.units:
+        raise InputError(
+            f"{file}: column '{name}' has unit '{unit}', not accepted here; use one of {accepted}"
+        )
+    return spec.units[unit]

@@ -1,0 +1,35 @@
+"""What was noticed in a run: each finding says where, how much, and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One thing noticed on reading or checking a run.
+
+    Attributes
+    ----------
+    code
+        Stable name, e.g. ``gap``, ``stuck_sensor``, ``outliers``, ``repaired_rows``.
+    message
+        One sentence for people, without the file's name.
+    column
+        The column concerned, if any.
+    row
+        First data row concerned, counted from 1 after the header, if any.
+    count
+        How many samples, rows or gaps are concerned.
+    """
+
+    code: str
+    message: str
+    column: str | None = None
+    row: int | None = None
+    count: int = 1
+
+    def as_dict(self) -> dict[str, Any]:
+        """The finding as JSON-ready values, without empty fields."""
+        return {key: value for key, value in asdict(self).items() if value is not None}

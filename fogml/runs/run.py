@@ -1,0 +1,207 @@
+"""The run: one continuous recording of one gyro, as immutable columns and set-up facts."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+from fogml.runs.columns import coil_sensor_number, is_temperature
+from fogml.runs.facts import Facts
+from fogml.runs.findings import Finding
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+GAP_FACTOR = 3.0
+"""A gap is an interval longer than this many median sample intervals."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One recording: columns of float64 in internal units, in time order, and facts.
+
+    Columns are read-only; slices and stretches are views on the same memory.
+
+    Attributes
+    ----------
+    name
+        Base name of the file it came from, or a name of one's own.
+    columns
+        Column name to values of shape (n,), internal units of the run format; ``time`` and
+        ``gyro`` are always there.
+    facts
+        Set-up facts.
+    gyro_unit
+        ``deg/h``, or ``count`` where the output was recorded in counts.
+    findings
+        What was noticed on reading.
+    """
+
+    name: str
+    columns: Mapping[str, FloatArray]
+    facts: Facts = field(default_factory=Facts)
+    gyro_unit: Literal["deg/h", "count"] = "deg/h"
+    findings: tuple[Finding, ...] = ()
+
+    def __post_init__(self) -> None:
+        frozen: dict[str, FloatArray] = {}
+        for name, values in self.columns.items():
+            view = np.asarray(values, dtype=np.float64).view()
+            view.flags.writeable = False
+            frozen[name] = view
+        for name in ("time", "gyro"):
+            if name not in frozen:
+                raise InputError(f"{self.name}: no column '{name}'; a run always needs time and gyro")
+        lengths = {name: values.shape for name, values in frozen.items()}
+        if len(set(lengths.values())) > 1 or frozen["time"].ndim != 1:
+            raise InputError(f"{self.name}: columns differ in length: {lengths}")
+        object.__setattr__(self, "columns", MappingProxyType(frozen))
+
+    @classmethod
+    def from_columns(cls, name: str = "run", facts: Facts | None = None, **columns: ArrayLike) -> Run:
+        """A run from arrays in internal units: ``Run.from_columns(time=t, gyro=g, T=temperature)``."""
+        arrays = {key: np.array(values, dtype=np.float64) for key, values in columns.items()}
+        return cls(name=name, columns=arrays, facts=facts or Facts())
+
+    def __len__(self) -> int:
+        return len(self.columns["time"])
+
+    def __repr__(self) -> str:
+        return f"Run({self.name!r}, {len(self)} samples, {', '.join(self.columns)})"
+
+    @property
+    def time(self) -> FloatArray:
+        """Time [s], shape (n,)."""
+        return self.columns["time"]
+
+    @property
+    def gyro(self) -> FloatArray:
+        """Gyro output as recorded [deg/h, or counts], shape (n,)."""
+        return self.columns["gyro"]
+
+    @cached_property
+    def gyro_deg_h(self) -> FloatArray:
+        """Gyro output as rate [deg/h], shape (n,); counts are divided by the nominal K0.
+
+        Raises
+        ------
+        InputError
+            If the output is in counts and no scale factor is stated.
+        """
+        if self.gyro_unit == "deg/h":
+            return self.gyro
+        if self.facts.scale_factor is None:
+            raise InputError(
+                f"{self.name}: column 'gyro' is in counts and no scale factor is stated; add "
+                "'scale_factor: {value: ..., unit: \"count per deg/h\"}' to the side file"
+            )
+        return self.gyro / self.facts.scale_factor.count_per_deg_h
+
+    @cached_property
+    def rate(self) -> FloatArray:
+        """Table rate about the input axis [deg/s], shape (n,); zeros where not recorded."""
+        rate = self.columns.get("rate")
+        return np.zeros(len(self)) if rate is None else rate
+
+    @property
+    def earth_known(self) -> bool:
+        """Whether the facts tell the Earth rate along the input axis."""
+        return self.facts.earth_rate_deg_h is not None
+
+    @cached_property
+    def reference_deg_h(self) -> FloatArray:
+        """Reference rate [deg/h], shape (n,): table rate plus Earth rate where it is known."""
+        return 3600.0 * self.rate + (self.facts.earth_rate_deg_h or 0.0)
+
+    @cached_property
+    def error_deg_h(self) -> FloatArray:
+        """Gyro output less reference rate [deg/h], shape (n,): what a drift model describes."""
+        return self.gyro_deg_h - self.reference_deg_h
+
+    @cached_property
+    def temperature_columns(self) -> tuple[str, ...]:
+        """Names of the recorded temperatures."""
+        return tuple(name for name in self.columns if is_temperature(name))
+
+    def temperature(self, name: str = "T") -> FloatArray:
+        """A temperature [degC] by its name in formulas, shape (n,).
+
+        ``T`` is the column T, else T_in, else the mean of the odd coil sensors; ``T_in`` and
+        ``T_out`` stand for the means of the odd and even sensors where only T1 ... are recorded.
+
+        Raises
+        ------
+        InputError
+            If the run does not hold that temperature.
+        """
+        if name in self.columns and is_temperature(name):
+            return self.columns[name]
+        if name == "T":
+            for stand_in in ("T_in", "T1"):
+                if stand_in in self.columns:
+                    return self.temperature("T_in")
+        if name in ("T_in", "T_out"):
+            parity = 1 if name == "T_in" else 0
+            numbers = {c: coil_sensor_number(c) for c in self.columns}
+            sensors = [c for c, number in numbers.items() if number is not None and number % 2 == parity]
+            if sensors:
+                return self._sensor_mean(tuple(sensors))
+        held = ", ".join(self.temperature_columns) or "none"
+        raise InputError(f"{self.name}: no temperature '{name}'; the run holds {held}")
+
+    def _sensor_mean(self, sensors: tuple[str, ...]) -> FloatArray:
+        means: dict[tuple[str, ...], FloatArray] = self.__dict__.setdefault("_sensor_means", {})
+        if sensors not in means:
+            means[sensors] = np.mean([self.columns[c] for c in sensors], axis=0)
+        return means[sensors]
+
+    @cached_property
+    def sample_s(self) -> float:
+        """Median sample interval [s]; 0 for a run of one sample."""
+        return float(np.median(np.diff(self.time))) if len(self) > 1 else 0.0
+
+    @cached_property
+    def gap_starts(self) -> NDArray[np.intp]:
+        """Indices of the samples that follow a gap longer than 3 median sample intervals."""
+        return np.flatnonzero(np.diff(self.time) > GAP_FACTOR * self.sample_s) + 1
+
+    @cached_property
+    def stretches(self) -> tuple[slice, ...]:
+        """The parts between gaps, as slices over the samples."""
+        edges = [0, *self.gap_starts.tolist(), len(self)]
+        return tuple(slice(a, b) for a, b in pairwise(edges))
+
+    @property
+    def span_s(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.time[-1] - self.time[0]) if len(self) else 0.0
+
+    @cached_property
+    def hash(self) -> str:
+        """SHA-256 over the columns' names and values, as hexadecimal digits."""
+        digest = hashlib.sha256(self.gyro_unit.encode())
+        for name in sorted(self.columns):
+            digest.update(name.encode())
+            digest.update(np.ascontiguousarray(self.columns[name]).data)
+        return digest.hexdigest()
+
+    def __getitem__(self, part: slice) -> Run:
+        """A part of the run as views, e.g. ``run[100:200]``."""
+        return replace(self, columns={name: values[part] for name, values in self.columns.items()})
+
+    def with_columns(self, **columns: ArrayLike) -> Run:
+        """The run with columns added or replaced (internal units)."""
+        added = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
+        return replace(self, columns={**self.columns, **added})
+
+    def with_findings(self, findings: Iterable[Finding]) -> Run:
+        """The run with more findings."""
+        return replace(self, findings=(*self.findings, *findings))

@@ -1,0 +1,100 @@
+"""What a judgement holds: numbers for the JSON, and averaged series for the figures."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.runs.findings import Finding
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """Figures of the averages over ``averaging_s``, in deg/h; rms**2 = bias**2 + bias_stability**2.
+
+    ``scale_factor_error`` in ppm, ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in
+    deg/h; None where the run does not tell.
+    """
+
+    bias: float
+    bias_stability: float
+    range: float
+    rms: float
+    bias_stability_10s: float | None = None
+    scale_factor_error: float | None = None
+    temperature_sensitivity: float | None = None
+    hysteresis: float | None = None
+
+
+@dataclass(frozen=True)
+class AveragedSeries:
+    """Averages over ``averaging_s``, for figures; every array has shape (m,).
+
+    ``before`` and ``after`` in deg/h, ``lower`` and ``upper`` the 90 % prediction interval of
+    ``after`` about zero, ``temperature`` in degC, ``rate`` of temperature in degC/min,
+    ``time`` in s, ``regime`` the names of the regimes, ``flag`` 0, 1 or 2 as in compensate.
+    """
+
+    time: FloatArray
+    temperature: FloatArray
+    rate: FloatArray
+    before: FloatArray
+    after: FloatArray
+    drift: FloatArray
+    lower: FloatArray
+    upper: FloatArray
+    regime: NDArray[np.str_]
+    flag: NDArray[np.int8]
+
+
+@dataclass(frozen=True)
+class RunJudgement:
+    """One model on one run. ``floor`` is the noise at ``averaging_s`` [deg/h]."""
+
+    run: str
+    unit: str | None
+    axis: str | None
+    averaging_s: float
+    before: Metrics
+    after: Metrics
+    floor: float
+    outside_training: float
+    rows_used: int
+    rows_left_out: int
+    bias_reference: str  # "earth rate" or "training mean"
+    series: AveragedSeries
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class LimitOutcome:
+    """A stated limit and what was reached; the largest value over the test runs."""
+
+    quantity: str
+    limit: float
+    value: float
+    met: bool
+
+
+@dataclass(frozen=True)
+class Judgement:
+    """A model judged: what ``report.json`` says, and the series that its page draws."""
+
+    model: dict[str, Any]  # kind, features, parameters, bytes, and what the model tells of itself
+    train: tuple[RunJudgement, ...]
+    test: tuple[RunJudgement, ...]
+    design_index: LimitOutcome | None = None
+    limits: tuple[LimitOutcome, ...] = ()
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def met(self) -> bool:
+        """Whether the design index and every stated limit are met."""
+        stated = [*self.limits, *([self.design_index] if self.design_index else [])]
+        return all(outcome.met for outcome in stated)
