@@ -1,0 +1,138 @@
+"""Averages over consecutive windows of time, gaps respected."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+GAP_FACTOR = 3.0
+"""An interval longer than this many median sample intervals is a gap."""
+_ROUNDING = 1e-6
+"""Share of a sample interval by which a window's edge gives way to rounded times."""
+
+
+@dataclass(frozen=True)
+class BlockAverages:
+    """Averages over m consecutive windows.
+
+    Attributes
+    ----------
+    time_s
+        Mean time of the samples in each window [s], shape (m,).
+    values
+        One array for each column that was given, in order: shape (m,), or (m, k) where the
+        column had shape (n, k); in the column's unit.
+    counts
+        Samples in each window, shape (m,).
+    starts, stops
+        Each window holds the samples ``starts[i]:stops[i]``, shape (m,).
+    """
+
+    time_s: FloatArray
+    values: tuple[FloatArray, ...]
+    counts: IndexArray
+    starts: IndexArray
+    stops: IndexArray
+
+    def __len__(self) -> int:
+        return len(self.time_s)
+
+
+def block_averages(
+    time: ArrayLike, *columns: ArrayLike, window_s: float, start: float | None = None
+) -> BlockAverages:
+    """Average columns over consecutive windows of `window_s` seconds.
+
+    A gap is an interval longer than 3 median sample intervals. A gap longer than a quarter of
+    the window cuts the series and the windows begin anew after it; a shorter one is spanned.
+    A window is kept if its samples cover at least half of it, from the first to the last of
+    them plus one sample interval; so the rest at the end of a stretch is dropped if short.
+    Takes O(n) time.
+
+    Parameters
+    ----------
+    time
+        Sample times [s], not decreasing, shape (n,).
+    *columns
+        Values to average, each of shape (n,) or (n, k).
+    window_s
+        Length of a window [s].
+    start
+        Time at which the first window begins [s]; samples before it are left out. By default
+        windows begin at the first sample of each stretch. With `start`, the windows of every
+        stretch lie on the one grid ``start + i * window_s``, so that two series share windows.
+
+    Returns
+    -------
+    BlockAverages
+        Empty if no window is at least half full.
+
+    Raises
+    ------
+    InputError
+        If the window is not a positive length or the columns differ in length from `time`.
+    """
+    time = np.asarray(time, dtype=np.float64)
+    arrays = [np.asarray(column, dtype=np.float64) for column in columns]
+    if not (np.isfinite(window_s) and window_s > 0):
+        raise InputError(f"averages over {window_s} s: the window must be a positive length in seconds")
+    for position, array in enumerate(arrays, start=1):
+        if array.shape[:1] != time.shape:
+            raise InputError(f"column {position} has {len(array)} samples, time has {len(time)}")
+    starts, stops = _windows(time, float(window_s), start)
+    counts = stops - starts
+    return BlockAverages(
+        time_s=_means(time, starts, stops),
+        values=tuple(_means(array, starts, stops) for array in arrays),
+        counts=counts,
+        starts=starts,
+        stops=stops,
+    )
+
+
+def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[IndexArray, IndexArray]:
+    """First and past-the-last samples of the windows that are at least half full."""
+    none = np.empty(0, dtype=np.intp)
+    first = 0 if start is None else int(np.searchsorted(time, start))
+    kept = time[first:]
+    if len(kept) == 0:
+        return none, none
+    intervals = np.diff(kept)
+    sample_s = float(np.median(intervals)) if len(intervals) else 0.0
+    cuts = np.flatnonzero(intervals > max(GAP_FACTOR * sample_s, window_s / 4)) + 1
+    edges = np.concatenate(([0], cuts, [len(kept)]))
+    if start is None:
+        origin: FloatArray | float = np.repeat(kept[edges[:-1]], np.diff(edges))
+    else:
+        origin = start
+    number = np.floor((kept - origin + _ROUNDING * sample_s) / window_s)
+    opens = np.flatnonzero(np.diff(number)) + 1
+    starts = np.union1d(edges[:-1], opens)
+    stops = np.append(starts[1:], len(kept))
+    covered = kept[stops - 1] - kept[starts] + sample_s
+    full = covered >= 0.5 * window_s - _ROUNDING * sample_s
+    if sample_s == 0.0:
+        # One sample, or all at one time: nothing tells the interval that a sample stands for.
+        full = np.ones_like(full)
+    return (starts[full] + first).astype(np.intp), (stops[full] + first).astype(np.intp)
+
+
+def _means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatArray:
+    if len(starts) == 0:
+        return np.empty((0, *values.shape[1:]))
+    # Without its first value, a time or a rate far from zero loses no digits in the sums.
+    origin = values[starts[0]]
+    # reduceat sums between neighbouring edges, so dropped windows are summed and left out.
+    edges = np.unique(np.concatenate((starts, stops)))
+    inside = edges[edges < len(values)]
+    sums = np.add.reduceat(values - origin, inside, axis=0)
+    chosen = sums[np.searchsorted(inside, starts)]
+    counts = (stops - starts).reshape(-1, *([1] * (values.ndim - 1)))
+    return np.asarray(chosen / counts + origin)

@@ -1,0 +1,106 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.signals.averages import block_averages
+
+
+def plain(time: np.ndarray, values: np.ndarray, window_s: float) -> tuple[list[float], list[int]]:
+    """The definition, sample by sample."""
+    sample_s = float(np.median(np.diff(time)))
+    groups: list[list[int]] = []
+    origin = time[0]
+    window = 0
+    groups.append([0])
+    for i in range(1, len(time)):
+        gap = time[i] - time[i - 1]
+        if gap > 3 * sample_s and gap > window_s / 4:
+            origin, window = time[i], 0
+            groups.append([i])
+            continue
+        now = int(np.floor((time[i] - origin + 1e-6 * sample_s) / window_s))
+        if now != window:
+            window = now
+            groups.append([])
+        groups[-1].append(i)
+    kept = [g for g in groups if time[g[-1]] - time[g[0]] + sample_s >= 0.5 * window_s - 1e-6 * sample_s]
+    return [float(np.mean(values[g])) for g in kept], [len(g) for g in kept]
+
+
+def test_regular_sampling_is_reshape_and_mean():
+    rng = np.random.default_rng(1)
+    time = 0.1 * np.arange(1000) + 5e8
+    x = rng.normal(size=1000)
+    got = block_averages(time, x, window_s=10.0)
+    np.testing.assert_allclose(got.values[0], x.reshape(10, 100).mean(axis=1), rtol=0, atol=1e-14)
+    np.testing.assert_array_equal(got.counts, 100)
+    np.testing.assert_allclose(got.time_s, time.reshape(10, 100).mean(axis=1), rtol=1e-15)
+
+
+def test_columns_keep_their_order_and_shape():
+    time = np.arange(40.0)
+    table = np.column_stack((time, 2 * time, time**2))
+    got = block_averages(time, time, table, window_s=10.0)
+    assert got.values[1].shape == (4, 3)
+    np.testing.assert_allclose(got.values[1][:, 1], 2 * got.values[0])
+    np.testing.assert_allclose(got.values[0], [4.5, 14.5, 24.5, 34.5])
+
+
+@pytest.mark.parametrize(("samples", "windows"), [(14, 1), (15, 2), (19, 2), (20, 2), (4, 0), (5, 1)])
+def test_rest_is_kept_from_half_full(samples: int, windows: int):
+    time = np.arange(float(samples))
+    assert len(block_averages(time, time, window_s=10.0)) == windows
+
+
+def test_long_gap_begins_anew_and_short_gap_is_spanned():
+    time = np.concatenate((np.arange(25.0), 1000.0 + np.arange(25.0)))
+    got = block_averages(time, time, window_s=10.0)
+    np.testing.assert_array_equal(got.starts, [0, 10, 20, 25, 35, 45])
+    np.testing.assert_array_equal(got.stops, [10, 20, 25, 35, 45, 50])
+    # A logger that pauses for 3 s in every 6 s still gives an average for every 100 s.
+    bursts = (6.0 * np.arange(100)[:, None] + 0.1 * np.arange(30)).ravel()
+    assert len(block_averages(bursts, bursts, window_s=100.0)) == 6
+
+
+def test_one_grid_for_two_series():
+    slow, fast = np.arange(3.0, 100.0), np.arange(1.0, 100.0, 0.1)
+    one = block_averages(slow, slow, window_s=10.0, start=10.0)
+    two = block_averages(fast, fast, window_s=10.0, start=10.0)
+    np.testing.assert_allclose(one.values[0], np.arange(14.5, 100, 10))
+    np.testing.assert_allclose(two.values[0], np.arange(14.95, 100, 10), atol=1e-9)
+
+
+def test_a_large_offset_costs_no_digits():
+    rng = np.random.default_rng(2)
+    noise = np.round(rng.normal(size=100_000) * 2**20) / 2**20
+    got = block_averages(np.arange(1e5), noise + 2.0**25, window_s=1e4)
+    want = noise.reshape(10, -1).mean(axis=1)
+    np.testing.assert_allclose(got.values[0] - 2.0**25, want, atol=1e-8)
+
+
+@settings(deadline=None)
+@given(
+    steps=st.lists(st.sampled_from([1.0, 1.0, 1.0, 1.0, 2.0, 2.5, 7.0, 40.0]), min_size=1, max_size=80),
+    window_s=st.sampled_from([0.5, 1.0, 2.5, 5.0, 10.0, 30.0]),
+)
+def test_equals_the_definition(steps: list[float], window_s: float):
+    time = np.cumsum([0.0, *steps])
+    values = np.sin(time)
+    want, counts = plain(time, values, window_s)
+    got = block_averages(time, values, window_s=window_s)
+    np.testing.assert_allclose(got.values[0], want, atol=1e-13)
+    assert got.counts.tolist() == counts
+
+
+def test_empty_single_and_bad_input():
+    empty = np.empty(0)
+    assert len(block_averages(empty, empty, window_s=1.0)) == 0
+    assert block_averages([3.0], [7.0], window_s=1.0).values[0].tolist() == [7.0]
+    with pytest.raises(InputError, match="positive"):
+        block_averages([0.0, 1.0], [1.0, 2.0], window_s=0.0)
+    with pytest.raises(InputError, match="column 2 has 1 samples"):
+        block_averages([0.0, 1.0], [1.0, 2.0], [1.0], window_s=1.0)
