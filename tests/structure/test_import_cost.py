@@ -1,0 +1,31 @@
+"""`import fogml` and the run type stay free of the heavy libraries."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import pytest
+
+HEAVY = {"torch", "sklearn", "pandas", "matplotlib", "plotly", "onnx"}
+
+
+@pytest.mark.parametrize("module", ["fogml", "fogml.errors", "fogml.runs.run", "fogml.cli.main"])
+def test_import_leaves_heavy_libraries_unloaded(module: str) -> None:
+    code = f"import sys, {module}; print(*sorted({HEAVY!r} & set(sys.modules)))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == ""
+
+
+def test_every_public_name_resolves() -> None:
+    import fogml
+
+    for name in fogml.__all__:
+        assert getattr(fogml, name) is not None
+
+
+def test_an_unknown_name_is_an_attribute_error() -> None:
+    import fogml
+
+    with pytest.raises(AttributeError, match="no attribute 'nonsense'"):
+        _ = fogml.nonsense

@@ -1,0 +1,78 @@
+"""The house's arrows: which package may import which, read from the source itself."""
+
+from __future__ import annotations
+
+import ast
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+import fogml
+
+ROOT = Path(fogml.__file__).parent
+GROUND = {"signals", "runs"}
+FIRST = GROUND | {"features"}
+# For each package, the packages it may import besides itself.
+ALLOWED = {
+    "signals": set(),
+    "runs": {"signals"},
+    "features": GROUND,
+    "models": FIRST,
+    "validation": FIRST | {"models"},
+    "twin": GROUND,
+    "gap": GROUND | {"twin"},
+    "tuning": FIRST | {"models", "validation"},
+    "export": FIRST | {"models", "validation"},
+    "lab": FIRST | {"models", "validation", "twin"},
+    "fleet": FIRST | {"models", "validation", "tuning", "twin", "gap"},
+    "report": FIRST | {"models", "validation", "twin", "gap", "tuning", "export", "lab", "fleet"},
+    "testing": FIRST | {"models", "validation", "twin", "gap"},
+}
+ALLOWED["cli"] = set(ALLOWED) - {"testing"}
+
+
+def imported_packages(path: Path) -> set[str]:
+    """The fogml packages that one file imports, inside functions too."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        names: list[str] = []
+        if isinstance(node, ast.Import):
+            names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+        for name in names:
+            parts = name.split(".")
+            if parts[0] == "fogml" and len(parts) > 1 and (ROOT / parts[1]).is_dir():
+                found.add(parts[1])
+    return found
+
+
+def packages() -> list[str]:
+    return sorted(p.name for p in ROOT.iterdir() if p.is_dir() and any(p.glob("*.py")))
+
+
+def edges() -> dict[str, set[str]]:
+    return {
+        package: set().union(*(imported_packages(f) for f in (ROOT / package).rglob("*.py"))) - {package}
+        for package in packages()
+    }
+
+
+@pytest.mark.parametrize("package", packages())
+def test_imports_follow_the_arrows(package: str) -> None:
+    assert package in ALLOWED, f"fogml/{package} has no place in the house"
+    assert edges()[package] <= ALLOWED[package]
+
+
+def test_there_are_no_circles() -> None:
+    tuple(TopologicalSorter(edges()).static_order())
+
+
+def test_every_file_is_short_enough_to_read() -> None:
+    long = {
+        str(path.relative_to(ROOT)): count
+        for path in ROOT.rglob("*.py")
+        if (count := len(path.read_text(encoding="utf-8").splitlines())) > 330
+    }
+    assert not long
