@@ -108,7 +108,7 @@ def read_side_file(run_path: Path) -> Facts:
     for suffix in (".yaml", ".yml"):
         side = run_path.with_suffix(suffix)
         if side.is_file():
-            return facts_from(_load_yaml(side), side.name)
+            return facts_from(read_yaml(side), side.name)
     return Facts()
 
 
@@ -119,7 +119,14 @@ def side_file_text(facts: Facts) -> str:
     return yaml.safe_dump(facts.as_dict(), sort_keys=False, allow_unicode=True)
 
 
-def _load_yaml(path: Path) -> Any:
+def read_yaml(path: Path) -> Any:
+    """The content of a YAML file.
+
+    Raises
+    ------
+    InputError
+        Naming the file and the line, if it is not YAML.
+    """
     import yaml
 
     try:

@@ -1,0 +1,247 @@
+"""A logger's text file as a table of numbers, by an import profile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.runs.findings import Finding
+from fogml.runs.profile_schema import ImportProfile
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+_NEWLINE, _RETURN, _BLANK, _TAB = 10, 13, 32, 9
+_SIGNATURE_LINES = 20
+
+
+@dataclass(frozen=True)
+class LoggerTable:
+    """The source columns that a profile uses, as numbers in the source's own units.
+
+    Attributes
+    ----------
+    columns
+        Source (name or position) to values, shape (n,).
+    rows
+        Number of each row among all data rows of the file, shape (n,), counted from 0, so that
+        rejected rows keep their place.
+    total_rows
+        Data rows of the file, rejected ones included.
+    findings
+        The rejected rows, counted.
+    """
+
+    columns: Mapping[str | int, FloatArray]
+    rows: IndexArray
+    total_rows: int
+    findings: tuple[Finding, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Lines:
+    """The bytes of a file and where its lines are."""
+
+    text: NDArray[np.uint8]
+    starts: IndexArray
+    ends: IndexArray  # without the line's end mark
+
+    @classmethod
+    def of(cls, content: bytes) -> _Lines:
+        text = np.frombuffer(content, dtype=np.uint8)
+        breaks = np.flatnonzero(text == _NEWLINE)
+        starts = np.concatenate([[0], breaks + 1])
+        ends = np.concatenate([breaks, [len(text)]])
+        if starts[-1] == len(text):
+            starts, ends = starts[:-1], ends[:-1]
+        returns = (ends > starts) & (text[np.maximum(ends - 1, 0)] == _RETURN)
+        return cls(text, starts, ends - returns)
+
+    def line(self, number: int) -> str:
+        return self.text[self.starts[number] : self.ends[number]].tobytes().decode()
+
+    def first_bytes(self) -> NDArray[np.uint8]:
+        """The first byte of each line that is no blank or tab; 0 for a blank line."""
+        visible = np.flatnonzero((self.text != _BLANK) & (self.text != _TAB))
+        if len(visible) == 0:
+            return np.zeros(len(self.starts), dtype=np.uint8)
+        at = np.searchsorted(visible, self.starts)
+        place = visible[np.minimum(at, len(visible) - 1)]
+        return np.where((at < len(visible)) & (place < self.ends), self.text[place], 0).astype(np.uint8)
+
+    def field_counts(self, separator: str | None) -> IndexArray:
+        """Fields of each line, shape (lines,)."""
+        if separator is not None:
+            marks = np.flatnonzero(self.text == ord(separator))
+            return np.searchsorted(marks, self.ends) - np.searchsorted(marks, self.starts) + 1
+        visible = (self.text != _BLANK) & (self.text != _TAB) & (self.text != _RETURN)
+        visible &= self.text != _NEWLINE
+        before = np.concatenate([[False], visible[:-1]])
+        field_starts = np.flatnonzero(visible & ~before)
+        return np.searchsorted(field_starts, self.ends) - np.searchsorted(field_starts, self.starts)
+
+    def keep(self, numbers: IndexArray) -> bytes:
+        """The chosen lines, in order, each closed by a newline."""
+        spans = np.zeros(len(self.text) + 1, dtype=np.int8)
+        spans[self.starts[numbers]] += 1
+        spans[np.minimum(self.ends[numbers] + 1, len(self.text))] -= 1
+        inside = np.cumsum(spans[:-1], dtype=np.int8) > 0
+        chosen = self.text[inside]
+        # The end mark of a line may be a carriage return and a newline: the return stays as the mark.
+        return np.where(chosen == _RETURN, _NEWLINE, chosen).astype(np.uint8).tobytes()
+
+
+def read_logger_text(path: str | Path, profile: ImportProfile, profile_name: str) -> LoggerTable:
+    """Read the source columns of a logger's text file.
+
+    Raises
+    ------
+    InputError
+        If the file is missing, is no text of that encoding, is not of the profile's form, or
+        holds faulty rows that the profile does not reject; the message names file and line.
+    """
+    path = Path(path)
+    return _Reader(path.name, profile, profile_name).read(_content(path, profile))
+
+
+def _content(path: Path, profile: ImportProfile) -> bytes:
+    try:
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
+    if not raw.strip():
+        raise InputError(f"{path.name}: the file is empty")
+    try:
+        text = raw.decode(profile.encoding)
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f"{path.name}: byte {error.start} is no {profile.encoding} text; "
+            "give the file's encoding in the profile (key 'encoding')"
+        ) from None
+    if "\0" in text[:4096]:
+        raise InputError(f"{path.name}: this is a binary file, a text file was expected")
+    return text.removeprefix("\ufeff").encode()
+
+
+class _Reader:
+    def __init__(self, file: str, profile: ImportProfile, profile_name: str) -> None:
+        self.file = file
+        self.profile = profile
+        self.hint = f"is this a file for the profile '{profile_name}'?"
+
+    def read(self, content: bytes) -> LoggerTable:
+        profile = self.profile
+        lines = _Lines.of(content)
+        signature = profile.signature
+        if signature is not None:
+            head = [lines.line(number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
+            if not any(signature in line for line in head):
+                raise InputError(f"{self.file}: '{signature}' was expected in its first lines; {self.hint}")
+        first = lines.first_bytes()
+        used = first != 0
+        used[: profile.skip_lines] = False
+        if profile.comment is not None:
+            for number in np.flatnonzero(used & (first == profile.comment.encode()[0])).tolist():
+                if lines.line(number).lstrip().startswith(profile.comment):
+                    used[number] = False
+        numbers = np.flatnonzero(used)[profile.header_lines :]
+        names: list[str] | None = None
+        if profile.header and len(numbers):
+            names = self._names(lines.line(int(numbers[0])))
+            numbers = numbers[1:]
+        if len(numbers) == 0:
+            raise InputError(f"{self.file}: no data rows; {self.hint}")
+        places = self._places(names)
+        fields = profile.fields or (len(names) if names else 0)
+        return self._table(lines, numbers, fields, places)
+
+    def _names(self, line: str) -> list[str]:
+        separator = self.profile.text_separator
+        names = line.split(separator)
+        return [name.strip().strip('"') for name in names] if self.profile.strip_names else names
+
+    def _places(self, names: list[str] | None) -> dict[str | int, int]:
+        """Position of each source column."""
+        places: dict[str | int, int] = {}
+        for source in self.profile.sources:
+            if isinstance(source, int):
+                places[source] = source
+                continue
+            found = [place for place, name in enumerate(names or []) if name == source]
+            if len(found) != 1:
+                fault = "no column" if not found else "more than one column"
+                raise InputError(
+                    f"{self.file}: {fault} '{source}'; the header holds {', '.join(names or [])}; {self.hint}"
+                )
+            places[source] = found[0]
+        return places
+
+    def _table(
+        self, lines: _Lines, numbers: IndexArray, fields: int, places: dict[str | int, int]
+    ) -> LoggerTable:
+        counts = lines.field_counts(self.profile.text_separator)[numbers]
+        short = counts != fields
+        findings = []
+        if short.any():
+            line = int(numbers[np.argmax(short)])
+            fault = f"{fields} fields were expected, line {line + 1} has {int(counts[np.argmax(short)])}"
+            if not self.profile.reject.wrong_field_count or 2 * np.count_nonzero(short) > len(numbers):
+                raise InputError(f"{self.file}: {fault} ({int(short.sum())} such rows); {self.hint}")
+            findings.append(_rejected(f"without {fields} fields", short))
+        rows = np.flatnonzero(~short)
+        values = self._values(lines.keep(numbers[rows]), fields, list(places.values()))
+        faulty = ~np.isfinite(values).all(axis=0)
+        if faulty.any():
+            line = int(numbers[rows[np.argmax(faulty)]])
+            if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
+                raise InputError(
+                    f"{self.file}: line {line + 1} holds text or nothing in a number's place "
+                    f"({int(faulty.sum())} such rows): '{lines.line(line)[:80]}'; {self.hint}"
+                )
+            bad = np.zeros(len(numbers), dtype=bool)
+            bad[rows[faulty]] = True
+            findings.append(_rejected("with text or nothing in a number's place", bad))
+            rows, values = rows[~faulty], values[:, ~faulty]
+        columns = dict(zip(places, values))
+        return LoggerTable(columns, rows, len(numbers), tuple(findings))
+
+    def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
+        """The source columns as numbers, shape (columns, rows); NaN where there is none."""
+        import pandas as pd
+
+        blank = self.profile.text_separator is None
+        options: dict[str, Any] = {
+            "header": None,
+            "names": range(fields),
+            "usecols": sorted(set(positions)),
+            "decimal": self.profile.decimal,
+            "sep": r"\s+" if blank else self.profile.text_separator,
+            "skipinitialspace": True,
+            "float_precision": "round_trip",
+            "skip_blank_lines": False,
+        }
+        try:
+            frame = pd.read_csv(BytesIO(content), dtype=np.float64, **options)
+        except ValueError:
+            # Some field is no number: read everything as text, and let what is none become NaN.
+            text = pd.read_csv(BytesIO(content), dtype=str, **{**options, "decimal": "."})
+            if self.profile.decimal == ",":
+                text = text.apply(lambda column: column.str.replace(",", ".", regex=False))
+            frame = text.apply(pd.to_numeric, errors="coerce")
+        return np.stack([frame[position].to_numpy(dtype=np.float64) for position in positions])
+
+
+def _rejected(what: str, rows: NDArray[np.bool_]) -> Finding:
+    """A finding that counts rejected rows; `rows` (n,) marks them among the data rows."""
+    count = int(np.count_nonzero(rows))
+    plural = "row" if count == 1 else "rows"
+    return Finding(
+        "rejected_rows", f"{count} {plural} {what} left out", row=int(np.argmax(rows)) + 1, count=count
+    )

@@ -1,0 +1,207 @@
+"""Loggers' recordings brought into the run format by an import profile."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.runs.columns import conversion
+from fogml.runs.facts import Facts, read_side_file
+from fogml.runs.findings import Finding
+from fogml.runs.logger_text import LoggerTable, read_logger_text
+from fogml.runs.profile_schema import ImportColumn, ImportProfile, LeadingJump, load_profile, profile_names
+from fogml.runs.run import Run
+
+__all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
+
+FloatArray = NDArray[np.float64]
+
+
+def import_recording(
+    path: str | Path, profile: str | Path | ImportProfile, axis: str | None = None
+) -> list[Run]:
+    """Bring a logger's file into the run format.
+
+    Parameters
+    ----------
+    path
+        The file; a side file with set-up facts beside it is read too, and overrides the
+        profile's facts.
+    profile
+        Name of a profile that ships, path of a YAML file, or a profile.
+    axis
+        One axis of the profile; all of them if None.
+
+    Returns
+    -------
+    list of Run
+        One for each leg and axis, named ``STEM[-LEG][-AXIS]``, in the internal units of the run
+        format. Time begins at 0 in each; every row left out is counted in the findings.
+
+    Raises
+    ------
+    InputError
+        If the file does not fit the profile; the message names file, line or column.
+    """
+    path = Path(path)
+    name = "given" if isinstance(profile, ImportProfile) else Path(profile).stem
+    profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
+    _check_axis(profile, axis)
+    table = read_logger_text(path, profile, name)
+    return runs_from_table(table, profile, path.stem, path.name, axis, read_side_file(path))
+
+
+def run_names(profile: ImportProfile, stem: str) -> dict[str, tuple[str | None, str | None]]:
+    """Names of the runs that a profile makes of a file, each with its leg and axis."""
+    names: dict[str, tuple[str | None, str | None]] = {}
+    for leg in profile.legs or (None,):
+        for axis in profile.axes or (None,):
+            names["-".join(part for part in (stem, leg, axis) if part is not None)] = (leg, axis)
+    return names
+
+
+def runs_from_table(
+    table: LoggerTable,
+    profile: ImportProfile,
+    stem: str,
+    file: str,
+    axis: str | None = None,
+    facts: Facts | None = None,
+) -> list[Run]:
+    """The runs that a profile makes of a logger's table: legs, axes, units, facts, notes.
+
+    Parameters
+    ----------
+    table
+        What was read from the file.
+    profile
+        The profile it was read by.
+    stem
+        What the runs' names begin with.
+    file
+        Name of the file for messages.
+    axis
+        One axis, or all.
+    facts
+        Facts that override the profile's.
+
+    Raises
+    ------
+    InputError
+        If a leg lies outside the file, the clock goes back, or the axis is unknown.
+    """
+    _check_axis(profile, axis)
+    table = _without_leading_rows(table, profile.reject.leading_jump)
+    runs = []
+    for name, (leg, this_axis) in run_names(profile, stem).items():
+        if axis is None or this_axis == axis:
+            part, findings = _leg(table, profile, leg, file)
+            columns = _columns(table, part, profile, this_axis)
+            _check_clock(columns["time"], table.rows[part], file)
+            run_facts = _facts(profile, this_axis, facts)
+            runs.append(Run(name, columns, run_facts, findings=(*table.findings, *findings)))
+    return [_with_unit(run, profile) for run in runs]
+
+
+def _check_axis(profile: ImportProfile, axis: str | None) -> None:
+    if axis is not None and axis not in profile.axes:
+        known = ", ".join(profile.axes) or "none"
+        raise InputError(f"axis '{axis}' is not in the import profile; its axes are: {known}")
+
+
+def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> LoggerTable:
+    """The table without the leading rows that a jump sets apart."""
+    if rule is None:
+        return table
+    steps = np.abs(np.diff(table.columns[rule.source][: rule.within])) > rule.more_than
+    if not steps.any():
+        return table
+    count = int(np.flatnonzero(steps)[-1]) + 1
+    plural = "row" if count == 1 else "rows"
+    finding = Finding(
+        "rejected_rows",
+        f"{count} leading {plural} left out: '{rule.source}' then jumps by more than {rule.more_than:g}",
+        row=int(table.rows[0]) + 1,
+        count=count,
+    )
+    columns = {source: values[count:] for source, values in table.columns.items()}
+    return replace(table, columns=columns, rows=table.rows[count:], findings=(*table.findings, finding))
+
+
+def _leg(
+    table: LoggerTable, profile: ImportProfile, leg: str | None, file: str
+) -> tuple[slice, tuple[Finding, ...]]:
+    """The rows of a leg, and how many rows of the file belong to none."""
+    if leg is None:
+        return slice(0, len(table.rows)), ()
+    first, end = profile.legs[leg]
+    if end > table.total_rows:
+        raise InputError(
+            f"{file}: leg '{leg}' ends at row {end}, the file has only {table.total_rows} rows; "
+            "the profile's 'legs' belong to another recording"
+        )
+    covered = np.zeros(table.total_rows, dtype=bool)
+    for leg_first, leg_end in profile.legs.values():
+        covered[leg_first:leg_end] = True
+    outside = ~covered[table.rows]
+    findings: tuple[Finding, ...] = ()
+    if outside.any():
+        count = int(np.count_nonzero(outside))
+        message = f"{count} {'row' if count == 1 else 'rows'} of the file in no leg left out"
+        row = int(table.rows[np.argmax(outside)]) + 1
+        findings = (Finding("rejected_rows", message, row=row, count=count),)
+    start, stop = np.searchsorted(table.rows, [first, end])
+    return slice(int(start), int(stop)), findings
+
+
+def _columns(
+    table: LoggerTable, part: slice, profile: ImportProfile, axis: str | None
+) -> dict[str, FloatArray]:
+    columns: dict[str, FloatArray] = {}
+    for name, column in profile.columns.items():
+        source = profile.axes[axis] if name == "gyro" and axis is not None else column.source
+        assert source is not None  # the profile's own check
+        columns[name] = _internal(table.columns[source][part], name, column)
+    if profile.sample_s is not None:
+        rows = table.rows[part]
+        columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
+    columns["time"] = columns["time"] - columns["time"][:1]
+    order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]
+    return {name: columns[name] for name in order}
+
+
+def _internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
+    factor, shift = conversion(name, column.unit, "import profile")
+    return (values * column.scale + column.offset) * factor + shift
+
+
+def _check_clock(time: FloatArray, rows: NDArray[np.intp], file: str) -> None:
+    if len(time) == 0:
+        raise InputError(f"{file}: no rows are left; the profile rejects them all")
+    back = np.diff(time) <= 0.0
+    if back.any():
+        at = int(np.argmax(back)) + 1
+        raise InputError(
+            f"{file}: column 'time' goes back or repeats at data row {int(rows[at]) + 1} "
+            f"({int(np.count_nonzero(back))} such rows); where the clock cannot be trusted, "
+            "give 'sample_s' in the profile in place of a column 'time'"
+        )
+
+
+def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None) -> Facts:
+    """Facts of the profile, then of the axis, then of the side file; notes are joined."""
+    layers = [profile.facts, profile.axis_facts.get(axis or "", Facts()), overriding or Facts()]
+    values: dict[str, object] = {"axis": axis}
+    for layer in layers:
+        values.update({key: getattr(layer, key) for key in layer.model_fields_set})
+    notes = [*profile.notes, *(layer.notes for layer in layers if layer.notes)]
+    values["notes"] = " ".join(notes) or None
+    return Facts(**values)  # type: ignore[arg-type]
+
+
+def _with_unit(run: Run, profile: ImportProfile) -> Run:
+    return replace(run, gyro_unit="count") if profile.columns["gyro"].unit == "count" else run
