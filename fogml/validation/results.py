@@ -17,7 +17,8 @@ FloatArray = NDArray[np.float64]
 class Metrics:
     """Figures of the averages over ``averaging_s``, in deg/h; rms**2 = bias**2 + bias_stability**2.
 
-    ``scale_factor_error`` in ppm, ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in
+    ``scale_factor_error`` (over all turns, with its sign) and ``scale_factor_error_largest`` (of
+    single turns, without) in ppm, ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in
     deg/h; None where the run does not tell.
     """
 
@@ -27,6 +28,7 @@ class Metrics:
     rms: float
     bias_stability_10s: float | None = None
     scale_factor_error: float | None = None
+    scale_factor_error_largest: float | None = None
     temperature_sensitivity: float | None = None
     hysteresis: float | None = None
 

@@ -1,0 +1,119 @@
+"""The command line ``fogml``: finds the command, runs it, and turns errors into exit statuses.
+
+Command modules load on use, so that ``fogml --help`` stays quick. Exit 0: done. 1: done, and a
+stated limit was not met. 2: bad input or usage. 130: interrupted.
+"""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from fogml import __version__
+from fogml.errors import FogmlError
+
+COMMANDS = {
+    "demo": ("fogml.cli.demo", "Train and judge on a real recording that ships, then say what to open."),
+    "import": ("fogml.cli.import_", "Bring a logger's file into the run format."),
+    "inspect": ("fogml.cli.inspect", "Say what is in a run: columns, span, gaps, soaks and ramps, faults."),
+    "train": ("fogml.cli.train", "Fit a drift model on some runs and judge it on others."),
+    "compare": ("fogml.cli.compare", "Judge every model and baseline on the same split, in one table."),
+    "compensate": ("fogml.cli.compensate", "Apply a model to a run of any length, in bounded memory."),
+    "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
+}
+"""Name of each command: its module, and its help in one line."""
+
+DONE, LIMIT_NOT_MET, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+
+class LazyGroup(TyperGroup):
+    """A group whose commands load when they are called."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in COMMANDS:
+            return None
+        module = import_module(COMMANDS[cmd_name][0])
+        command = typer.main.get_command(module.app)
+        command.name = cmd_name
+        return command
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+            from difflib import get_close_matches
+
+            near = get_close_matches(args[0], COMMANDS, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else f" Commands are {', '.join(COMMANDS)}."
+            fail(f"no such command '{args[0]}'.{hint}")
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        try:
+            return super().invoke(ctx)
+        except FogmlError as error:
+            fail(str(error))
+        except BrokenPipeError:
+            raise
+        except OSError as error:
+            fail(_system_message(error))
+        except MemoryError:
+            fail("not enough memory for this; close other programs or use a shorter run")
+        except KeyboardInterrupt:
+            typer.echo("fogml: interrupted; nothing was written", err=True)
+            raise typer.Exit(INTERRUPTED) from None
+
+
+def fail(message: str) -> None:
+    """Print one message on stderr and end with exit status 2."""
+    typer.echo(f"fogml: {message}", err=True)
+    raise typer.Exit(BAD_INPUT) from None
+
+
+def _system_message(error: OSError) -> str:
+    place = f"{error.filename}: " if error.filename else ""
+    return f"{place}{error.strerror or error}"
+
+
+app = typer.Typer(
+    cls=LazyGroup,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"fogml {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def fogml(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end."),
+    ] = False,
+) -> None:
+    """Temperature drift models for fibre-optic gyros: train on one chamber run, judge on another."""
+
+
+def main() -> None:
+    """Entry point of the program ``fogml``."""
+    for stream in (sys.stdout, sys.stderr):
+        # A terminal that can't show a character must not end a long job.
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
+    app(prog_name="fogml")

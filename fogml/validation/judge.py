@@ -1,0 +1,232 @@
+"""Judging a fitted drift model: on the runs it was trained on, and on runs it has never seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.runs.findings import Finding
+from fogml.runs.regimes import regimes
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.transitions import transition_mask
+from fogml.validation.floors import floor_of_run
+from fogml.validation.metrics import QUANTITIES, RunMetrics
+from fogml.validation.results import AveragedSeries, Judgement, LimitOutcome, RunJudgement
+
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
+
+DEFAULT_AVERAGING_S = 100.0
+_OUTSIDE = 1
+
+
+def judge(
+    model: DriftModel,
+    train_runs: Run | Sequence[Run],
+    test_runs: Run | Sequence[Run],
+    *,
+    averaging_s: float = DEFAULT_AVERAGING_S,
+    design_index: float | None = None,
+    limits: Mapping[str, float] | None = None,
+    any_unit: bool = False,
+) -> Judgement:
+    """Judge a fitted model on its training runs and on test runs.
+
+    The error before is the output less the reference rate; after, less the model's drift too.
+    Where Earth rate is not known for every run, the mean over the training runs is taken from
+    both, each its own, so that the bias tells how far the constant moved since training. Rows
+    whose window is not full and transitions of the turntable are left out.
+
+    Parameters
+    ----------
+    model
+        A fitted drift model.
+    train_runs, test_runs
+        What it was fitted on, and what it is judged on.
+    averaging_s
+        Averaging time of every figure [s].
+    design_index
+        Greatest ``after.rms`` allowed on the test runs [deg/h].
+    limits
+        Greatest absolute values allowed of other figures of `after`, by the names in
+        :class:`~fogml.validation.results.Metrics`.
+    any_unit
+        Judge runs of another unit or axis than the model's as well.
+
+    Raises
+    ------
+    InputError
+        For a limit that is unknown or that no test run tells, for a run of another unit or axis,
+        and for a run too short for two averages.
+    """
+    train = [train_runs] if isinstance(train_runs, Run) else list(train_runs)
+    test = [test_runs] if isinstance(test_runs, Run) else list(test_runs)
+    if not train or not test:
+        raise InputError("a judgement needs at least one training run and one test run")
+    limits = check_limits(limits or {})
+    if design_index is not None:
+        check_limits({"design index": design_index}, names=("design index",))
+    train_errors = [_errors(model, run, any_unit=True) for run in train]
+    test_errors = [_errors(model, run, any_unit=any_unit) for run in test]
+    earth_known = all(run.earth_known for run in (*train, *test))
+    constant = (0.0, 0.0) if earth_known else _training_means(train_errors)
+    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in train_errors)
+    judged_test = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in test_errors)
+    return Judgement(
+        model=model.describe(),
+        train=judged_train,
+        test=judged_test,
+        design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
+        limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
+        notes=_notes(train, test),
+    )
+
+
+def check_limits(limits: Mapping[str, float], names: Sequence[str] = QUANTITIES) -> dict[str, float]:
+    """The limits as floats.
+
+    Raises
+    ------
+    InputError
+        For an unknown quantity, listing the known, and for a limit that is no positive number.
+    """
+    checked = {}
+    for name, limit in limits.items():
+        if name not in names:
+            raise InputError(f"limit on '{name}': no such figure; known are {', '.join(names)}")
+        if not (math.isfinite(limit) and limit > 0.0):
+            raise InputError(f"limit {name}={limit:g}: a positive number is needed")
+        checked[name] = float(limit)
+    return checked
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """One run's error before and after the model [deg/h], and which rows count.
+
+    ``half_width`` is the 90 % prediction interval's [deg/h]; every array has shape (n,).
+    """
+
+    run: Run
+    before: FloatArray
+    drift: FloatArray
+    half_width: FloatArray
+    flag: NDArray[np.int8]
+    used: BoolArray
+    notes: tuple[str, ...]
+
+    @property
+    def after(self) -> FloatArray:
+        return self.before - self.drift
+
+
+def _errors(model: DriftModel, run: Run, *, any_unit: bool) -> _Errors:
+    notes = model.check_applies(run, any_unit=any_unit)
+    evaluation = model.evaluate(run)
+    half_width = model.intervals_.half_width(0.9, evaluation.excess)
+    used = evaluation.full & ~transition_mask(run)
+    return _Errors(run, run.error_deg_h, evaluation.drift, half_width, evaluation.flag, used, notes)
+
+
+def _training_means(errors: Sequence[_Errors]) -> tuple[float, float]:
+    """Mean error before and after over the used rows of all training runs [deg/h]."""
+    rows = sum(int(e.used.sum()) for e in errors)
+    if rows == 0:
+        names = ", ".join(e.run.name for e in errors)
+        raise InputError(f"{names}: no usable row; the windows of the features are longer than the runs")
+    before = sum(float(e.before[e.used].sum()) for e in errors) / rows
+    after = sum(float(e.after[e.used].sum()) for e in errors) / rows
+    return before, after
+
+
+def _judge_run(
+    errors: _Errors, averaging_s: float, constant: tuple[float, float], earth_known: bool
+) -> RunJudgement:
+    run, used = errors.run, errors.used
+    metrics = RunMetrics(run, used, averaging_s)
+    before = errors.before - constant[0]
+    after = errors.after - constant[1]
+    outside = int((errors.flag[used] == _OUTSIDE).sum())
+    share = outside / int(used.sum())
+    findings = run.findings
+    if outside:
+        message = (
+            f"{share:.1%} of the samples lie outside the temperatures and rates that the model was trained on"
+        )
+        findings = (*findings, Finding("outside_training", message, count=outside))
+    return RunJudgement(
+        run=run.name,
+        unit=run.facts.unit,
+        axis=run.facts.axis,
+        averaging_s=averaging_s,
+        before=metrics.figures(before),
+        after=metrics.figures(after),
+        floor=floor_of_run(run, used, errors.after, averaging_s),
+        outside_training=share,
+        rows_used=int(used.sum()),
+        rows_left_out=int((~used).sum()),
+        bias_reference="earth rate" if earth_known else "training mean",
+        series=_series(errors, metrics, before, after),
+        findings=findings,
+        notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes),
+    )
+
+
+def _series(errors: _Errors, metrics: RunMetrics, before: FloatArray, after: FloatArray) -> AveragedSeries:
+    run, used = errors.run, errors.used
+    temperature = run.temperature("T") if run.temperature_columns else np.full(len(run), np.nan)
+    columns = [temperature, before, after, errors.drift, errors.half_width]
+    averages = metrics.averages(*(column[used] for column in columns))
+    temperature, before, after, drift, half_width = averages.values
+    # A window is named after the regime and the flag of its middle sample.
+    middle = np.flatnonzero(used)[(averages.starts + averages.stops) // 2]
+    found = regimes(run)
+    rate = np.gradient(temperature, averages.time_s) * 60.0
+    return AveragedSeries(
+        time=averages.time_s,
+        temperature=temperature,
+        rate=rate,
+        before=before,
+        after=after,
+        drift=drift,
+        lower=-half_width,
+        upper=half_width,
+        regime=np.asarray(found.names, dtype=np.str_)[found.labels[middle]],
+        flag=np.asarray(errors.flag[middle], dtype=np.int8),
+    )
+
+
+def outcome_of(quantity: str, limit: float, test: Sequence[RunJudgement]) -> LimitOutcome:
+    """A limit against the largest absolute value over the test runs that tell it."""
+    values = [getattr(run.after, quantity) for run in test]
+    told = [abs(value) for value in values if value is not None]
+    if not told:
+        raise InputError(
+            f"limit on '{quantity}': no test run tells it (scale factor needs turns of the table, "
+            "temperature sensitivity and hysteresis need soaks); drop the limit or give such a run"
+        )
+    value = max(told)
+    return LimitOutcome(quantity=quantity, limit=limit, value=value, met=bool(value <= limit))
+
+
+def _notes(train: Sequence[Run], test: Sequence[Run]) -> tuple[str, ...]:
+    runs = (*train, *test)
+    unknown = sorted({run.name for run in runs if not run.earth_known})
+    if not unknown:
+        return ()
+    if len(unknown) < len({run.name for run in runs}):
+        return (
+            f"Earth rate is known for some runs and not for {', '.join(unknown)}: biases are given relative "
+            "to the training runs' mean and hold the difference; state latitude and input_axis in the "
+            "side file of each run.",
+        )
+    return (
+        "Earth rate is not known (no latitude and input_axis in the side files): a constant is estimated, "
+        "and biases are relative to the training runs' mean.",
+    )

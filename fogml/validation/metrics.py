@@ -1,0 +1,122 @@
+"""The figures of a run's error: bias, bias stability, range, rms, and what soaks and turns tell."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fogml.errors import InputError
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.signals.averages import BlockAverages, block_averages
+from fogml.validation.results import Metrics
+from fogml.validation.scale_factor import find_steps, scale_factor_error
+from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
+
+SHORT_AVERAGING_S = 10.0
+QUANTITIES = tuple(field.name for field in dataclasses.fields(Metrics))
+"""Names of the figures that a limit may be put on."""
+
+
+@dataclass(frozen=True)
+class AverageFigures:
+    """Figures of averages [deg/h]: ``rms**2 = bias**2 + bias_stability**2``."""
+
+    bias: float
+    bias_stability: float
+    range: float
+    rms: float
+
+
+def figures_of_averages(averages: ArrayLike) -> AverageFigures:
+    """Bias, bias stability, range and rms of consecutive averages.
+
+    Parameters
+    ----------
+    averages
+        Averages of the error [deg/h], shape (m,), m >= 1. The bias stability is their standard
+        deviation over m (not m - 1), so that the squares add up to the rms.
+    """
+    values = np.asarray(averages, dtype=np.float64)
+    bias = float(values.mean())
+    stability = float(values.std())
+    return AverageFigures(
+        bias=bias,
+        bias_stability=stability,
+        range=float(values.max() - values.min()),
+        rms=float(np.hypot(bias, stability)),
+    )
+
+
+class RunMetrics:
+    """The figures of any error series over the same rows of one run.
+
+    Windows, soaks and turns are found once, so that before and after are treated alike.
+
+    Parameters
+    ----------
+    run
+        The run.
+    used
+        Rows that count, shape (n,): windows full, transitions of the table cut.
+    averaging_s
+        Averaging time [s].
+
+    Raises
+    ------
+    InputError
+        If the averaging time is shorter than a sample interval, or the run holds fewer than two
+        averages.
+    """
+
+    def __init__(self, run: Run, used: BoolArray, averaging_s: float) -> None:
+        if not (np.isfinite(averaging_s) and averaging_s > 0.0):
+            raise InputError(f"averaging time {averaging_s} s: a positive number of seconds is needed")
+        if averaging_s < run.sample_s * (1.0 - 1e-9):
+            raise InputError(
+                f"{run.name}: averages over {averaging_s:g} s are asked for, but samples are "
+                f"{run.sample_s:g} s apart; choose a longer --averaging"
+            )
+        self.run = run
+        self.used = used
+        self.averaging_s = averaging_s
+        self._time = run.time[used]
+        self._soaks = find_soaks(run, used, least_s=averaging_s)
+        self._steps = find_steps(run, used)
+        found = len(self.averages(self._time))
+        if found < 2:
+            raise InputError(
+                f"{run.name}: {used.sum()} usable rows give {found} averages over {averaging_s:g} s, at "
+                "least 2 are needed; choose a shorter --averaging or a longer run"
+            )
+
+    def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
+        """Averages over the averaging time of columns that hold the used rows only."""
+        return block_averages(self._time, *columns, window_s=window_s or self.averaging_s)
+
+    def figures(self, error_deg_h: FloatArray) -> Metrics:
+        """The figures of an error series [deg/h] of the whole run, shape (n,)."""
+        error = error_deg_h[self.used]
+        main = figures_of_averages(self.averages(error).values[0])
+        biases = [float(error_deg_h[soak.rows].mean()) for soak in self._soaks]
+        scale = scale_factor_error(self._steps, error_deg_h) if self._steps is not None else None
+        return Metrics(
+            bias=main.bias,
+            bias_stability=main.bias_stability,
+            range=main.range,
+            rms=main.rms,
+            bias_stability_10s=self._short_stability(error),
+            scale_factor_error=scale.overall if scale else None,
+            scale_factor_error_largest=scale.largest if scale else None,
+            temperature_sensitivity=temperature_sensitivity(self._soaks, biases),
+            hysteresis=hysteresis(self._soaks, biases),
+        )
+
+    def _short_stability(self, error: FloatArray) -> float | None:
+        """Bias stability at 10 s, where a window holds at least two samples and lasts no longer."""
+        if self.run.sample_s > SHORT_AVERAGING_S / 2.0:
+            return None
+        averages = self.averages(error, window_s=SHORT_AVERAGING_S).values[0]
+        return figures_of_averages(averages).bias_stability if len(averages) > 1 else None

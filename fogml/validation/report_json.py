@@ -1,0 +1,90 @@
+"""A judgement as the values of ``report.json`` and ``compare.json``."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from fogml.validation.results import Judgement, LimitOutcome, Metrics, RunJudgement
+
+if TYPE_CHECKING:
+    from fogml.validation.compare import Comparison
+
+TRAIN_SCHEMA = "fogml.train/1"
+COMPARE_SCHEMA = "fogml.compare/1"
+
+
+def judgement_json(judgement: Judgement) -> dict[str, Any]:
+    """A judgement as JSON-ready values, schema ``fogml.train/1``."""
+    values: dict[str, Any] = {"schema": TRAIN_SCHEMA, **_body(judgement)}
+    return finite_json(values)
+
+
+def comparison_json(comparison: Comparison) -> dict[str, Any]:
+    """A comparison as JSON-ready values, schema ``fogml.compare/1``.
+
+    ``models`` holds each judged model as in ``fogml.train/1``, ``failed`` the reason for each
+    that could not be fitted or judged.
+    """
+    values = {
+        "schema": COMPARE_SCHEMA,
+        "models": {name: _body(judgement) for name, judgement in comparison.judgements.items()},
+        "failed": dict(comparison.failed),
+    }
+    return finite_json(values)
+
+
+def _body(judgement: Judgement) -> dict[str, Any]:
+    values: dict[str, Any] = {
+        "model": judgement.model,
+        "train": [_run(run) for run in judgement.train],
+        "test": [_run(run) for run in judgement.test],
+    }
+    if judgement.design_index is not None:
+        outcome = judgement.design_index
+        values["design_index"] = {"limit": outcome.limit, "value": outcome.value, "met": outcome.met}
+    values["limits"] = [_limit(outcome) for outcome in judgement.limits]
+    values["met"] = judgement.met
+    values["notes"] = list(judgement.notes)
+    return values
+
+
+def _run(judged: RunJudgement) -> dict[str, Any]:
+    return {
+        "run": judged.run,
+        "unit": "deg/h",
+        "averaging_s": judged.averaging_s,
+        "before": _metrics(judged.before),
+        "after": _metrics(judged.after),
+        "floor": judged.floor,
+        "outside_training": judged.outside_training,
+        "rows_used": judged.rows_used,
+        "rows_left_out": judged.rows_left_out,
+        "bias_reference": judged.bias_reference,
+        "serial_number": judged.unit,
+        "axis": judged.axis,
+        "findings": [finding.as_dict() for finding in judged.findings],
+        "notes": list(judged.notes),
+    }
+
+
+def _metrics(metrics: Metrics) -> dict[str, float]:
+    return {name: value for name, value in asdict(metrics).items() if value is not None}
+
+
+def _limit(outcome: LimitOutcome) -> dict[str, Any]:
+    return asdict(outcome)
+
+
+def finite_json(value: Any) -> Any:
+    """The value with numpy's scalars and arrays as Python's, tuples as lists, NaN and infinities as None."""
+    if isinstance(value, dict):
+        return {str(key): finite_json(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [finite_json(item) for item in value]
+    if hasattr(value, "tolist"):
+        return finite_json(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

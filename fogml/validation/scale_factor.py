@@ -1,0 +1,120 @@
+"""Scale factor error from the turns of a rate table.
+
+Between two neighbouring plateaus of the table's rate the output steps by ``K * step in rate``.
+Steps are taken between equally long pieces beside the transition, so a bias that drifts slowly
+cancels, and wholly so over a turn one way and back.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.transitions import find_transitions
+
+LEAST_STEP = 0.02
+"""Steps smaller than this share of the run's greatest step are no turns."""
+LONGEST_PIECE_S = 60.0
+"""Longest piece beside a transition [s]: long enough to average, short enough for a moving bias."""
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Steps of the table's rate in a run: k steps, and the rows on both sides of each.
+
+    Attributes
+    ----------
+    before, after
+        Row ranges [start, stop) among the usable rows, shape (k, 2).
+    height
+        Step of the reference rate [deg/h], shape (k,).
+    turn
+        Which turn (from rest to rest) each step belongs to, shape (k,).
+    usable
+        Indices of the usable rows, shape (m,).
+    """
+
+    before: NDArray[np.intp]
+    after: NDArray[np.intp]
+    height: FloatArray
+    turn: NDArray[np.intp]
+    usable: NDArray[np.intp]
+
+    def __len__(self) -> int:
+        return len(self.height)
+
+
+@dataclass(frozen=True)
+class ScaleFactorError:
+    """Scale factor error [ppm]: by least squares over all steps, and the greatest of single turns."""
+
+    overall: float
+    largest: float
+
+
+def find_steps(run: Run, used: BoolArray) -> Steps | None:
+    """The steps of the table's rate with usable rows on both sides, None if the table never turned.
+
+    Parameters
+    ----------
+    used
+        Rows that count, transitions cut, shape (n,).
+    """
+    if "rate" not in run.columns:
+        return None
+    usable = np.flatnonzero(used)
+    # Ramps of the table give several transitions with no usable row between: those plateaus are
+    # empty and fall out here.
+    cuts = np.union1d(find_transitions(run), run.gap_starts)
+    edges = np.unique(np.searchsorted(usable, cuts))
+    edges = np.concatenate(([0], edges[(edges > 0) & (edges < len(usable))], [len(usable)]))
+    if len(edges) < 3:
+        return None
+    time = run.time[usable]
+    reference = 3600.0 * run.rate[usable]
+    gap_before = np.isin(edges[1:-1], np.searchsorted(usable, run.gap_starts))
+    means = np.add.reduceat(reference, edges[:-1]) / np.diff(edges)
+    before, after, height, at_rest = [], [], [], []
+    steps = np.abs(np.diff(means))
+    least = LEAST_STEP * steps.max()
+    resting = np.abs(means) < least
+    for i in np.flatnonzero((steps >= least) & (steps > 0.0) & ~gap_before):
+        start, middle, stop = edges[i], edges[i + 1], edges[i + 2]
+        length = min(LONGEST_PIECE_S, time[middle - 1] - time[start], time[stop - 1] - time[middle])
+        first = int(np.searchsorted(time, time[middle - 1] - length))
+        last = int(np.searchsorted(time, time[middle] + length, side="right"))
+        before.append((first, middle))
+        after.append((middle, last))
+        height.append(reference[middle:last].mean() - reference[first:middle].mean())
+        at_rest.append(bool(resting[i]))
+    if not height:
+        return None
+    turn = np.cumsum(np.array(at_rest, dtype=np.intp))
+    pairs = [np.array(rows, dtype=np.intp).reshape(-1, 2) for rows in (before, after)]
+    return Steps(pairs[0], pairs[1], np.array(height), turn, usable)
+
+
+def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorError:
+    """Scale factor error ``K - 1`` [ppm] from the steps of an error series.
+
+    Parameters
+    ----------
+    error_deg_h
+        Output less reference rate [deg/h], shape (n,): the whole run's.
+    """
+    values = error_deg_h[steps.usable]
+    sums = np.concatenate(([0.0], np.cumsum(values - values.mean())))
+
+    def mean(rows: NDArray[np.intp]) -> FloatArray:
+        return np.asarray((sums[rows[:, 1]] - sums[rows[:, 0]]) / (rows[:, 1] - rows[:, 0]))
+
+    products = (mean(steps.after) - mean(steps.before)) * steps.height
+    squares = steps.height**2
+    turns, member = np.unique(steps.turn, return_inverse=True)
+    each = np.bincount(member, products, len(turns)) / np.bincount(member, squares, len(turns))
+    return ScaleFactorError(
+        overall=float(1e6 * products.sum() / squares.sum()), largest=float(1e6 * np.abs(each).max())
+    )
