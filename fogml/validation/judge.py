@@ -35,6 +35,7 @@ def judge(
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
     any_unit: bool = False,
+    notes: Sequence[str] = (),
 ) -> Judgement:
     """Judge a fitted model on its training runs and on test runs.
 
@@ -58,6 +59,8 @@ def judge(
         :class:`~fogml.validation.results.Metrics`.
     any_unit
         Judge runs of another unit or axis than the model's as well.
+    notes
+        What else the judgement should say.
 
     Raises
     ------
@@ -77,14 +80,16 @@ def judge(
     earth_known = all(run.earth_known for run in (*train, *test))
     constant = (0.0, 0.0) if earth_known else _training_means(train_errors)
     judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in train_errors)
-    judged_test = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in test_errors)
+    judged_test = tuple(
+        _judge_run(e, averaging_s, constant, earth_known, seen=_seen(e.run, train)) for e in test_errors
+    )
     return Judgement(
         model=model.describe(),
         train=judged_train,
         test=judged_test,
         design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
-        notes=_notes(train, test),
+        notes=(*notes, *_notes(train, test)),
     )
 
 
@@ -134,6 +139,18 @@ def _errors(model: DriftModel, run: Run, *, any_unit: bool) -> _Errors:
     return _Errors(run, run.error_deg_h, evaluation.drift, half_width, evaluation.flag, used, notes)
 
 
+def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
+    """Whether a test run holds the very samples of a training run."""
+    for other in train:
+        if np.array_equal(run.time, other.time) and np.array_equal(run.gyro, other.gyro):
+            message = (
+                f"holds the same samples as training run {other.name}: its figures say how well the model "
+                "was fitted, not how well it holds"
+            )
+            return (Finding("seen_in_training", message, count=len(run)),)
+    return ()
+
+
 def _training_means(errors: Sequence[_Errors]) -> tuple[float, float]:
     """Mean error before and after over the used rows of all training runs [deg/h]."""
     rows = sum(int(e.used.sum()) for e in errors)
@@ -146,7 +163,11 @@ def _training_means(errors: Sequence[_Errors]) -> tuple[float, float]:
 
 
 def _judge_run(
-    errors: _Errors, averaging_s: float, constant: tuple[float, float], earth_known: bool
+    errors: _Errors,
+    averaging_s: float,
+    constant: tuple[float, float],
+    earth_known: bool,
+    seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
     run, used = errors.run, errors.used
     metrics = RunMetrics(run, used, averaging_s)
@@ -154,7 +175,7 @@ def _judge_run(
     after = errors.after - constant[1]
     outside = int((errors.flag[used] == _OUTSIDE).sum())
     share = outside / int(used.sum())
-    findings = run.findings
+    findings = (*run.findings, *seen)
     if outside:
         message = (
             f"{share:.1%} of the samples lie outside the temperatures and rates that the model was trained on"

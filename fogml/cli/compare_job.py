@@ -1,0 +1,134 @@
+"""The job of ``fogml compare``."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+
+from pydantic import field_validator
+
+from fogml.cli.runs import open_runs
+from fogml.cli.settings import LimitSettings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.cli.train_job import check_settings
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+from fogml.validation.compare import Comparison, compare
+from fogml.validation.report_json import comparison_json
+from fogml.validation.strict import hold_strict
+
+
+class CompareSettings(LimitSettings):
+    """Settings of ``fogml compare``."""
+
+    runs: list[str] = []
+    test: list[str] = []
+    leave_one_out: bool = False
+    models: list[str] = ["all"]
+    features: str | None = None
+    repair: bool = False
+    strict: bool = False
+    any_unit: bool = False
+    out: str = "compare-results"
+
+    @field_validator("models", mode="before")
+    @classmethod
+    def _from_text(cls, value: object) -> object:
+        if isinstance(value, str):
+            return [name.strip() for name in value.split(",") if name.strip()]
+        return value
+
+    def in_full(self) -> CompareSettings:
+        """The settings with every path in full."""
+        return self.model_copy(
+            update={
+                "runs": [absolute(path) for path in self.runs],
+                "test": [absolute(path) for path in self.test],
+                "out": absolute(self.out),
+            }
+        )
+
+
+def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:
+    """Fit and judge every model, write the results, print them; whether some model meets the limits."""
+    check_settings(settings)
+    makers = _makers(settings)
+    with whole_folder(settings.out) as folder:
+        comparison = _compare(settings, makers, terminal)
+        values = comparison_json(comparison)
+        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
+        (folder / "compare.json").write_text(text + "\n", encoding="utf-8")
+        with terminal.work("drawing"):
+            from fogml.report import compare_page
+
+            page = compare_page(comparison.judgements, comparison.failed)
+        (folder / "compare.html").write_text(page, encoding="utf-8")
+        (folder / "config.yaml").write_text(settings.in_full().yaml("compare"), encoding="utf-8")
+    _print(comparison, terminal)
+    terminal.result(values)
+    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'compare.html'}")
+    return any(judgement.met for judgement in comparison.judgements.values())
+
+
+def _makers(settings: CompareSettings) -> dict[str, partial]:
+    from fogml.models.names import MODEL_NAMES, make_model
+
+    names: list[str] = []
+    for name in settings.models:
+        names += MODEL_NAMES if name == "all" else [name]
+    makers = {name: partial(make_model, name, settings.features, settings.seed) for name in names}
+    for name, make in makers.items():
+        if name not in MODEL_NAMES:
+            make()  # an unknown name is an error before any run is read
+    return makers
+
+
+def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Terminal) -> Comparison:
+    if not settings.runs:
+        raise InputError("no training run is given; name the training runs before --test")
+    if settings.leave_one_out == bool(settings.test):
+        raise InputError("give test runs after --test, or --leave-one-out without --test")
+    train_runs = open_runs(settings.runs, terminal, repair=settings.repair)
+    test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else None
+    if settings.strict:
+        hold_strict([(run.name, run.findings) for run in (*train_runs, *(test_runs or []))])
+    with terminal.work("comparing", total=len(makers)) as work:
+        begun: list[str] = []
+
+        def step(name: str) -> None:
+            work.advance(1.0 if begun else 0.0, f"fitting {name}")
+            begun.append(name)
+
+        comparison = compare(
+            makers,
+            train_runs,
+            test_runs,
+            averaging_s=settings.averaging,
+            design_index=settings.design_index,
+            limits=settings.limits,
+            any_unit=settings.any_unit,
+            step=step,
+        )
+    if settings.strict:
+        for judgement in comparison.judgements.values():
+            hold_strict([(run.run, run.findings) for run in judgement.test])
+    return comparison
+
+
+def _print(comparison: Comparison, terminal: Terminal) -> None:
+    several = len(next(iter(comparison.judgements.values())).test) > 1
+    rows = []
+    for name, judgement in comparison.judgements.items():
+        for run in judgement.test:
+            label = f"{name} on {run.run}" if several else name
+            figures = (run.after.rms, run.after.bias, run.after.bias_stability, run.after.range)
+            rows.append([label, str(judgement.model["parameters"]), *(number(value) for value in figures)])
+    run = next(iter(comparison.judgements.values())).test[0]
+    terminal.table(
+        f"After compensation, {run.averaging_s:g} s averages, deg/h (noise floor {number(run.floor)})",
+        ["model", "parameters", "rms", "bias", "bias stability", "range"],
+        rows,
+    )
+    for name, reason in comparison.failed.items():
+        terminal.say(f"{name}: not fitted: {reason}")

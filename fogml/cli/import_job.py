@@ -1,0 +1,63 @@
+"""The job of ``fogml import``."""
+
+from __future__ import annotations
+
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+
+
+class ImportSettings(Settings):
+    """Settings of ``fogml import``."""
+
+    file: str | None = None
+    profile: str | None = None
+    axis: str | None = None
+    out: str | None = None
+
+    def in_full(self) -> ImportSettings:
+        """The settings with every path in full; a profile that ships keeps its name."""
+        from fogml.runs.profiles import profile_names
+
+        assert self.file and self.profile and self.out
+        profile = self.profile if self.profile in profile_names() else absolute(self.profile)
+        return self.model_copy(
+            update={"file": absolute(self.file), "profile": profile, "out": absolute(self.out)}
+        )
+
+
+def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
+    """Import, write the runs into ``settings.out``, and say what was written."""
+    from fogml.runs.profiles import import_recording, profile_names
+    from fogml.runs.writing import write_run
+
+    if not settings.file:
+        raise InputError("no file is given; name the logger's file")
+    if not settings.profile:
+        raise InputError(f"no --profile is given; those that ship are {', '.join(profile_names())}")
+    if not settings.out:
+        raise InputError("no --out is given; name the folder for the runs")
+    written = []
+    with whole_folder(settings.out) as folder:
+        with terminal.work(f"reading {settings.file}") as work:
+            runs = import_recording(settings.file, settings.profile, settings.axis)
+            for run in runs:
+                work.doing(f"writing {run.name}")
+                write_run(run, folder / f"{run.name}.csv")
+        for run in runs:
+            for finding in run.findings:
+                terminal.note(f"{run.name}: {finding.message}")
+            written.append(
+                {
+                    "run": f"{run.name}.csv",
+                    "rows": len(run),
+                    "span_s": run.span_s,
+                    "facts": run.facts.as_dict(),
+                    "findings": [finding.as_dict() for finding in run.findings],
+                }
+            )
+        (folder / "config.yaml").write_text(settings.in_full().yaml("import"), encoding="utf-8")
+    rows = [[run.name, str(len(run)), f"{run.span_s:.6g}"] for run in runs]
+    terminal.table(f"Written to {settings.out}", ["run", "rows", "span [s]"], rows)
+    terminal.result({"schema": "fogml.import/1", "runs": written})

@@ -1,0 +1,45 @@
+"""Opening the runs that a command names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fogml.cli.settings import SHIPPED
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.runs.run import Run
+
+
+def open_run(path: str, *, repair: bool = False) -> Run:
+    """The run in a file, or ``shipped:NAME``, checked: what is noticed is in its findings."""
+    from fogml.runs.checks import check_run
+    from fogml.runs.reading import read_run
+    from fogml.runs.shipped import shipped_run
+
+    run = (
+        shipped_run(path.removeprefix(SHIPPED)) if path.startswith(SHIPPED) else read_run(path, repair=repair)
+    )
+    return run.with_findings(check_run(run))
+
+
+def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: bool = False) -> list[Run]:
+    """The runs in several files; findings are noted on stderr.
+
+    Raises
+    ------
+    InputError
+        If a file is named twice.
+    """
+    twice = sorted({path for path in paths if list(paths).count(path) > 1})
+    if twice:
+        raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
+    runs = []
+    with terminal.work("reading", total=len(paths)) as work:
+        for path in paths:
+            work.doing(f"reading {path}")
+            runs.append(open_run(path, repair=repair))
+            work.advance()
+    for run in runs:
+        for finding in run.findings:
+            terminal.note(f"{run.name}: {finding.message}")
+    return runs

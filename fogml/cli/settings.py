@@ -1,0 +1,134 @@
+"""Settings of a command: a YAML file, overridden by flags, checked, and written beside the results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, Self, TypeVar
+
+import yaml
+from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
+
+from fogml import __version__
+from fogml.errors import InputError
+
+SHIPPED = "shipped:"
+"""What a run's path begins with when it names a recording that ships."""
+
+
+class Settings(BaseModel):
+    """What every command takes. Unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+    seed: int = 0
+
+    @classmethod
+    def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
+        """The settings from a YAML file and from flags; a flag that is None or empty is not set.
+
+        Raises
+        ------
+        InputError
+            If the file can't be read, a key is unknown or a value does not fit.
+        """
+        stated = read_config(config) if config is not None else {}
+        given = {name: value for name, value in flags.items() if value is not None and value != []}
+        source = config.name if config is not None else "settings"
+        try:
+            return cls.model_validate({**stated, **given})
+        except ValidationError as error:
+            raise InputError(_message(cls, error, source, stated)) from None
+
+    def yaml(self, command: str) -> str:
+        """The settings in full as the text of a configuration file."""
+        head = f"# fogml {__version__}: run it again with  fogml {command} --config config.yaml\n"
+        return head + yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+
+
+class LimitSettings(Settings):
+    """Settings of a command that judges."""
+
+    averaging: float = 100.0
+    design_index: float | None = None
+    limits: dict[str, float] = {}
+
+    @field_validator("limits", mode="before")
+    @classmethod
+    def _from_flags(cls, value: Any) -> Any:
+        """``["name=value", ...]`` as flags give them, or a mapping as YAML does."""
+        if not isinstance(value, list):
+            return value
+        limits: dict[str, float] = {}
+        for text in value:
+            name, equals, number = str(text).partition("=")
+            try:
+                limits[name.strip()] = float(number)
+            except ValueError:
+                equals = ""
+            if not equals:
+                raise ValueError(f"'{text}' is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
+        return limits
+
+
+AnySettings = TypeVar("AnySettings", bound=Settings)
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """The mapping in a YAML file; relative paths of runs that lie beside it are made absolute.
+
+    Raises
+    ------
+    InputError
+        If the file is missing or holds no mapping.
+    """
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; --config takes a YAML file") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a folder; --config takes a YAML file") from None
+    except UnicodeDecodeError:
+        raise InputError(f"{path.name}: not readable as text; --config takes a YAML file") from None
+    except yaml.YAMLError as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark is not None else ""
+        raise InputError(f"{path.name}{where}: not readable as YAML; correct it") from None
+    if values is None:
+        return {}
+    if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
+        raise InputError(f"{path.name}: 'key: value' lines were expected")
+    return {key: _beside(value, path.parent) if key in PATH_KEYS else value for key, value in values.items()}
+
+
+PATH_KEYS = ("runs", "test", "run", "file", "profile", "model_folder")
+"""Settings that name files to read."""
+
+
+def _beside(value: Any, folder: Path) -> Any:
+    """A path as it stands if something is there, else the one in the configuration's folder if so."""
+    if isinstance(value, list):
+        return [_beside(item, folder) for item in value]
+    if isinstance(value, str) and not Path(value).exists() and (folder / value).exists():
+        return str(folder / value)
+    return value
+
+
+def absolute(path: str) -> str:
+    """The path in full, so that written settings can be run from anywhere."""
+    return path if path.startswith(SHIPPED) else str(Path(path).absolute())
+
+
+def _message(settings: type[Settings], error: ValidationError, source: str, stated: Mapping[str, Any]) -> str:
+    first = error.errors()[0]
+    key = str(first["loc"][0]) if first["loc"] else "?"
+    if first["type"] == "extra_forbidden":
+        known = list(settings.model_fields)
+        near = get_close_matches(key, known, n=1)
+        hint = f"did you mean '{near[0]}'? " if near else ""
+        return f"{source}: unknown key '{key}'; {hint}known keys are {', '.join(known)}"
+    place = f"{source}: " if key in stated else ""
+    if first["type"] == "missing":
+        return f"{place}nothing is given for '{key}'"
+    reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
+    return f"{place}{key.replace('_', ' ')}: {reason} (found {first['input']!r})"

@@ -1,0 +1,146 @@
+"""What a command prints: the result on stdout, everything else on stderr."""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+import typer
+
+_LINE_EVERY_S = 10.0
+"""Where stderr is no terminal, a line on long work this often."""
+
+
+class Work(Protocol):
+    """Long work under way."""
+
+    def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
+        """Say that `amount` more is done, and what comes next."""
+
+    def doing(self, what: str) -> None:
+        """Say what is being done."""
+
+
+class Terminal:
+    """Where a command prints to.
+
+    Parameters
+    ----------
+    as_json
+        Print the result alone, as JSON.
+    quiet
+        Print nothing but the result as JSON, if asked for, and errors.
+    """
+
+    def __init__(self, as_json: bool = False, quiet: bool = False) -> None:
+        self.as_json = as_json
+        self.quiet = quiet
+
+    def note(self, text: str) -> None:
+        """A line on stderr."""
+        if not self.quiet:
+            typer.echo(text, err=True)
+
+    def say(self, text: str) -> None:
+        """A line on stdout for people."""
+        if not (self.quiet or self.as_json):
+            typer.echo(text)
+
+    def result(self, values: Any) -> None:
+        """The result on stdout, where JSON is asked for."""
+        if self.as_json:
+            typer.echo(json.dumps(values, allow_nan=False))
+
+    def table(self, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+        """A table on stdout for people: the first column left, the others right."""
+        if self.quiet or self.as_json:
+            return
+        from rich import box
+        from rich.console import Console
+        from rich.table import Table
+
+        table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        for number, name in enumerate(header):
+            # Words break anywhere rather than be cut: a figure is never lost.
+            table.add_column(name, justify="right" if number else "left", overflow="fold")
+        for row in rows:
+            table.add_row(*row)
+        Console(highlight=False, markup=False).print(table)
+
+    @contextmanager
+    def work(self, what: str, total: float | None = None) -> Iterator[Work]:
+        """Show progress on stderr, with the time left where `total` is known."""
+        if self.quiet:
+            yield _Silent()
+        elif sys.stderr.isatty():
+            with _bar(what, total) as work:
+                yield work
+        else:
+            yield _Lines(what, total)
+
+
+class _Silent:
+    def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
+        """Nothing is shown."""
+
+    def doing(self, what: str) -> None:
+        """Nothing is shown."""
+
+
+class _Lines:
+    """A line now and then, for logs."""
+
+    def __init__(self, what: str, total: float | None) -> None:
+        self._what = what
+        self._total = total
+        self._done = 0.0
+        self._began = self._shown = time.monotonic()
+
+    def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
+        self._done += amount
+        self.doing(doing or self._what)
+
+    def doing(self, what: str) -> None:
+        self._what = what
+        now = time.monotonic()
+        if now - self._shown < _LINE_EVERY_S:
+            return
+        self._shown = now
+        spent = now - self._began
+        text = f"{what}: {spent:.0f} s"
+        if self._total and self._done:
+            left = spent * (self._total - self._done) / self._done
+            text = f"{what}: {self._done / self._total:.0%}, about {left:.0f} s left"
+        typer.echo(text, err=True)
+
+
+@contextmanager
+def _bar(what: str, total: float | None) -> Iterator[Work]:
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+    from rich.progress import TimeRemainingColumn as TimeLeftColumn
+
+    columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False)]
+    columns += [BarColumn(), TimeLeftColumn()] if total else [TimeElapsedColumn()]
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        task = progress.add_task(what, total=total)
+
+        class Bar:
+            def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
+                progress.advance(task, amount)
+                if doing is not None:
+                    progress.update(task, description=doing)
+
+            def doing(self, what: str) -> None:
+                progress.update(task, description=what)
+
+        yield Bar()
+
+
+def number(value: float | None) -> str:
+    """A figure for a table: four significant digits; a dash where there is none."""
+    return "–" if value is None else f"{value:.4g}"

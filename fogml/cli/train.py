@@ -1,0 +1,67 @@
+"""``fogml train``: fit on some runs, judge on others."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from fogml.cli import options
+from fogml.cli.terminal import Terminal
+
+app = typer.Typer(**options.APP_SETTINGS)
+
+
+@app.command(cls=options.TestRunsCommand)
+def train(
+    runs: Annotated[list[str] | None, typer.Argument(metavar="RUN...", help="Training runs.")] = None,
+    test: options.Tests = None,
+    model: Annotated[str | None, typer.Option("--model", help="Name of the model (auto).")] = None,
+    features: options.Features = None,
+    design_index: options.DesignIndex = None,
+    limit: options.Limits = None,
+    train_again: Annotated[
+        bool | None,
+        typer.Option(
+            "--train-again/--train-once",
+            help="Search sizes and features on training folds until the design index is met there.",
+        ),
+    ] = None,
+    averaging: options.Averaging = None,
+    repair: options.Repair = None,
+    strict: options.Strict = None,
+    any_unit: options.AnyUnit = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Fit a drift model on some runs and judge it on others.
+
+    Writes model/, report.json, report.html, report.xlsx and config.yaml; certificate.html where
+    limits are given. Exit status 1 if the design index or a limit is not met.
+    """
+    from fogml.cli.train_job import TrainSettings, train_and_write
+
+    settings = TrainSettings.gather(
+        config,
+        {
+            "runs": runs,
+            "test": test,
+            "model": model,
+            "features": features,
+            "design_index": design_index,
+            "limits": limit,
+            "train_again": train_again,
+            "averaging": averaging,
+            "repair": repair,
+            "strict": strict,
+            "any_unit": any_unit,
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
+    )
+    judgement = train_and_write(settings, Terminal(as_json, quiet))
+    if not judgement.met:
+        raise typer.Exit(1)

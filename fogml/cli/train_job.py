@@ -1,0 +1,171 @@
+"""The job of ``fogml train``, which ``fogml demo`` does too."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from fogml.cli.runs import open_runs
+from fogml.cli.settings import LimitSettings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+from fogml.runs.run import Run
+from fogml.validation.judge import check_limits, judge
+from fogml.validation.report_json import judgement_json
+from fogml.validation.results import Judgement
+from fogml.validation.strict import hold_strict
+
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
+
+
+class TrainSettings(LimitSettings):
+    """Settings of ``fogml train``."""
+
+    runs: list[str] = []
+    test: list[str] = []
+    model: str = "auto"
+    features: str | None = None
+    train_again: bool = False
+    repair: bool = False
+    strict: bool = False
+    any_unit: bool = False
+    out: str = "train-results"
+
+    def in_full(self) -> TrainSettings:
+        """The settings with every path in full."""
+        return self.model_copy(
+            update={
+                "runs": [absolute(path) for path in self.runs],
+                "test": [absolute(path) for path in self.test],
+                "out": absolute(self.out),
+            }
+        )
+
+
+def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
+    """Fit, judge, write the results into ``settings.out``, and print them."""
+    check_settings(settings)
+    # The folder is asked for first: nobody should train for an hour and then find it closed.
+    with whole_folder(settings.out) as folder:
+        train_runs, test_runs = split_runs(settings, terminal)
+        model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal)
+        write_results(folder, settings, model, judgement, terminal)
+    print_judgement(judgement, terminal)
+    terminal.result(judgement_json(judgement))
+    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'report.html'}")
+    return judgement
+
+
+def check_settings(settings: LimitSettings) -> None:
+    """Check what can be checked before a run is read.
+
+    Raises
+    ------
+    InputError
+        Naming the setting.
+    """
+    check_limits(settings.limits)
+    if settings.design_index is not None:
+        check_limits({"design index": settings.design_index}, names=("design index",))
+    if not settings.averaging > 0.0:
+        raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
+
+
+def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
+    """The training runs and the test runs, read and checked."""
+    if not settings.runs:
+        raise InputError("no training run is given; name the training runs before --test")
+    if not settings.test:
+        raise InputError("no test run is given; name at least one after --test")
+    train_runs = open_runs(settings.runs, terminal, repair=settings.repair)
+    test_runs = open_runs(settings.test, terminal, repair=settings.repair)
+    if settings.strict:
+        hold_strict([(run.name, run.findings) for run in (*train_runs, *test_runs)])
+    return train_runs, test_runs
+
+
+def fit_and_judge(
+    settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
+) -> tuple[DriftModel, Judgement]:
+    """The fitted model and its judgement."""
+    from fogml.models.names import make_model
+
+    with terminal.work(f"fitting {settings.model}") as work:
+        if settings.train_again:
+            from fogml.validation.index_search import train_until_index
+
+            if settings.design_index is None:
+                raise InputError("--train-again needs a --design-index to reach")
+            found = train_until_index(
+                train_runs,
+                settings.design_index,
+                model=settings.model,
+                features=settings.features,
+                averaging_s=settings.averaging,
+                seed=settings.seed,
+                step=work.doing,
+            )
+            model, notes = found.model, (found.summary(),)
+        else:
+            model = make_model(settings.model, settings.features, settings.seed).fit(train_runs)
+            notes = ()
+        work.doing("judging")
+        judgement = judge(
+            model,
+            train_runs,
+            test_runs,
+            averaging_s=settings.averaging,
+            design_index=settings.design_index,
+            limits=settings.limits,
+            any_unit=settings.any_unit,
+            notes=notes,
+        )
+    if settings.strict:
+        hold_strict([(run.run, run.findings) for run in judgement.test])
+    return model, judgement
+
+
+def write_results(
+    folder: Path, settings: TrainSettings, model: DriftModel, judgement: Judgement, terminal: Terminal
+) -> None:
+    """Write model, report, pages, spreadsheet and settings into a folder."""
+    from fogml.models.saved import save_model
+    from fogml.report import certificate, spreadsheet, train_page
+
+    with terminal.work("writing"):
+        save_model(model, folder / "model")
+        text = json.dumps(judgement_json(judgement), indent=2, allow_nan=False, ensure_ascii=False)
+        (folder / "report.json").write_text(text + "\n", encoding="utf-8")
+        (folder / "report.html").write_text(train_page(judgement), encoding="utf-8")
+        spreadsheet(judgement, folder / "report.xlsx")
+        if judgement.limits or judgement.design_index:
+            (folder / "certificate.html").write_text(certificate(judgement), encoding="utf-8")
+        (folder / "config.yaml").write_text(settings.in_full().yaml("train"), encoding="utf-8")
+
+
+def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
+    """The figures of the test runs as a table, then limits and notes."""
+    rows = []
+    for run in judgement.test:
+        for label, figures in (("before", run.before), ("after", run.after)):
+            values = (figures.bias, figures.bias_stability, figures.range, figures.rms)
+            rows.append([f"{run.run} {label}", *(number(value) for value in values)])
+        rows.append([f"{run.run} noise floor", "–", number(run.floor), "–", "–"])
+    averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
+    title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
+    terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
+    for run in judgement.test:
+        if run.outside_training:
+            terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
+    stated = [*judgement.limits]
+    if judgement.design_index is not None:
+        stated.insert(0, judgement.design_index)
+    for outcome in stated:
+        verdict = "met" if outcome.met else "NOT met"
+        label = "design index (rms)" if outcome is judgement.design_index else outcome.quantity
+        terminal.say(f"{label}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
+    for note in judgement.notes:
+        terminal.say(note)
