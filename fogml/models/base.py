@@ -1,0 +1,197 @@
+"""The drift model: the one interface that every model has."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator
+from sklearn.exceptions import NotFittedError
+
+from fogml.models.card import TrainingCard, check_unit_and_axis
+from fogml.models.intervals import Intervals
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+GOOD, OUTSIDE, NOT_FULL = 0, 1, 2
+"""Flags of a compensated sample."""
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """A model evaluated on a run of n samples.
+
+    Attributes
+    ----------
+    drift
+        What is to be subtracted from the output [deg/h], shape (n,).
+    full
+        Whether every feature window was full; elsewhere the drift is the static part, shape (n,).
+    outside
+        Whether the sample lies outside the trained box, shape (n,).
+    excess
+        How far outside, as a share of the box's span in the atom that is furthest out;
+        0 inside, shape (n,).
+    """
+
+    drift: FloatArray
+    full: BoolArray
+    outside: BoolArray
+    excess: FloatArray
+
+    @property
+    def flag(self) -> NDArray[np.int8]:
+        """0 good, 1 outside what the model was trained on, 2 window not full; shape (n,)."""
+        flag = np.where(self.outside, np.int8(OUTSIDE), np.int8(GOOD))
+        flag[~self.full] = NOT_FULL
+        return flag
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """A compensated run: drift and compensated output [deg/h] and flags, each of shape (n,)."""
+
+    drift: FloatArray
+    compensated: FloatArray
+    flag: NDArray[np.int8]
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """The columns that ``fogml compensate`` writes, by their header cells."""
+        return {
+            "drift [deg/h]": self.drift,
+            "gyro_compensated [deg/h]": self.compensated,
+            "flag": self.flag,
+        }
+
+
+class DriftModel(BaseEstimator, ABC):
+    """A model of a gyro's temperature drift.
+
+    ``compensated = gyro_deg_h - drift``. Parameters are those of the constructor, as in
+    scikit-learn (``get_params``, ``set_params``, ``clone``); what a fit learns ends in an
+    underscore.
+
+    Attributes
+    ----------
+    kind
+        The name by which the model was asked for, e.g. ``M2``.
+    form
+        Key of the class in saved models.
+    card_
+        Where the fitted model comes from.
+    intervals_
+        Half-widths of the prediction interval.
+    """
+
+    form: ClassVar[str]
+    kind: str
+    card_: TrainingCard
+    intervals_: Intervals
+
+    @abstractmethod
+    def fit(self, runs: Run | Sequence[Run]) -> Self:
+        """Fit to training runs of one unit and axis.
+
+        Raises
+        ------
+        InputError
+            If the runs don't belong together or don't hold what the model needs.
+        """
+
+    @abstractmethod
+    def evaluate(self, run: Run) -> Evaluation:
+        """Drift with window fullness and distance from the trained box, at every sample."""
+
+    @abstractmethod
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """The arrays that the fitted model consists of, by name."""
+
+    @abstractmethod
+    def parameter_count(self) -> int:
+        """Number of fitted parameters."""
+
+    @abstractmethod
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted model as JSON-ready values and arrays; card and intervals apart."""
+
+    @classmethod
+    @abstractmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> DriftModel:
+        """The model that `to_saved` gave; whoever calls sets ``card_`` and ``intervals_``."""
+
+    @property
+    def feature_names(self) -> list[str]:
+        """Names of the model's inputs."""
+        return []
+
+    @property
+    def window_s(self) -> float:
+        """Longest look-back of the features [s]: how much history a sample needs."""
+        return 0.0
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Temperatures that the model needs, by their names in formulas."""
+        return ()
+
+    def predict(self, run: Run) -> FloatArray:
+        """Drift [deg/h] at every sample, shape (n,)."""
+        return self.evaluate(run).drift
+
+    def predict_interval(self, run: Run, level: float = 0.9) -> tuple[FloatArray, FloatArray]:
+        """Interval of the drift [deg/h], lower and upper, each of shape (n,).
+
+        It covers a share `level` of the drift's averages over ``intervals_.averaging_s``, noise of
+        the averages included, on runs like the training runs; see `fogml.models.intervals`.
+        Outside the trained box it widens in proportion to the distance.
+
+        Raises
+        ------
+        InputError
+            If the level is not between 0 and 1.
+        """
+        evaluation = self.evaluate(run)
+        half = self.intervals_.half_width(level, evaluation.excess)
+        return evaluation.drift - half, evaluation.drift + half
+
+    def compensate(self, run: Run) -> Compensation:
+        """Subtract the drift; flag what is outside the trained box or has no full window."""
+        evaluation = self.evaluate(run)
+        return Compensation(evaluation.drift, run.gyro_deg_h - evaluation.drift, evaluation.flag)
+
+    def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
+        """Notes on using the model on a run.
+
+        Raises
+        ------
+        InputError
+            If the run is of another unit or axis than the training runs and `any_unit` is not set.
+        """
+        self._check_fitted()
+        return check_unit_and_axis(self.card_, run, any_unit)
+
+    def describe(self) -> dict[str, Any]:
+        """What reports say of the model: kind, features, parameters, bytes, training, intervals."""
+        self._check_fitted()
+        return {
+            "kind": self.kind,
+            "features": self.feature_names,
+            "parameters": self.parameter_count(),
+            "bytes": sum(array.nbytes for array in self.weights().values()),
+            "unit": self.card_.unit,
+            "axis": self.card_.axis,
+            "window_s": self.window_s,
+            "rows": self.card_.rows,
+            "box": {name: list(span) for name, span in self.card_.box.items()},
+            "interval": self.intervals_.summary(),
+            "notes": list(self.card_.notes),
+        }
+
+    def _check_fitted(self) -> None:
+        if not hasattr(self, "card_"):
+            raise NotFittedError(f"this {type(self).__name__} is not fitted yet; call fit first")

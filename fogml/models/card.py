@@ -1,0 +1,181 @@
+"""What a fitted model states of its training: unit, axis, runs, box, and the version that made it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import fogml
+from fogml.errors import InputError
+from fogml.runs.run import Run
+
+
+@dataclass(frozen=True)
+class TrainingRun:
+    """A training run by name and by the SHA-256 of its columns."""
+
+    name: str
+    sha256: str
+
+
+@dataclass(frozen=True)
+class TrainingCard:
+    """Where a model comes from.
+
+    Attributes
+    ----------
+    unit, axis
+        Serial number and axis of the training runs; None where they state none.
+    gyro_unit
+        Unit in which the output was recorded, ``deg/h`` or ``count``.
+    runs
+        The training runs.
+    fogml_version
+        Version that fitted the model.
+    sample_s
+        Median sample interval of the first training run [s].
+    earth_known
+        Whether Earth rate was known, and so is no part of the drift.
+    rows
+        Training rows used.
+    box
+        Atom of the features to its [low, high] in the training rows, in the atom's unit.
+    notes
+        What a user of the model should know.
+    """
+
+    unit: str | None
+    axis: str | None
+    gyro_unit: str
+    runs: tuple[TrainingRun, ...]
+    fogml_version: str
+    sample_s: float
+    earth_known: bool
+    rows: int
+    box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    def as_dict(self) -> dict[str, Any]:
+        """The card as JSON-ready values."""
+        return {
+            "unit": self.unit,
+            "axis": self.axis,
+            "gyro_unit": self.gyro_unit,
+            "runs": [{"name": run.name, "sha256": run.sha256} for run in self.runs],
+            "fogml_version": self.fogml_version,
+            "sample_s": self.sample_s,
+            "earth_known": self.earth_known,
+            "rows": self.rows,
+            "box": {name: [low, high] for name, (low, high) in self.box.items()},
+            "notes": list(self.notes),
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> TrainingCard:
+        """The card that `as_dict` wrote.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If it is not such a card.
+        """
+        values = dict(values)
+        runs = tuple(TrainingRun(str(run["name"]), str(run["sha256"])) for run in values.pop("runs"))
+        box = {str(name): (float(low), float(high)) for name, (low, high) in values.pop("box").items()}
+        notes = tuple(str(note) for note in values.pop("notes"))
+        return cls(runs=runs, box=box, notes=notes, **values)
+
+
+def training_card(
+    runs: Sequence[Run],
+    *,
+    rows: int,
+    box: Mapping[str, tuple[float, float]] | None = None,
+    notes: Sequence[str] = (),
+) -> TrainingCard:
+    """The card of a model fitted to `runs`, which `checked_runs` has passed."""
+    from concurrent.futures import ThreadPoolExecutor
+
+    # SHA-256 leaves the interpreter free, so runs are hashed side by side.
+    with ThreadPoolExecutor(max_workers=min(8, len(runs))) as pool:
+        hashes = list(pool.map(lambda run: run.hash, runs))
+    return TrainingCard(
+        unit=_common(run.facts.unit for run in runs),
+        axis=_common(run.facts.axis for run in runs),
+        gyro_unit=runs[0].gyro_unit,
+        runs=tuple(TrainingRun(run.name, digest) for run, digest in zip(runs, hashes, strict=True)),
+        fogml_version=fogml.__version__,
+        sample_s=runs[0].sample_s,
+        earth_known=runs[0].earth_known,
+        rows=rows,
+        box=dict(box or {}),
+        notes=tuple(notes),
+    )
+
+
+def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:
+    """Training runs as a tuple, of one unit and axis, and either all or none with known Earth rate.
+
+    Raises
+    ------
+    InputError
+        If there is none, one is empty, or they don't belong together.
+    """
+    group = (runs,) if isinstance(runs, Run) else tuple(runs)
+    if not group:
+        raise InputError("no training run is given; name at least one")
+    for run in group:
+        if not isinstance(run, Run):
+            raise InputError(f"a model is fitted to runs, found {type(run).__name__}")
+        if len(run) == 0:
+            raise InputError(f"{run.name}: holds no samples; leave it out of training")
+    for fact in ("unit", "axis"):
+        stated = {getattr(run.facts, fact): run.name for run in group if getattr(run.facts, fact) is not None}
+        if len(stated) > 1:
+            listed = ", ".join(f"{value} ({name})" for value, name in stated.items())
+            raise InputError(
+                f"training runs are of more than one {fact}: {listed}; train one model for each {fact}"
+            )
+    known = [run for run in group if run.earth_known]
+    if known and len(known) < len(group):
+        without = next(run for run in group if not run.earth_known)
+        raise InputError(
+            f"{without.name}: latitude and input_axis are not stated, but they are for {known[0].name}; "
+            "state them for every training run or for none, or Earth rate is drift in some and not in others"
+        )
+    return group
+
+
+def check_unit_and_axis(card: TrainingCard, run: Run, any_unit: bool) -> tuple[str, ...]:
+    """Whether a model may be used on a run: notes to show, or an error.
+
+    Raises
+    ------
+    InputError
+        If the run is of another unit or axis and `any_unit` is not set.
+    """
+    notes = []
+    for fact in ("unit", "axis"):
+        trained, found = getattr(card, fact), getattr(run.facts, fact)
+        if trained is None or found is None:
+            if trained != found:
+                silent = "the model" if trained is None else run.name
+                notes.append(f"{silent} states no {fact}: whether model and run belong together is not known")
+        elif trained != found:
+            difference = f"{run.name}: {fact} '{found}', but the model was trained on {fact} '{trained}'"
+            if not any_unit:
+                raise InputError(
+                    f"{difference}; use a model of this {fact}, or --any-unit to apply it nevertheless"
+                )
+            notes.append(f"{difference}: applied because any unit was allowed")
+    if run.earth_known and not card.earth_known:
+        notes.append(
+            f"{run.name}: Earth rate is known here, but was not in training: "
+            "the model's drift holds the Earth rate of the training attitude"
+        )
+    return tuple(notes)
+
+
+def _common(values: Any) -> str | None:
+    return next((value for value in values if value is not None), None)

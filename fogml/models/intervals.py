@@ -1,0 +1,114 @@
+"""Prediction intervals from what a model leaves on parts of the training runs it did not see.
+
+Training rows are averaged over ``averaging_s``, cut into folds of time (whole runs where there
+are three or more), and for each fold the model is fitted to the others. The interval's
+half-width at a level p is the conformal quantile of the n absolute residuals: the
+ceil((n + 1) p)-th smallest (Vovk, Gammerman & Shafer 2005; the cross-conformal form is
+Barber et al., "Predictive inference with the jackknife+", Ann. Statist. 49, 2021).
+
+What it covers: averages over ``averaging_s`` of the gyro's error on runs like the training
+runs, noise of the averages included. So it is a little wide for the drift alone, and says
+nothing on single samples. What training runs don't show it can't hold: another ramp rate,
+another turn-on, ageing. Outside the trained box the half-width grows in proportion to the
+distance: twice as wide at one tenth of the box's span.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+
+LEVELS = (*(round(0.05 * i, 2) for i in range(1, 20)), 0.975, 0.99, 0.995)
+WIDENING_PER_SPAN = 10.0
+"""Growth of the half-width per box span outside the box, as a share of itself."""
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Half-widths of the prediction interval at a grid of levels.
+
+    Attributes
+    ----------
+    averaging_s
+        Time over which the residuals were averaged [s].
+    half_widths
+        Half-width [deg/h] at each of `LEVELS`.
+    count
+        Number of residuals behind them.
+    folds
+        How the training rows were parted: ``time blocks`` or ``whole runs``.
+    """
+
+    averaging_s: float
+    half_widths: tuple[float, ...]
+    count: int
+    folds: str
+    levels: tuple[float, ...] = field(default=LEVELS)
+
+    def half_width(self, level: float, excess: ArrayLike = 0.0) -> FloatArray:
+        """Half-width [deg/h] at a level, for samples `excess` spans outside the box.
+
+        A level above what the residuals can tell, n / (n + 1), gives the widest one stored.
+
+        Raises
+        ------
+        InputError
+            If the level is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise InputError(f"interval level {level}: must lie between 0 and 1, e.g. 0.9")
+        inside = np.interp(level, (0.0, *self.levels), (0.0, *self.half_widths))
+        return np.asarray(inside * (1.0 + WIDENING_PER_SPAN * np.asarray(excess, dtype=np.float64)))
+
+    def summary(self) -> dict[str, Any]:
+        """The 90 % half-width and what it stands on."""
+        return {
+            "half_width_90": float(self.half_width(0.9)),
+            "averaging_s": self.averaging_s,
+            "residuals": self.count,
+            "folds": self.folds,
+        }
+
+    def as_dict(self) -> dict[str, Any]:
+        """The intervals as JSON-ready values."""
+        return {
+            "averaging_s": self.averaging_s,
+            "levels": list(self.levels),
+            "half_widths": list(self.half_widths),
+            "count": self.count,
+            "folds": self.folds,
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> Intervals:
+        """The intervals that `as_dict` wrote.
+
+        Raises
+        ------
+        KeyError, TypeError, ValueError
+            If they are not such intervals.
+        """
+        values = dict(values)
+        levels = tuple(float(level) for level in values.pop("levels"))
+        half_widths = tuple(float(half) for half in values.pop("half_widths"))
+        if len(levels) != len(half_widths) or list(levels) != sorted(levels):
+            raise ValueError("levels and half_widths do not match")
+        return cls(levels=levels, half_widths=half_widths, **values)
+
+
+def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: str) -> Intervals:
+    """Conformal half-widths from out-of-fold residuals [deg/h], shape (n,)."""
+    sizes = np.sort(np.abs(np.asarray(residuals, dtype=np.float64)))
+    count = len(sizes)
+    if count == 0:
+        raise InputError("no residuals to tell a prediction interval from; the training runs are too short")
+    ranks = [min(math.ceil((count + 1) * level), count) for level in LEVELS]
+    return Intervals(float(averaging_s), tuple(float(sizes[rank - 1]) for rank in ranks), count, folds)

@@ -1,0 +1,242 @@
+"""Linear least squares with an optional ridge, for wide and ill-conditioned columns and many rows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from fogml.errors import InputError
+from fogml.models.folds import dealt_folds
+from fogml.models.tall_least_squares import Condensed, Part, condense
+from fogml.runs.run import FloatArray
+
+RIDGE_GRID = (0.0, *np.logspace(-8, 1, 19).tolist())
+"""Ridges that ``ridge="auto"`` chooses from."""
+_RANK_TOLERANCE = 1e-12
+
+
+class LinearRegressor(RegressorMixin, BaseEstimator):
+    """Linear model ``y = intercept + x @ coef``, by QR and SVD on centred and scaled columns.
+
+    Minimises ``mean((y - prediction)**2) + ridge * sum((coef * column_std)**2)``; the intercept
+    is not penalised. Columns that others tell (rank deficiency) get the solution of least norm
+    on scaled columns.
+
+    Parameters
+    ----------
+    ridge
+        0, a positive number, or ``"auto"``: the one of `RIDGE_GRID` with the least squared error
+        on left-out folds of time. Errors on blocks of time are used and not the leave-one-out
+        or generalised cross-validation shortcuts, because those take the noise for white, and
+        a gyro's is not.
+    fit_intercept
+        Whether there is an intercept.
+
+    Attributes
+    ----------
+    coef_ : (k,)
+        Coefficients, in y's unit per column's unit.
+    intercept_ : float
+        Intercept.
+    ridge_ : float
+        The ridge used.
+    rank_ : int
+        Rank of the centred columns.
+    residual_std_ : float
+        Root of the residual sum of squares over the rows less the effective parameters.
+    covariance_ : (k + 1, k + 1)
+        Covariance of (intercept, coefficients) for white residuals; where noise is coloured, or
+        the model wrong, the true one is larger.
+    cross_validation_ : dict
+        With ``ridge="auto"``, mean squared error on left-out folds for each ridge.
+    """
+
+    def __init__(self, ridge: float | Literal["auto"] = 0.0, fit_intercept: bool = True) -> None:
+        self.ridge = ridge
+        self.fit_intercept = fit_intercept
+
+    def fit(self, X: ArrayLike, y: ArrayLike, folds: ArrayLike | None = None) -> Self:
+        """Fit to rows in time order.
+
+        Parameters
+        ----------
+        X
+            Columns, shape (n, k).
+        y
+            Values, shape (n,).
+        folds
+            Fold of each row, from 0, for ``ridge="auto"``; by default 20 blocks of
+            neighbouring rows dealt to 5 folds in turn.
+        """
+        matrix, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        labels = dealt_folds(len(target)) if folds is None else np.asarray(folds, dtype=np.intp)
+        if labels.shape != target.shape:
+            raise InputError(f"folds has shape {labels.shape}, there are {len(target)} rows")
+        if np.count_nonzero(np.diff(labels)) > len(labels) // 64:
+            # Folds that change from row to row are brought together, to be read in long pieces.
+            order = np.argsort(labels, kind="stable")
+            matrix, target, labels = matrix[order], target[order], labels[order]
+        return self.fit_parts([Part(np.asarray(target, dtype=np.float64), matrix.__getitem__, labels)])
+
+    def fit_parts(self, parts: Sequence[Part]) -> Self:
+        """Fit to rows whose columns are built piece by piece, so that they never exist at once."""
+        automatic = isinstance(self.ridge, str)
+        if automatic and self.ridge != "auto":
+            raise InputError(f"ridge '{self.ridge}': must be 'auto', 0 or a positive number")
+        if not automatic and not float(self.ridge) >= 0.0:
+            raise InputError(f"ridge {self.ridge}: must be 'auto', 0 or a positive number")
+        if not automatic:
+            parts = [Part(part.target, part.columns, np.zeros_like(part.folds)) for part in parts]
+        n_folds = 1 + max(int(part.folds.max(initial=0)) for part in parts)
+        condensed = condense(parts, n_folds)
+        self.n_features_in_ = len(condensed.shift)
+        ridge = self._choose_ridge(condensed) if automatic else float(self.ridge)
+        self._solve(condensed, ridge)
+        return self
+
+    def predict(self, X: ArrayLike) -> FloatArray:
+        """Values for rows of columns, shape (n,)."""
+        check_is_fitted(self)
+        matrix = validate_data(self, X, dtype=np.float64, reset=False)
+        return self.predict_unchecked(matrix)
+
+    def predict_unchecked(self, X: FloatArray) -> FloatArray:
+        """As `predict`, for columns known to be finite float64 of shape (n, k)."""
+        return np.asarray(X @ self.coef_ + self.intercept_)
+
+    def standard_errors(self) -> FloatArray:
+        """Standard errors of (intercept, coefficients) for white residuals, shape (k + 1,)."""
+        check_is_fitted(self)
+        return np.asarray(np.sqrt(np.diag(self.covariance_)))
+
+    @property
+    def parameter_count(self) -> int:
+        """Number of coefficients, the intercept included."""
+        return len(self.coef_) + int(self.fit_intercept)
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted regressor as JSON-ready values and arrays."""
+        check_is_fitted(self)
+        values = {
+            "ridge": self.ridge,
+            "fit_intercept": self.fit_intercept,
+            "ridge_used": self.ridge_,
+            "rank": self.rank_,
+            "residual_std": self.residual_std_,
+            "standard_errors": self.standard_errors().tolist(),
+        }
+        return values, {"coef": self.coef_, "intercept": np.array([self.intercept_])}
+
+    @classmethod
+    def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
+        """The regressor that `to_saved` gave; of the covariance its diagonal remains."""
+        model = cls(ridge=values["ridge"], fit_intercept=bool(values["fit_intercept"]))
+        model.coef_ = np.asarray(arrays["coef"], dtype=np.float64).reshape(-1)
+        model.intercept_ = float(np.asarray(arrays["intercept"]).reshape(()))
+        model.n_features_in_ = len(model.coef_)
+        model.ridge_ = float(values["ridge_used"])
+        model.rank_ = int(values["rank"])
+        model.residual_std_ = float(values["residual_std"])
+        errors = np.asarray(values["standard_errors"], dtype=np.float64)
+        if errors.shape != (len(model.coef_) + 1,):
+            raise ValueError("standard_errors do not match the coefficients")
+        model.covariance_ = np.diag(errors**2)
+        return model
+
+    def _choose_ridge(self, condensed: Condensed) -> float:
+        held = [fold for fold, count in enumerate(condensed.counts) if count]
+        if len(held) < 2:
+            raise InputError("ridge 'auto' needs rows in at least two folds; state a ridge instead")
+        errors = np.zeros(len(RIDGE_GRID))
+        for fold in held:
+            rest = np.concatenate([condensed.factors[other] for other in held if other != fold])
+            count = int(condensed.counts.sum() - condensed.counts[fold])
+            system = _System(condensed, rest, count, self.fit_intercept)
+            rows = condensed.factors[fold]
+            for place, ridge in enumerate(RIDGE_GRID):
+                left = rows[:, -1] - rows[:, :-1] @ system.solution(ridge)
+                errors[place] += left @ left
+        errors /= condensed.counts.sum()
+        self.cross_validation_ = dict(zip(RIDGE_GRID, errors.tolist(), strict=True))
+        return float(RIDGE_GRID[int(np.argmin(errors))])
+
+    def _solve(self, condensed: Condensed, ridge: float) -> None:
+        count = int(condensed.counts.sum())
+        rows = np.concatenate(condensed.factors)
+        system = _System(condensed, rows, count, self.fit_intercept)
+        solution = system.solution(ridge)
+        left = rows[:, -1] - rows[:, :-1] @ solution
+        self.ridge_ = ridge
+        self.rank_ = system.rank
+        self.coef_ = solution[1:] / condensed.scale
+        self.intercept_ = (
+            float(solution[0] + condensed.y_shift - condensed.shift @ self.coef_) if self.fit_intercept else 0.0
+        )
+        freedom = count - system.effective_parameters(ridge) - int(self.fit_intercept)
+        variance = float(left @ left) / freedom if freedom > 0 else 0.0
+        self.residual_std_ = float(np.sqrt(variance))
+        self.covariance_ = variance * system.unit_covariance(ridge)
+
+
+class _System:
+    """A least-squares problem in condensed rows: its singular values, and solutions for any ridge.
+
+    Solutions are (b0, b) in the condensed frame, where ``y - y_shift = b0 + (x - shift)/scale @ b``.
+    """
+
+    def __init__(self, frame: Condensed, rows: FloatArray, count: int, intercept: bool) -> None:
+        self._frame, self._count, self._intercept = frame, count, intercept
+        if intercept:
+            # The column of ones stands first: what QR leaves below its row is centred.
+            triangle = np.linalg.qr(rows, mode="r")
+            self._mean = triangle[0] / triangle[0, 0]
+            columns, target = triangle[1:, 1:-1], triangle[1:, -1]
+            level = frame.shift / frame.scale
+        else:
+            columns = rows[:, 1:-1] + rows[:, :1] * (frame.shift / frame.scale)
+            target = rows[:, -1] + rows[:, 0] * frame.y_shift
+            level = np.zeros(len(frame.shift))
+        self._spread = np.linalg.norm(columns, axis=0) / np.sqrt(count)
+        # A column that does not vary but for rounding holds nothing.
+        self._constant = self._spread <= 1e-13 * np.maximum(1.0, np.abs(level))
+        self._spread[self._constant] = 1.0
+        columns = np.where(self._constant, 0.0, columns / self._spread)
+        if columns.size:
+            left, values, right = np.linalg.svd(columns, full_matrices=False)
+        else:
+            left, values, right = np.empty((len(columns), 0)), np.empty(0), np.empty((0, columns.shape[1]))
+        self.rank = int(np.count_nonzero(values > _RANK_TOLERANCE * values.max(initial=0.0)))
+        self._values, self._right = values[: self.rank], right[: self.rank]
+        self._target = left.T[: self.rank] @ target
+
+    def solution(self, ridge: float) -> FloatArray:
+        """Solution (b0, b) in the condensed frame, shape (k + 1,)."""
+        gains = self._values / (self._values**2 + ridge * self._count)
+        slopes = (gains * self._target) @ self._right / self._spread
+        if self._intercept:
+            first = self._mean[-1] - self._mean[1:-1] @ slopes
+        else:
+            first = slopes @ (self._frame.shift / self._frame.scale) - self._frame.y_shift
+        return np.concatenate(([first], slopes))
+
+    def effective_parameters(self, ridge: float) -> float:
+        """Trace of the smoother, the intercept not counted."""
+        return float(np.sum(self._values**2 / (self._values**2 + ridge * self._count)))
+
+    def unit_covariance(self, ridge: float) -> FloatArray:
+        """Covariance of (intercept, coefficients) in raw columns for residuals of variance 1."""
+        gains = self._values / (self._values**2 + ridge * self._count)
+        half = gains[:, None] * self._right / (self._spread * self._frame.scale)
+        slopes = half.T @ half
+        covariance = np.zeros((len(slopes) + 1, len(slopes) + 1))
+        covariance[1:, 1:] = slopes
+        if self._intercept:
+            mean = self._frame.shift + self._frame.scale * self._mean[1:-1]
+            covariance[0, 1:] = covariance[1:, 0] = -slopes @ mean
+            covariance[0, 0] = mean @ slopes @ mean + 1.0 / self._count
+        return covariance

@@ -1,0 +1,209 @@
+"""Training rows: features and error of the gyro, of full windows, turntable transitions cut."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.models.folds import dealt_blocks
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.signals.averages import block_averages
+
+TURNING_DEG_S = 1e-3
+"""A table rate above this is turning [deg/s]; 3.6 deg/h."""
+_COMPOSED_VALUES = 1 << 19
+# Values composed at once while averaging: 4 MiB, which stays in the cache.
+
+
+@dataclass(frozen=True)
+class TrainingTable:
+    """Training rows in time order, run after run.
+
+    Attributes
+    ----------
+    X
+        Features, shape (n, k).
+    y
+        Error of the gyro [deg/h], shape (n,).
+    run_index
+        Which of the runs each row is of, shape (n,).
+    time_s
+        Time on that run's clock [s], shape (n,).
+    block
+        Number of the block of time that a row falls in, shape (n,). Each run is parted into 20
+        blocks of neighbouring rows; numbers go on from run to run. Blocks, never single rows,
+        are what cross-validation and early stopping hold out.
+    averaging_s
+        Time that a row averages over [s]; 0 where rows are single samples.
+    notes
+        What was left out, for the model's card.
+    """
+
+    X: FloatArray
+    y: FloatArray
+    run_index: NDArray[np.intp]
+    time_s: FloatArray
+    block: NDArray[np.intp]
+    averaging_s: float = 0.0
+    notes: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.y)
+
+    def take(self, rows: NDArray[np.intp] | BoolArray) -> TrainingTable:
+        """The table's rows at indices, or where a mask is True."""
+        return replace(
+            self,
+            X=self.X[rows],
+            y=self.y[rows],
+            run_index=self.run_index[rows],
+            time_s=self.time_s[rows],
+            block=self.block[rows],
+        )
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """The training rows of one run, features not yet composed from their atoms.
+
+    ``atoms`` has shape (m, a), ``y`` [deg/h] and ``time_s`` [s] shape (m,); ``notes`` say what was left out.
+    """
+
+    atoms: FloatArray
+    y: FloatArray
+    time_s: FloatArray
+    notes: tuple[str, ...] = ()
+
+
+def training_table(runs: Sequence[Run], features: Features, max_rows: int | None = None) -> TrainingTable:
+    """Training rows of runs, averaged over blocks of time down to `max_rows` where that is stated.
+
+    Raises
+    ------
+    InputError
+        If no row has a full window.
+    """
+    rows = [run_rows(run, features) for run in runs]
+    return table_of_rows(rows, features, max_rows)
+
+
+def run_rows(run: Run, features: Features) -> RunRows:
+    """The rows of a run that models are fitted to.
+
+    Left out are rows without full windows, rows about changes of the table's rate, and, where a
+    run both stands and turns, rows at which the table turns: the error there is mostly the scale
+    factor's, 10 ppm of 10 deg/s being 0.36 deg/h, and a drift model does not know the rate.
+    """
+    atoms, full = features.atom_values(run)
+    used, notes = usable_rows(run, full)
+    if used.all():
+        return RunRows(atoms, run.error_deg_h, run.time, notes)
+    return RunRows(atoms[used], run.error_deg_h[used], run.time[used], notes)
+
+
+def usable_rows(run: Run, full: BoolArray) -> tuple[BoolArray, tuple[str, ...]]:
+    """Mask of the rows that drift models are fitted to, and what was left out and why."""
+    if "rate" not in run.columns:
+        return full, ()
+    turning = np.abs(run.rate) > TURNING_DEG_S
+    if not turning.any():
+        return full, ()
+    from fogml.runs.transitions import transition_mask
+
+    cut = transition_mask(run)
+    used = full & ~cut
+    notes = []
+    if cut.any():
+        notes.append(f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out")
+    if (used & ~turning).any() and (used & turning).any():
+        notes.append(
+            f"{run.name}: {int((used & turning).sum())} rows at which the table turns left out; "
+            "the joint model uses them"
+        )
+        used &= ~turning
+    return used, tuple(notes)
+
+
+def table_of_rows(rows: Sequence[RunRows], features: Features, max_rows: int | None = None) -> TrainingTable:
+    """The table of rows that `run_rows` gave."""
+    count = sum(len(part.y) for part in rows)
+    if count == 0:
+        raise InputError(
+            "no training row has a full feature window; give longer runs, or state shorter windows in the "
+            "features, e.g. dT[block, 16 s]"
+        )
+    averaging_s = 0.0
+    if max_rows is not None and count > max_rows:
+        averaging_s = recorded_s(rows) / max_rows
+    return averaged_table(rows, features, averaging_s)
+
+
+def averaged_table(rows: Sequence[RunRows], features: Features, averaging_s: float) -> TrainingTable:
+    """The table of rows averaged over `averaging_s` seconds; 0 leaves them as they are."""
+    X, y, time_s, index, block = [], [], [], [], []
+    first_block = 0
+    for number, part in enumerate(rows):
+        if averaging_s > 0.0:
+            columns, target, time = _averages(part, features, averaging_s)
+        else:
+            columns, target, time = features.compose(part.atoms), part.y, part.time_s
+        X.append(columns)
+        y.append(target)
+        time_s.append(time)
+        index.append(np.full(len(target), number, dtype=np.intp))
+        block.append(dealt_blocks(len(target)) + first_block)
+        if len(target):
+            first_block = int(block[-1][-1]) + 1
+    return TrainingTable(
+        np.concatenate(X),
+        np.concatenate(y),
+        np.concatenate(index),
+        np.concatenate(time_s),
+        np.concatenate(block),
+        averaging_s,
+        tuple(note for part in rows for note in part.notes),
+    )
+
+
+def recorded_s(rows: Sequence[RunRows]) -> float:
+    """Time that the rows stand for [s]: their number times the median interval, run by run."""
+    return float(sum(len(part.y) * _sample_s(part.time_s) for part in rows))
+
+
+def _sample_s(time_s: FloatArray) -> float:
+    return float(np.median(np.diff(time_s))) if len(time_s) > 1 else 1.0
+
+
+def _averages(
+    part: RunRows, features: Features, averaging_s: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Averages of the composed features, of y and of time, over windows at least half full.
+
+    The features are averaged, not their atoms: the mean of T**2 is not the square of the mean.
+    """
+    from scipy.sparse import csr_array
+
+    means = block_averages(part.time_s, part.y, window_s=averaging_s)
+    if len(means) == 0:
+        return np.empty((0, len(features.names()))), np.empty(0), np.empty(0)
+    width = max(1, len(features.names()))
+    per_piece = max(1, _COMPOSED_VALUES // (width * int(means.counts.max())))
+    pieces = []
+    for start in range(0, len(means), per_piece):
+        starts, stops = means.starts[start : start + per_piece], means.stops[start : start + per_piece]
+        composed = features.compose(part.atoms[starts[0] : stops[-1]])
+        counts = stops - starts
+        # Row i of the operator holds 1/count over the samples of window i.
+        samples = np.repeat(starts - starts[0] - np.concatenate(([0], counts.cumsum()[:-1])), counts)
+        samples += np.arange(len(samples))
+        operator = csr_array(
+            (np.repeat(1.0 / counts, counts), samples, np.concatenate(([0], counts.cumsum()))),
+            shape=(len(counts), len(composed)),
+        )
+        pieces.append(operator @ composed)
+    return np.concatenate(pieces), means.values[0], means.time_s
