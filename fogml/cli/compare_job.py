@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import partial
 from pathlib import Path
+from typing import ClassVar
 
 from pydantic import field_validator
 
@@ -22,6 +23,7 @@ from fogml.validation.strict import hold_strict
 class CompareSettings(LimitSettings):
     """Settings of ``fogml compare``."""
 
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
     runs: list[str] = []
     test: list[str] = []
     leave_one_out: bool = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from fogml.cli.settings import Settings, absolute
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
@@ -11,6 +13,7 @@ from fogml.outputs import whole_folder
 class ImportSettings(Settings):
     """Settings of ``fogml import``."""
 
+    path_keys: ClassVar[tuple[str, ...]] = ("file", "profile")
     file: str | None = None
     profile: str | None = None
     axis: str | None = None

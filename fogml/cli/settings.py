@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, ClassVar, Self
 
 import yaml
 from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
@@ -21,6 +21,8 @@ class Settings(BaseModel):
     """What every command takes. Unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+    path_keys: ClassVar[tuple[str, ...]] = ()
+    """Settings that name files to read."""
     seed: int = 0
 
     @classmethod
@@ -33,6 +35,10 @@ class Settings(BaseModel):
             If the file can't be read, a key is unknown or a value does not fit.
         """
         stated = read_config(config) if config is not None else {}
+        # A path in a configuration file may be meant from where the file lies.
+        for key in set(stated) & set(cls.path_keys):
+            assert config is not None
+            stated[key] = _beside(stated[key], config.parent)
         given = {name: value for name, value in flags.items() if value is not None and value != []}
         source = config.name if config is not None else "settings"
         try:
@@ -71,11 +77,8 @@ class LimitSettings(Settings):
         return limits
 
 
-AnySettings = TypeVar("AnySettings", bound=Settings)
-
-
 def read_config(path: Path) -> dict[str, Any]:
-    """The mapping in a YAML file; relative paths of runs that lie beside it are made absolute.
+    """The mapping in a YAML file.
 
     Raises
     ------
@@ -98,11 +101,7 @@ def read_config(path: Path) -> dict[str, Any]:
         return {}
     if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):
         raise InputError(f"{path.name}: 'key: value' lines were expected")
-    return {key: _beside(value, path.parent) if key in PATH_KEYS else value for key, value in values.items()}
-
-
-PATH_KEYS = ("runs", "test", "run", "file", "profile", "model_folder")
-"""Settings that name files to read."""
+    return values
 
 
 def _beside(value: Any, folder: Path) -> Any:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import LimitSettings, absolute
@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 class TrainSettings(LimitSettings):
     """Settings of ``fogml train``."""
 
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
     runs: list[str] = []
     test: list[str] = []
     model: str = "auto"

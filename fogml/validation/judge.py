@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.models.base import NOT_FULL, OUTSIDE
+from fogml.models.table import usable_rows
 from fogml.runs.findings import Finding
 from fogml.runs.regimes import regimes
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.runs.transitions import transition_mask
 from fogml.validation.floors import floor_of_run
 from fogml.validation.metrics import QUANTITIES, RunMetrics
 from fogml.validation.results import AveragedSeries, Judgement, LimitOutcome, RunJudgement
@@ -23,7 +24,6 @@ if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 DEFAULT_AVERAGING_S = 100.0
-_OUTSIDE = 1
 
 
 def judge(
@@ -41,8 +41,9 @@ def judge(
 
     The error before is the output less the reference rate; after, less the model's drift too.
     Where Earth rate is not known for every run, the mean over the training runs is taken from
-    both, each its own, so that the bias tells how far the constant moved since training. Rows
-    whose window is not full and transitions of the turntable are left out.
+    both, each its own, so that the bias tells how far the constant moved since training. The
+    figures are of the rows that models are fitted to: windows full, transitions of the turntable
+    cut, and at rest where a run both stands and turns; the turns tell the scale factor.
 
     Parameters
     ----------
@@ -135,8 +136,10 @@ def _errors(model: DriftModel, run: Run, *, any_unit: bool) -> _Errors:
     notes = model.check_applies(run, any_unit=any_unit)
     evaluation = model.evaluate(run)
     half_width = model.intervals_.half_width(0.9, evaluation.excess)
-    used = evaluation.full & ~transition_mask(run)
-    return _Errors(run, run.error_deg_h, evaluation.drift, half_width, evaluation.flag, used, notes)
+    used, left_out = usable_rows(run, evaluation.full)
+    return _Errors(
+        run, run.error_deg_h, evaluation.drift, half_width, evaluation.flag, used, (*notes, *left_out)
+    )
 
 
 def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
@@ -170,10 +173,10 @@ def _judge_run(
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
     run, used = errors.run, errors.used
-    metrics = RunMetrics(run, used, averaging_s)
+    metrics = RunMetrics(run, used, averaging_s, full=errors.flag != NOT_FULL)
     before = errors.before - constant[0]
     after = errors.after - constant[1]
-    outside = int((errors.flag[used] == _OUTSIDE).sum())
+    outside = int((errors.flag[used] == OUTSIDE).sum())
     share = outside / int(used.sum())
     findings = (*run.findings, *seen)
     if outside:

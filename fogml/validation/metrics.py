@@ -60,9 +60,12 @@ class RunMetrics:
     run
         The run.
     used
-        Rows that count, shape (n,): windows full, transitions of the table cut.
+        Rows that count for all but the scale factor, shape (n,): windows full, transitions of the
+        table cut, at rest where the run both stands and turns.
     averaging_s
         Averaging time [s].
+    full
+        Rows whose windows are full, shape (n,), turning or not; all of them by default.
 
     Raises
     ------
@@ -71,7 +74,9 @@ class RunMetrics:
         averages.
     """
 
-    def __init__(self, run: Run, used: BoolArray, averaging_s: float) -> None:
+    def __init__(
+        self, run: Run, used: BoolArray, averaging_s: float, *, full: BoolArray | None = None
+    ) -> None:
         if not (np.isfinite(averaging_s) and averaging_s > 0.0):
             raise InputError(f"averaging time {averaging_s} s: a positive number of seconds is needed")
         if averaging_s < run.sample_s * (1.0 - 1e-9):
@@ -84,7 +89,7 @@ class RunMetrics:
         self.averaging_s = averaging_s
         self._time = run.time[used]
         self._soaks = find_soaks(run, used, least_s=averaging_s)
-        self._steps = find_steps(run, used)
+        self._steps = find_steps(run, np.ones(len(run), dtype=bool) if full is None else full)
         found = len(self.averages(self._time))
         if found < 2:
             raise InputError(

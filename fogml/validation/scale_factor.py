@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.runs.transitions import find_transitions
+from fogml.runs.transitions import find_transitions, transition_mask
 
 LEAST_STEP = 0.02
 """Steps smaller than this share of the run's greatest step are no turns."""
@@ -55,20 +55,25 @@ class ScaleFactorError:
     largest: float
 
 
-def find_steps(run: Run, used: BoolArray) -> Steps | None:
+def find_steps(run: Run, full: BoolArray) -> Steps | None:
     """The steps of the table's rate with usable rows on both sides, None if the table never turned.
+
+    Usable are rows outside the transitions.
 
     Parameters
     ----------
-    used
-        Rows that count, transitions cut, shape (n,).
+    full
+        Rows whose windows are full, shape (n,).
     """
     if "rate" not in run.columns:
         return None
-    usable = np.flatnonzero(used)
+    transitions = find_transitions(run)
+    if len(transitions) == 0:
+        return None
+    usable = np.flatnonzero(full & ~transition_mask(run))
     # Ramps of the table give several transitions with no usable row between: those plateaus are
     # empty and fall out here.
-    cuts = np.union1d(find_transitions(run), run.gap_starts)
+    cuts = np.union1d(transitions, run.gap_starts)
     edges = np.unique(np.searchsorted(usable, cuts))
     edges = np.concatenate(([0], edges[(edges > 0) & (edges < len(usable))], [len(usable)]))
     if len(edges) < 3:
