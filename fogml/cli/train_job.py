@@ -12,7 +12,8 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
-from fogml.validation.judge import check_limits, judge
+from fogml.validation.judge import judge
+from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement
 from fogml.validation.strict import hold_strict
@@ -69,8 +70,7 @@ def check_settings(settings: LimitSettings) -> None:
         Naming the setting.
     """
     check_limits(settings.limits)
-    if settings.design_index is not None:
-        check_limits({"design index": settings.design_index}, names=("design index",))
+    check_design_index(settings.design_index)
     if not settings.averaging > 0.0:
         raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import FogmlError, InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, check_limits, judge
+from fogml.validation.judge import DEFAULT_AVERAGING_S, judge
 from fogml.validation.leave_one_out import leave_one_run_out
+from fogml.validation.limits import check_limits
 from fogml.validation.results import Judgement
 
 if TYPE_CHECKING:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -17,8 +16,9 @@ from fogml.runs.findings import Finding
 from fogml.runs.regimes import regimes
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.validation.floors import floor_of_run
-from fogml.validation.metrics import QUANTITIES, RunMetrics
-from fogml.validation.results import AveragedSeries, Judgement, LimitOutcome, RunJudgement
+from fogml.validation.limits import check_design_index, check_limits, outcome_of
+from fogml.validation.metrics import RunMetrics
+from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -74,8 +74,7 @@ def judge(
     if not train or not test:
         raise InputError("a judgement needs at least one training run and one test run")
     limits = check_limits(limits or {})
-    if design_index is not None:
-        check_limits({"design index": design_index}, names=("design index",))
+    check_design_index(design_index)
     train_errors = [_errors(model, run, any_unit=True) for run in train]
     test_errors = [_errors(model, run, any_unit=any_unit) for run in test]
     earth_known = all(run.earth_known for run in (*train, *test))
@@ -92,24 +91,6 @@ def judge(
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
         notes=(*notes, *_notes(train, test)),
     )
-
-
-def check_limits(limits: Mapping[str, float], names: Sequence[str] = QUANTITIES) -> dict[str, float]:
-    """The limits as floats.
-
-    Raises
-    ------
-    InputError
-        For an unknown quantity, listing the known, and for a limit that is no positive number.
-    """
-    checked = {}
-    for name, limit in limits.items():
-        if name not in names:
-            raise InputError(f"limit on '{name}': no such figure; known are {', '.join(names)}")
-        if not (math.isfinite(limit) and limit > 0.0):
-            raise InputError(f"limit {name}={limit:g}: a positive number is needed")
-        checked[name] = float(limit)
-    return checked
 
 
 @dataclass(frozen=True)
@@ -224,19 +205,6 @@ def _series(errors: _Errors, metrics: RunMetrics, before: FloatArray, after: Flo
         regime=np.asarray(found.names, dtype=np.str_)[found.labels[middle]],
         flag=np.asarray(errors.flag[middle], dtype=np.int8),
     )
-
-
-def outcome_of(quantity: str, limit: float, test: Sequence[RunJudgement]) -> LimitOutcome:
-    """A limit against the largest absolute value over the test runs that tell it."""
-    values = [getattr(run.after, quantity) for run in test]
-    told = [abs(value) for value in values if value is not None]
-    if not told:
-        raise InputError(
-            f"limit on '{quantity}': no test run tells it (scale factor needs turns of the table, "
-            "temperature sensitivity and hysteresis need soaks); drop the limit or give such a run"
-        )
-    value = max(told)
-    return LimitOutcome(quantity=quantity, limit=limit, value=value, met=bool(value <= limit))
 
 
 def _notes(train: Sequence[Run], test: Sequence[Run]) -> tuple[str, ...]:

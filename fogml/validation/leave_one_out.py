@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, check_limits, judge, outcome_of
+from fogml.validation.judge import DEFAULT_AVERAGING_S, judge
+from fogml.validation.limits import check_limits, outcome_of
 from fogml.validation.results import Judgement
 
 if TYPE_CHECKING:

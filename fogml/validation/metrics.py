@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,8 +15,6 @@ from fogml.validation.scale_factor import find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
 
 SHORT_AVERAGING_S = 10.0
-QUANTITIES = tuple(field.name for field in dataclasses.fields(Metrics))
-"""Names of the figures that a limit may be put on."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,108 @@
+"""Settings: flags over YAML over defaults, unknown keys named, values after --test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fogml.cli.options import spread_values
+from fogml.cli.train_job import TrainSettings
+from fogml.errors import InputError
+
+
+def config(folder: Path, text: str) -> Path:
+    path = folder / "settings.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_flags_override_the_file_and_the_file_overrides_defaults(tmp_path):
+    path = config(tmp_path, "model: rbf\naveraging: 10\nlimits: {rms: 0.5}\n")
+    settings = TrainSettings.gather(path, {"model": "M2", "features": None, "limits": None})
+    assert (settings.model, settings.averaging, settings.limits) == ("M2", 10.0, {"rms": 0.5})
+    assert settings.out == "train-results"
+
+
+def test_limits_from_flags():
+    settings = TrainSettings.gather(None, {"limits": ["bias_stability=0.02", "range = 1"]})
+    assert settings.limits == {"bias_stability": 0.02, "range": 1.0}
+
+
+@pytest.mark.parametrize("text", ["bias_stability", "bias_stability=", "bias_stability=low"])
+def test_a_limit_without_a_number_is_an_error(text):
+    with pytest.raises(InputError, match="NAME=VALUE"):
+        TrainSettings.gather(None, {"limits": [text]})
+
+
+def test_an_unknown_key_is_named_with_the_nearest_known(tmp_path):
+    with pytest.raises(InputError, match=r"settings.yaml: unknown key 'feature'; did you mean 'features'"):
+        TrainSettings.gather(config(tmp_path, "feature: T\n"), {})
+
+
+@pytest.mark.parametrize("text", ["- a\n- b\n", "just text", "1: 2"])
+def test_a_file_without_keys_is_an_error(tmp_path, text):
+    with pytest.raises(InputError, match="key: value"):
+        TrainSettings.gather(config(tmp_path, text), {})
+
+
+def test_a_file_that_is_no_yaml_names_its_line(tmp_path):
+    with pytest.raises(InputError, match=r"settings.yaml, line 2"):
+        TrainSettings.gather(config(tmp_path, "model: M1\nfeatures: [T\n"), {})
+
+
+def test_a_binary_file_as_configuration_is_an_error(tmp_path):
+    path = tmp_path / "settings.yaml"
+    path.write_bytes(b"\xff\xfe\x00\x01")
+    with pytest.raises(InputError, match=r"settings\.yaml"):
+        TrainSettings.gather(path, {})
+
+
+def test_a_missing_file_and_a_folder_are_errors(tmp_path):
+    with pytest.raises(InputError, match="no such file"):
+        TrainSettings.gather(tmp_path / "none.yaml", {})
+    with pytest.raises(InputError, match="folder"):
+        TrainSettings.gather(tmp_path, {})
+
+
+def test_a_value_of_the_wrong_kind_names_its_key(tmp_path):
+    with pytest.raises(InputError, match=r"settings.yaml: averaging: .*'long'"):
+        TrainSettings.gather(config(tmp_path, "averaging: long\n"), {})
+
+
+def test_runs_beside_the_file_are_found(tmp_path, monkeypatch):
+    folder = tmp_path / "data"
+    folder.mkdir()
+    (folder / "a.csv").write_text("")
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    settings = TrainSettings.gather(config(folder, "runs: [a.csv]\ntest: [none.csv]\n"), {})
+    assert settings.runs == [str(folder / "a.csv")]
+    assert settings.test == ["none.csv"]
+
+
+def test_written_settings_read_back_the_same(tmp_path):
+    settings = TrainSettings.gather(
+        None, {"runs": ["shipped:cold-start-x"], "test": ["b.csv"], "limits": ["rms=0.1"], "seed": 3}
+    ).in_full()
+    path = config(tmp_path, settings.yaml("train"))
+    assert TrainSettings.gather(path, {}) == settings
+    assert yaml.safe_load(path.read_text())["runs"] == ["shipped:cold-start-x"]
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        (["a", "--test", "b", "c", "--seed", "1"], ["a", "--test", "b", "--test", "c", "--seed", "1"]),
+        (["a", "--test", "b", "--test", "c"], ["a", "--test", "b", "--test", "c"]),
+        (["--test", "b", "-o", "x", "a"], ["--test", "b", "-o", "x", "a"]),
+        (["a", "--test=b", "c"], ["a", "--test=b", "c"]),
+        (["a", "--test"], ["a", "--test"]),
+        (["a", "--test", "--json"], ["a", "--test", "--json"]),
+        (["--test", "b", "--", "c"], ["--test", "b", "--", "c"]),
+    ],
+)
+def test_values_after_an_option_belong_to_it(given, expected):
+    assert spread_values(given, "--test") == expected
