@@ -1,0 +1,99 @@
+"""The job of ``fogml inspect``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fogml.cli.runs import open_runs
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+from fogml.runs.run import Run
+from fogml.validation.inspection import inspection_json
+from fogml.validation.strict import hold_strict
+
+
+class InspectSettings(Settings):
+    """Settings of ``fogml inspect``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("runs",)
+    runs: list[str] = []
+    repair: bool = False
+    strict: bool = False
+    out: str | None = None
+
+    def in_full(self) -> InspectSettings:
+        """The settings with every path in full."""
+        assert self.out
+        return self.model_copy(
+            update={"runs": [absolute(path) for path in self.runs], "out": absolute(self.out)}
+        )
+
+
+def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
+    """Look into the runs, write what was found where an output folder is named, and print it."""
+    if not settings.runs:
+        raise InputError("no run is given; name at least one")
+    if settings.out is None:
+        values = _inspect(settings, terminal)[1]
+    else:
+        with whole_folder(settings.out) as folder:
+            runs, values = _inspect(settings, terminal)
+            text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
+            (folder / "inspect.json").write_text(text + "\n", encoding="utf-8")
+            with terminal.work("drawing"):
+                from fogml.report import inspect_page
+
+                (folder / "inspect.html").write_text(inspect_page(runs), encoding="utf-8")
+            (folder / "config.yaml").write_text(settings.in_full().yaml("inspect"), encoding="utf-8")
+    for run in values["runs"]:
+        _print(run, terminal)
+    terminal.result(values)
+    if settings.out is not None:
+        terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'inspect.html'}")
+
+
+def _inspect(settings: InspectSettings, terminal: Terminal) -> tuple[list[Run], dict[str, Any]]:
+    # Findings are part of the result here, so they are not noted on stderr as well.
+    runs = open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair)
+    if settings.strict:
+        hold_strict([(run.name, run.findings) for run in runs])
+    with terminal.work("looking into the runs"):
+        return runs, inspection_json(runs)
+
+
+def _print(run: dict[str, Any], terminal: Terminal) -> None:
+    rows = [
+        [column["name"], column["unit"] or "–", *(number(column[key]) for key in _STATISTICS)]
+        for column in run["columns"]
+    ]
+    title = f"{run['run']}: {run['rows']} rows, {number(run['span_s'])} s, one in {number(run['sample_s'])} s"
+    terminal.table(title, ["column", "unit", *(key.replace("_", " ") for key in _STATISTICS)], rows)
+    if run["earth_rate_deg_h"] is not None:
+        terminal.say(f"Earth rate along the input axis: {number(run['earth_rate_deg_h'])} deg/h")
+    else:
+        terminal.say("Earth rate along the input axis: not known (state latitude and input_axis)")
+    for name, found in run["temperatures"].items():
+        terminal.say(
+            f"{name}: span {number(found['span'])} degC, fastest rise {number(found['fastest_rise'])}, "
+            f"fastest fall {number(found['fastest_fall'])} degC/min"
+        )
+    gaps = run["gaps"]
+    if gaps["count"]:
+        terminal.say(
+            f"gaps: {gaps['count']}, the longest {number(gaps['longest_s'])} s, {gaps['stretches']} stretches"
+        )
+    spent = [
+        f"{name.replace('_', ' ')} {number(time)} s"
+        for name, time in run["regimes"]["seconds"].items()
+        if time
+    ]
+    terminal.say("regimes: " + ", ".join(spent))
+    for finding in run["findings"]:
+        terminal.say(f"{finding['code'].replace('_', ' ')}: {finding['message']}")
+
+
+_STATISTICS = ("least", "greatest", "mean", "standard_deviation")

@@ -1,0 +1,142 @@
+"""The frame of the command line: help, version, errors as one message and an exit status."""
+
+from __future__ import annotations
+
+import errno
+import subprocess
+import sys
+import time
+from importlib import import_module
+from types import SimpleNamespace
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import fogml
+from fogml.cli import main
+from fogml.errors import InputError
+
+runner = CliRunner()
+
+
+def use_command(monkeypatch, action):
+    """Make ``fogml train`` do something else."""
+    app = typer.Typer()
+    app.command("train")(action)
+    monkeypatch.setattr(main, "import_module", lambda name: SimpleNamespace(app=app))
+
+
+def run_program(*arguments: str, **options):
+    code = "from fogml.cli.main import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", code, *arguments], capture_output=True, text=True, timeout=60, **options
+    )
+
+
+def test_version():
+    result = runner.invoke(main.app, ["--version"])
+    assert result.exit_code == 0
+    assert result.stdout.strip() == f"fogml {fogml.__version__}"
+
+
+def test_help_lists_every_command():
+    result = runner.invoke(main.app, ["--help"])
+    assert result.exit_code == 0
+    for name in main.COMMANDS:
+        assert f"\n  {name} " in result.stdout
+
+
+@pytest.mark.parametrize("name", main.COMMANDS)
+def test_the_line_in_the_list_is_the_command_s_own(name):
+    module, line = main.COMMANDS[name]
+    command = typer.main.get_command(import_module(module).app)
+    assert command.help.splitlines()[0] == line
+
+
+@pytest.mark.parametrize("name", main.COMMANDS)
+def test_every_command_has_help_and_the_common_options(name):
+    result = runner.invoke(main.app, [name, "--help"])
+    assert result.exit_code == 0
+    for option in ("--config", "--seed", "--json", "--quiet", "--out"):
+        assert option in result.stdout
+
+
+def test_help_loads_nothing_heavy():
+    code = (
+        "import sys\nfrom fogml.cli.main import app\n"
+        "try:\n    app(['--help'])\nexcept SystemExit:\n    pass\n"
+        "heavy = {'torch', 'sklearn', 'pandas', 'plotly', 'scipy', 'pyarrow', 'numpy', 'pydantic'}\n"
+        "print(sorted(heavy & set(sys.modules)), file=sys.stderr)"
+    )
+    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert found.stderr.strip() == "[]"
+
+
+def test_help_answers_soon():
+    times = []
+    for _ in range(5):
+        begun = time.perf_counter()
+        assert run_program("--help").returncode == 0
+        times.append(time.perf_counter() - begun)
+    # 0.1 s on an idle machine; other processes may hold the processor.
+    assert min(times) < 0.3
+
+
+def test_an_unknown_command_names_the_nearest():
+    result = runner.invoke(main.app, ["trian"])
+    assert result.exit_code == 2
+    assert "Did you mean 'train'?" in result.stderr
+    result = runner.invoke(main.app, ["sing"])
+    assert result.exit_code == 2
+    assert "Commands are demo" in result.stderr
+
+
+def test_an_unknown_option_is_a_usage_error():
+    result = runner.invoke(main.app, ["train", "--modle", "rbf"])
+    assert result.exit_code == 2
+    assert "--modle" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("error", "message"),
+    [
+        (InputError("a.csv: column 'time' is missing"), "a.csv: column 'time' is missing"),
+        (OSError(errno.ENOSPC, "No space left on device", "/tmp/x"), "/tmp/x: No space left on device"),
+        (PermissionError(errno.EACCES, "Permission denied", "out"), "out: Permission denied"),
+        (MemoryError(), "not enough memory"),
+    ],
+)
+def test_errors_are_one_message_and_status_2(monkeypatch, error, message):
+    def action():
+        raise error
+
+    use_command(monkeypatch, action)
+    result = runner.invoke(main.app, ["train"])
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert len(result.stderr.strip().splitlines()) == 1
+
+
+def test_an_interrupt_is_status_130(monkeypatch):
+    def action():
+        raise KeyboardInterrupt
+
+    use_command(monkeypatch, action)
+    assert runner.invoke(main.app, ["train"]).exit_code == 130
+
+
+def test_a_defect_is_not_hidden(monkeypatch):
+    def action():
+        raise AssertionError("a defect")
+
+    use_command(monkeypatch, action)
+    result = runner.invoke(main.app, ["train"])
+    assert isinstance(result.exception, AssertionError)
+
+
+def test_the_program_runs():
+    found = run_program("--version")
+    assert (found.returncode, found.stderr) == (0, "")
