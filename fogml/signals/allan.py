@@ -125,8 +125,10 @@ def allan_deviation(
         raise InputError("Allan deviation: values that are not finite; leave them out first")
     # In floating point: 2 m^2 n passes the largest integer at 1e7 samples.
     adev = np.sqrt(sums / (2.0 * counts)) / factors
-    averages = (lengths[None, :] // factors[:, None]).sum(axis=1)
-    exponent = noise_exponents(kernel.lag_sums(phases, edges, factors), averages)
+    from_one = np.union1d([1], factors)
+    averages = (lengths[None, :] // from_one[:, None]).sum(axis=1)
+    exponent = noise_exponents(kernel.lag_sums(phases, edges, from_one), averages)
+    exponent = exponent[np.searchsorted(from_one, factors)]
     edf = np.array(
         [
             degrees_of_freedom(int(kind), int(m), lengths + 1, overlapping=overlapping)

@@ -29,14 +29,15 @@ def noise_exponents(lag_sums: FloatArray, averages: IntArray) -> IntArray:
     From the lag-1 autocorrelation r of the averages, differenced once if
     ``r / (1 + r) >= 1/4``; the exponent is ``-2 (r / (1 + r) + differences)``, rounded to one
     of quantisation 2, white 0, flicker -1, random walk -2. Flicker of the angle (1), which is
-    no term of gyro noise, counts as white and so gets the fewer degrees of freedom. Factors
-    with under 30 averages take the exponent of the factor before them.
+    no term of gyro noise, counts as white and so gets the fewer degrees of freedom. So does
+    quantisation at a factor above one where another noise prevails, as its share can only
+    fall. Factors with under 30 averages take the exponent of the factor before them.
 
     Parameters
     ----------
     lag_sums
         Sums of squares and of neighbours' products of the averages, then of their first
-        differences, shape (k, 4).
+        differences, at rising factors from 1, shape (k, 4).
     averages
         Averages behind each row, shape (k,).
 
@@ -46,10 +47,13 @@ def noise_exponents(lag_sums: FloatArray, averages: IntArray) -> IntArray:
         Shape (k,).
     """
     exponents = np.zeros(len(lag_sums), dtype=np.int64)
-    last = WHITE
+    if len(averages) == 0 or averages[0] < _ENOUGH:
+        return exponents
+    last = QUANTISATION
     for row, (squares, products, step_squares, step_products) in enumerate(lag_sums):
         if averages[row] >= _ENOUGH and squares > 0 and step_squares > 0:
-            last = _exponent(products / squares, step_products / step_squares)
+            told = _exponent(products / squares, step_products / step_squares)
+            last = WHITE if told == QUANTISATION and last != QUANTISATION else told
         exponents[row] = last
     return exponents
 
