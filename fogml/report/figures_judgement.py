@@ -1,0 +1,246 @@
+"""Figures of one model on one run: drift in time, against temperature, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from fogml.report import style
+from fogml.report.page import Drawing
+from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices, time_in_words
+from fogml.report.shading import in_order, regime_word, segments_of, shade
+from fogml.report.words import number, percent
+from fogml.validation.results import AveragedSeries, RunJudgement
+
+STEADY_DEG_C_PER_MIN = 0.05
+"""Temperature rates within this are steady: neither warming nor cooling."""
+_FLAGS = {1: ("outside training", "diamond-open", style.ORANGE), 2: ("window not full", "x", style.PURPLE)}
+_DIRECTIONS = (
+    ("warming", style.WARMING, "triangle-up", 1),
+    ("cooling", style.COOLING, "triangle-down", -1),
+    ("steady", style.STEADY, "circle-open", 0),
+)
+
+
+def averages_of(judged: RunJudgement) -> str:
+    """The averaging time in words: ``100 s averages``."""
+    return f"{judged.averaging_s:g} s averages"
+
+
+def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = None) -> Drawing:
+    """Temperature, drift with the model over it, and what is left with its 90 % band, in time."""
+    series = judged.series
+    per_unit, unit = time_in_words(float(np.ptp(series.time)))
+    time = series.time / per_unit
+    gaps = gap_starts(series.time)
+    figure = make_subplots(
+        rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.045, row_heights=[1, 1.5, 1.5]
+    )
+
+    def line(row: int, values: NDArray[np.float64], **trace: Any) -> None:
+        x, y = drawn(time, values, gaps=gaps)
+        figure.add_trace(go.Scatter(x=x, y=y, mode="lines", **trace), row=row, col=1)
+
+    line(
+        1, series.temperature, name="temperature", line={"color": style.BLUE, "width": 1.6}, showlegend=False
+    )
+    line(2, series.before, name="drift before", line={"color": style.BEFORE, "width": 1.4})
+    line(
+        2, series.before - series.after, name="model", line={"color": style.MODEL, "width": 2, "dash": "dash"}
+    )
+    if np.isfinite(series.upper).any():
+        figure.add_trace(_band(time, series, gaps), row=3, col=1)
+    line(3, series.after, name="left after", line={"color": style.AFTER, "width": 1.4})
+    _mark_flagged(figure, time, series)
+    _floor_lines(figure, judged.floor)
+    regimes = shade(figure, segments_of(time, series.regime))
+    figure.update_yaxes(title_text="T [°C]", row=1, col=1)
+    figure.update_yaxes(title_text="drift [deg/h]", row=2, col=1)
+    figure.update_yaxes(title_text="left [deg/h]", row=3, col=1)
+    figure.update_xaxes(title_text=f"time [{unit}]", row=3, col=1)
+    style.styled(figure, 590, legend={"y": 1.05}, hovermode="x")
+    words = ", ".join(regime_word(name) for name in regimes)
+    return Drawing(
+        figure,
+        alt=(
+            f"{judged.run} against time, {averages_of(judged)}: temperature from "
+            f"{number(float(np.nanmin(series.temperature)))} to {number(float(np.nanmax(series.temperature)))} °C; "
+            f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
+            f"what is left, over a range of {number(judged.after.range)} deg/h. Bands behind: {words}."
+        ),
+        caption=(
+            f"{averages_of(judged).capitalize()}. Top: temperature. Middle: drift before compensation, and the "
+            "model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and dashed the "
+            f"noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
+        ),
+    )
+
+
+def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.intp]) -> go.Scatter:
+    """The prediction interval as one closed outline per stretch, so that no gap is filled."""
+    sides_x, sides_y = [], []
+    for rows in np.split(np.arange(len(time)), gaps):
+        points = max(DRAWN_POINTS * len(rows) // len(time), 4)
+        lower, upper = (rows[min_max_indices(v[rows], points)] for v in (series.lower, series.upper))
+        sides_x += [time[lower], time[upper][::-1], [np.nan]]
+        sides_y += [series.lower[lower], series.upper[upper][::-1], [np.nan]]
+    return go.Scatter(
+        x=np.concatenate(sides_x),
+        y=np.concatenate(sides_y),
+        mode="lines",
+        line={"color": style.AFTER, "width": 0},
+        fill="toself",
+        fillcolor="rgba(0, 158, 115, 0.22)",
+        name="90 % band",
+        hoverinfo="skip",
+    )
+
+
+def _mark_flagged(figure: go.Figure, time: NDArray[np.float64], series: AveragedSeries) -> None:
+    for flag, (words, symbol, colour) in _FLAGS.items():
+        rows = np.flatnonzero(series.flag == flag)
+        if rows.size:
+            rows = rows[min_max_indices(series.after[rows], DRAWN_POINTS // 4)]
+            marker = {"symbol": symbol, "color": colour, "size": 6, "line": {"width": 1.2}}
+            trace = go.Scatter(x=time[rows], y=series.after[rows], mode="markers", marker=marker, name=words)
+            figure.add_trace(trace, row=3, col=1)
+
+
+def _floor_lines(figure: go.Figure, floor: float) -> None:
+    for value in (floor, -floor):
+        figure.add_hline(y=value, row=3, col=1, line={"color": style.FLOOR, "width": 1, "dash": "dash"})
+
+
+def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement] = ()) -> Drawing:
+    """Drift against temperature, warming and cooling apart: before with the model, and after."""
+    series = judged.series
+    figure = make_subplots(
+        rows=1,
+        cols=2,
+        horizontal_spacing=0.09,
+        subplot_titles=("before, with the model", "after, on its own scale"),
+    )
+    for other in train:
+        kept = min_max_indices(other.series.before, DRAWN_POINTS // 4)
+        figure.add_trace(
+            go.Scatter(
+                x=other.series.temperature[kept],
+                y=other.series.before[kept],
+                mode="markers",
+                name="training runs",
+                legendgroup="train",
+                showlegend=other is train[0],
+                hovertext=other.run,
+                marker={"symbol": "x-thin", "size": 5, "line": {"color": style.TRAINING, "width": 1}},
+            ),
+            row=1,
+            col=1,
+        )
+    direction = direction_of(series)
+    for words, colour, symbol, sign in _DIRECTIONS:
+        rows = np.flatnonzero(direction == sign)
+        if rows.size == 0:
+            continue
+        for column, values in ((1, series.before), (2, series.after)):
+            kept = rows[min_max_indices(values[rows], DRAWN_POINTS // 2)]
+            figure.add_trace(
+                go.Scatter(
+                    x=series.temperature[kept],
+                    y=values[kept],
+                    mode="markers",
+                    name=words,
+                    legendgroup=words,
+                    showlegend=column == 1,
+                    marker={"color": colour, "symbol": symbol, "size": 5.5, "opacity": 0.75},
+                ),
+                row=1,
+                col=column,
+            )
+    model = series.before - series.after
+    kept = np.sort(min_max_indices(model))
+    x, y = drawn(series.time[kept], model[kept])
+    temperature = np.interp(x, series.time, series.temperature)
+    temperature[np.isnan(y)] = np.nan
+    figure.add_trace(
+        go.Scatter(x=temperature, y=y, mode="lines", name="model", line={"color": style.BLACK, "width": 1.8}),
+        row=1,
+        col=1,
+    )
+    for value in (judged.floor, -judged.floor):
+        figure.add_hline(y=value, row=1, col=2, line={"color": style.FLOOR, "width": 1, "dash": "dash"})
+    figure.update_xaxes(title_text="T [°C]")
+    figure.update_yaxes(title_text="drift [deg/h]", row=1, col=1)
+    figure.update_yaxes(title_text="left [deg/h]", row=1, col=2)
+    style.styled(figure, 430, legend={"y": 1.1}, margin={"t": 74})
+    return Drawing(
+        figure,
+        alt=(
+            f"{judged.run}: drift against temperature with warming and cooling apart. Before, the averages "
+            f"range over {number(judged.before.range)} deg/h; after, over {number(judged.after.range)} deg/h."
+        ),
+        caption=(
+            f"{averages_of(judged).capitalize()}. Where warming and cooling part, the drift depends on more than "
+            "the temperature, and no curve in T alone can follow it. Dashed on the right: the noise floor of "
+            f"± {number(judged.floor)} deg/h."
+        ),
+    )
+
+
+def direction_of(series: AveragedSeries) -> NDArray[np.int8]:
+    """1 warming, -1 cooling, 0 steady (within 0.05 degC/min), shape (m,)."""
+    rate = series.rate
+    return np.where(rate > STEADY_DEG_C_PER_MIN, 1, np.where(rate < -STEADY_DEG_C_PER_MIN, -1, 0)).astype(
+        np.int8
+    )
+
+
+def rms_by_regime(judged: RunJudgement) -> Drawing:
+    """Rms of the averages in each regime, before and after, with the floor."""
+    series = judged.series
+    names = [name for name in in_order(series.regime.tolist())]
+    groups = [("whole run", np.ones(len(series.time), dtype=np.bool_))]
+    groups += [(regime_word(name), series.regime == name) for name in names]
+    rows = []
+    for words, chosen in groups:
+        before, after = (float(np.sqrt(np.mean(v[chosen] ** 2))) for v in (series.before, series.after))
+        rows.append((f"{words} ({percent(float(chosen.mean()))})", before, after))
+    labels = [row[0] for row in rows]
+    figure = go.Figure()
+    for index, (name, colour, symbol) in enumerate(
+        (("before", style.BEFORE, "diamond-open"), ("after", style.AFTER, "circle")), start=1
+    ):
+        marker = {"symbol": symbol, "color": colour, "size": 11, "line": {"width": 2}}
+        figure.add_trace(
+            go.Scatter(x=[row[index] for row in rows], y=labels, mode="markers", name=name, marker=marker)
+        )
+    floor = judged.floor
+    figure.add_vline(x=floor, line={"color": style.FLOOR, "width": 1.4, "dash": "dash"})
+    figure.add_trace(
+        go.Scatter(
+            x=[None], y=[None], mode="lines", name="noise floor", line={"color": style.FLOOR, "dash": "dash"}
+        )
+    )
+    figure.update_xaxes(title_text="rms [deg/h]", type="log", dtick="D2")
+    figure.update_yaxes(autorange="reversed")
+    style.styled(figure, 120 + 38 * len(rows))
+    worst = max(rows[1:], key=lambda row: row[2])
+    return Drawing(
+        figure,
+        alt=(
+            "Rms by regime, before and after: "
+            + "; ".join(
+                f"{words}: {number(before)} and {number(after)} deg/h" for words, before, after in rows
+            )
+            + f". Noise floor {number(floor)} deg/h."
+        ),
+        caption=(
+            f"Rms of the {averages_of(judged)} about the reference, by regime (share of the run in brackets), "
+            f"and the noise floor of {number(floor)} deg/h. Most is left in: {worst[0]}, {number(worst[2])} deg/h."
+        ),
+        half=True,
+    )

@@ -1,0 +1,122 @@
+"""One self-contained page: text, figures as data, style, and plotly.js inlined once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import plotly.graph_objects as go
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
+
+import fogml
+from fogml.report import words
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A figure with what a reader who cannot see it needs.
+
+    Attributes
+    ----------
+    figure
+        The figure, styled, with its height in its layout.
+    alt
+        What it shows, in a sentence or two.
+    caption
+        What to look for; below the figure.
+    half
+        Whether it stands beside something else on a wide screen.
+    """
+
+    figure: go.Figure
+    alt: str
+    caption: str = ""
+    half: bool = False
+
+
+@dataclass(frozen=True)
+class Tile:
+    """A headline figure: its name, value, unit, a note below, and ``met`` or ``missed`` if it is one."""
+
+    name: str
+    value: str
+    unit: str = ""
+    note: str = ""
+    kind: str = ""
+
+
+class _Drawings:
+    """Gives each figure of a page its number, and remembers whether plotly.js is needed."""
+
+    def __init__(self) -> None:
+        self.count = 0
+
+    def __call__(self, drawing: Drawing) -> Markup:
+        self.count += 1
+        # "<" as an escape keeps any text in the data from ending the script element.
+        data = Markup(drawing.figure.to_json().replace("<", "\\u003c"))
+        template = _environment().get_template("figure.html")
+        height = drawing.figure.layout.height or 400
+        return Markup(template.render(drawing=drawing, number=self.count, data=data, height=height))
+
+
+@cache
+def _environment() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("fogml.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["number"] = words.number
+    environment.filters["stated"] = words.stated
+    environment.filters["percent"] = words.percent
+    environment.filters["plural"] = words.plural
+    environment.globals["label"] = words.label
+    return environment
+
+
+def _text(name: str) -> Markup:
+    """A style sheet or script of the templates folder, as it stands."""
+    loader = _environment().loader
+    assert loader is not None
+    return Markup(loader.get_source(_environment(), name)[0])
+
+
+def _plotly() -> Markup:
+    from plotly.offline import get_plotlyjs
+
+    return Markup(get_plotlyjs())
+
+
+def render(template: str, *, title: str, **context: Any) -> str:
+    """A whole HTML page from a template that extends ``base.html``.
+
+    The template draws a figure with ``{{ draw(drawing) }}``. Everything is inlined, and a
+    content security policy forbids the page any request.
+
+    Parameters
+    ----------
+    template
+        File name in ``fogml/report/templates``.
+    title
+        Title of the document.
+    context
+        What the template shows.
+    """
+    return (
+        _environment()
+        .get_template(template)
+        .render(
+            title=title,
+            draw=_Drawings(),
+            style=_text("style.css"),
+            script=_text("figures.js"),
+            plotly=_plotly,
+            version=fogml.__version__,
+            **context,
+        )
+    )

@@ -1,0 +1,140 @@
+"""The tables that several pages share: figures per run, metrics before and after, findings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+from fogml.report.words import label, number, percent, unit_of
+from fogml.runs.findings import Finding
+from fogml.validation.results import Metrics, RunJudgement
+
+Column = tuple[str, str, str]
+"""Heading, unit, and ``text`` or ``figure``."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """Cells of a table's row as text, and a mark that sets it off: ``chosen`` or ``baseline``."""
+
+    cells: tuple[str, ...]
+    mark: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table as a page shows it."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[Row, ...]
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Noticed:
+    """A finding with its place in words."""
+
+    code: str
+    message: str
+    place: str
+
+
+def metrics_table(judged: RunJudgement) -> Table:
+    """Every figure that the run tells, before and after, with the floor beside."""
+    rows = []
+    for field in fields(Metrics):
+        before, after = getattr(judged.before, field.name), getattr(judged.after, field.name)
+        if before is None and after is None:
+            continue
+        floor = number(judged.floor) if field.name in ("bias_stability", "rms") else ""
+        cells = (label(field.name), number(before), number(after), floor, unit_of(field.name))
+        rows.append(Row(cells))
+    about = "known Earth rate" if judged.bias_reference == "earth rate" else "the training runs' mean"
+    return Table(
+        columns=(
+            ("Figure", "", "text"),
+            ("Before", "", "figure"),
+            ("After", "", "figure"),
+            ("Floor", "", "figure"),
+            ("Unit", "", "text"),
+        ),
+        rows=tuple(rows),
+        caption=f"{judged.averaging_s:g} s averages where not said otherwise; bias relative to {about}.",
+    )
+
+
+def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
+    """One row per run: bias, bias stability, range and rms before and after, floor, outside."""
+    rows = [
+        Row(
+            (
+                run.run,
+                f"{run.averaging_s:g}",
+                *(
+                    f"{number(getattr(run.before, name))} → {number(getattr(run.after, name))}"
+                    for name in ("bias", "bias_stability", "range", "rms")
+                ),
+                number(run.floor),
+                percent(run.outside_training),
+                f"{run.rows_used:,}".replace(",", "\u202f"),
+            )
+        )
+        for run in runs
+    ]
+    return Table(
+        columns=(
+            ("Run", "", "text"),
+            ("Averages", "s", "figure"),
+            ("Bias", "deg/h", "figure"),
+            ("Bias stability", "deg/h", "figure"),
+            ("Range", "deg/h", "figure"),
+            ("Rms", "deg/h", "figure"),
+            ("Noise floor", "deg/h", "figure"),
+            ("Outside training", "", "figure"),
+            ("Samples used", "", "figure"),
+        ),
+        rows=tuple(rows),
+        caption=caption,
+    )
+
+
+def coefficients_of(model: Mapping[str, Any]) -> list[tuple[str, float, float | None]]:
+    """Term, coefficient and standard error of a model that tells them; none of another."""
+    told = model.get("coefficients") or {}
+    return [
+        (name, float(c["value"]), float(c["se"]) if c.get("se") is not None else None)
+        if isinstance(c, Mapping)
+        else (name, float(c), None)
+        for name, c in told.items()
+    ]
+
+
+def coefficients_table(model: Mapping[str, Any]) -> Table | None:
+    """Coefficients with their standard errors, where the model tells them."""
+    told = coefficients_of(model)
+    if not told:
+        return None
+    return Table(
+        columns=(
+            ("Term", "", "text"),
+            ("Coefficient", "deg/h per unit of the term", "figure"),
+            ("Standard error", "", "figure"),
+        ),
+        rows=tuple(Row((name, number(value, 5), number(error, 2))) for name, value, error in told),
+    )
+
+
+def noticed(findings: Iterable[Finding | Mapping[str, Any]]) -> list[Noticed]:
+    """Findings with their places in words, from objects or from their JSON form."""
+    shown = []
+    for finding in findings:
+        values = finding.as_dict() if isinstance(finding, Finding) else finding
+        place = [f"column {values['column']}"] if values.get("column") else []
+        place += [f"from row {values['row']}"] if values.get("row") else []
+        shown.append(Noticed(str(values["code"]), _sentence(str(values["message"])), ", ".join(place)))
+    return shown
+
+
+def _sentence(message: str) -> str:
+    return message[:1].upper() + message[1:]

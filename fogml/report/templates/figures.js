@@ -1,0 +1,44 @@
+(function () {
+  "use strict";
+  var PAPER_WIDTH = 672; // px on A4 within the margins of the style sheet
+  var options = {
+    displaylogo: false,
+    responsive: true,
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+    toImageButtonOptions: { format: "svg" }
+  };
+  var waiting = Array.prototype.slice.call(document.querySelectorAll(".plot"));
+  var shown = waiting.slice();
+
+  function draw(plot) {
+    var figure = JSON.parse(document.getElementById(plot.id + "-data").textContent);
+    options.toImageButtonOptions.filename = document.title + " " + plot.id;
+    var plain = plot.classList.contains("plain");
+    Plotly.newPlot(plot, figure.data, figure.layout, Object.assign({}, options, plain ? { displayModeBar: false } : {}));
+  }
+
+  // One figure per turn, so that the first can be read while the rest are drawn.
+  function next() {
+    if (waiting.length) {
+      draw(waiting.shift());
+      setTimeout(next, 0);
+    } else {
+      document.body.dataset.drawn = shown.length;
+    }
+  }
+
+  window.addEventListener("beforeprint", function () {
+    while (waiting.length) {
+      draw(waiting.shift());
+    }
+    shown.forEach(function (plot) {
+      Plotly.relayout(plot, { autosize: false, width: PAPER_WIDTH });
+    });
+  });
+  window.addEventListener("afterprint", function () {
+    shown.forEach(function (plot) {
+      Plotly.relayout(plot, { autosize: true, width: null });
+    });
+  });
+  next();
+})();

@@ -1,0 +1,126 @@
+"""The page of ``fogml train``: a model fitted on some runs, judged on others, at one look."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fogml.report import figures_judgement
+from fogml.report.page import Drawing, Tile, render
+from fogml.report.tables import Noticed, Table, coefficients_table, metrics_table, noticed, runs_table
+from fogml.report.verdict import improves, model_card, stated_limits, subject, verdict, worst_run
+from fogml.report.words import number, percent, plural, stated, unit_of
+from fogml.validation.results import Judgement, RunJudgement
+
+
+@dataclass(frozen=True)
+class RunSection:
+    """What the page shows of one test run."""
+
+    judged: RunJudgement
+    anchor: str
+    in_time: Drawing
+    against_temperature: Drawing | None
+    by_regime: Drawing
+    metrics: Table
+    findings: list[Noticed]
+    left_out: str
+
+
+def train_page(judgement: Judgement) -> str:
+    """The self-contained HTML page of a judgement.
+
+    Parameters
+    ----------
+    judgement
+        As :func:`fogml.validation.judge.judge` gives it.
+
+    Returns
+    -------
+    str
+        The page, to be written as UTF-8.
+    """
+    name = subject(judgement)
+    return render(
+        "train.html",
+        title=f"{name} – drift model judged",
+        name=name,
+        judgement=judgement,
+        verdict=verdict(judgement),
+        limits=stated_limits(judgement),
+        tiles=headline_tiles(judgement),
+        sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
+        test_table=runs_table(judgement.test, "Before → after, on runs that the model has not seen."),
+        train_table=runs_table(
+            judgement.train,
+            "Before → after, on the runs that the model was fitted to: how well it was fitted.",
+        ),
+        card=model_card(judgement.model),
+        coefficients=coefficients_table(judgement.model),
+        train_findings=[(run.run, noticed(run.findings)) for run in judgement.train if run.findings],
+        notes=_notes(judgement),
+        unit_of=unit_of,
+    )
+
+
+def headline_tiles(judgement: Judgement) -> list[Tile]:
+    """Before, after, floor and improvement of the worst test run."""
+    worst = worst_run(judgement.test)
+    averages = figures_judgement.averages_of(worst)
+    on = f"{worst.run}, {averages}" if len(judgement.test) > 1 else averages
+    ratio = worst.before.rms / worst.after.rms if worst.after.rms > 0 else float("inf")
+    gain = f"{number(ratio, 2)} × smaller" if ratio >= 1 else f"{number(1 / ratio, 2)} × larger"
+    tiles = [
+        Tile("Rms before", number(worst.before.rms), "deg/h", on),
+        Tile("Rms after", number(worst.after.rms), "deg/h", gain, "" if improves(worst) else "missed"),
+        Tile("Bias stability after", number(worst.after.bias_stability), "deg/h", averages),
+        Tile("Noise floor", number(worst.floor), "deg/h", averages),
+        Tile("Outside training", percent(worst.outside_training), "", "of the samples judged"),
+    ]
+    index = judgement.design_index
+    if index is not None:
+        tiles.append(
+            Tile(
+                "Design index",
+                number(index.value),
+                "deg/h",
+                f"{'✓ met' if index.met else '✗ not met'}, limit {stated(index.limit)}",
+                "met" if index.met else "missed",
+            )
+        )
+    return tiles
+
+
+def _section(index: int, judged: RunJudgement, judgement: Judgement) -> RunSection:
+    return RunSection(
+        judged=judged,
+        anchor=f"test-{index}",
+        in_time=figures_judgement.drift_in_time(judged, judgement.model.get("interval")),
+        against_temperature=figures_judgement.drift_against_temperature(judged, judgement.train),
+        by_regime=figures_judgement.rms_by_regime(judged),
+        metrics=metrics_table(judged),
+        findings=noticed(judged.findings),
+        left_out=_left_out(judged),
+    )
+
+
+def _left_out(judged: RunJudgement) -> str:
+    if not judged.rows_left_out:
+        return ""
+    share = judged.rows_left_out / (judged.rows_used + judged.rows_left_out)
+    return (
+        f"{plural(judged.rows_left_out, 'sample')} ({percent(share)}) left out: the features' windows were not "
+        "full there, or the turntable was changing its rate."
+    )
+
+
+def _notes(judgement: Judgement) -> list[str]:
+    """Every note once: the judgement's, the model's, then the runs'."""
+    runs: Sequence[RunJudgement] = (*judgement.train, *judgement.test)
+    told = [*judgement.notes, *judgement.model.get("notes", ())]
+    by_note: dict[str, list[str]] = {}
+    for run in runs:
+        for note in run.notes:
+            by_note.setdefault(note, []).append(run.run)
+    told += [f"{', '.join(dict.fromkeys(names))}: {note}" for note, names in by_note.items()]
+    return list(dict.fromkeys(str(note) for note in told))

@@ -1,0 +1,127 @@
+"""What a judgement says, in one plain sentence or two."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from fogml.report.words import label, listed, number, percent, plural, stated, unit_of
+from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
+
+_NOTICED_SHARE = 0.01
+
+
+def subject(judgement: Judgement) -> str:
+    """What was judged, as a heading: unit, axis, model and test runs."""
+    units = list(dict.fromkeys(run.unit for run in judgement.test if run.unit))
+    axes = list(dict.fromkeys(run.axis for run in judgement.test if run.axis))
+    who = [listed(units)] if units else []
+    who += [f"axis {listed(axes)}"] if axes else []
+    what = f"{judgement.model.get('kind', 'model')} on {listed([run.run for run in judgement.test], 3)}"
+    return ", ".join(who) + (": " if who else "") + what
+
+
+def worst_run(runs: Sequence[RunJudgement]) -> RunJudgement:
+    """The run with the largest rms after; the design index looks at this one."""
+    return max(runs, key=lambda run: run.after.rms)
+
+
+def stated_limits(judgement: Judgement) -> list[LimitOutcome]:
+    """The design index, if stated, and the limits."""
+    index = judgement.design_index
+    if index is None:
+        return list(judgement.limits)
+    return [LimitOutcome("design_index", index.limit, index.value, index.met), *judgement.limits]
+
+
+def verdict(judgement: Judgement) -> list[str]:
+    """Sentences, the most important first: what is left of what, and what the reader must know."""
+    worst = worst_run(judgement.test)
+    return [
+        *_what_is_left(judgement, worst),
+        *_bias(worst),
+        *_limits(stated_limits(judgement)),
+        *_outside(judgement.test),
+    ]
+
+
+def improves(judged: RunJudgement) -> bool:
+    """Whether the rms is smaller after than before."""
+    return judged.after.rms < judged.before.rms
+
+
+def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
+    kind = str(judgement.model.get("kind", "drift"))
+    several = len(judgement.test) > 1
+    where = f"On {worst.run}" + (
+        f", the worst of {plural(len(judgement.test), 'test run')}," if several else ""
+    )
+    before, after = number(worst.before.bias_stability), number(worst.after.bias_stability)
+    averages = f"bias stability, {worst.averaging_s:g} s averages"
+    floor = f"the noise floor is {number(worst.floor)} deg/h"
+    if kind in ("none", "mean"):
+        left = f"{where} nothing is compensated"
+        if kind == "mean":
+            left = f"{where} only the training runs' mean is taken off"
+        return [f"{left}: {after} deg/h stays ({averages}); {floor}."]
+    if worst.after.rms >= worst.before.rms:
+        return [
+            f"{where} the {kind} model does harm: rms goes from {number(worst.before.rms)} to "
+            f"{number(worst.after.rms)} deg/h, bias stability from {before} to {after} deg/h "
+            f"({worst.averaging_s:g} s averages); {floor}."
+        ]
+    sentence = f"{where} the {kind} model leaves {after} deg/h of {before} deg/h ({averages}); {floor}."
+    harmed = [run.run for run in judgement.test if not improves(run)]
+    return [sentence, f"It makes {listed(harmed)} worse."] if harmed else [sentence]
+
+
+def _bias(worst: RunJudgement) -> list[str]:
+    """The bias is worth a sentence where it makes up most of what is left."""
+    if abs(worst.after.bias) <= worst.after.bias_stability or worst.after.rms <= worst.floor:
+        return []
+    about = "known Earth rate" if worst.bias_reference == "earth rate" else "the training runs' mean"
+    return [
+        f"Its mean is off by {number(worst.after.bias)} deg/h from {about}; with that, "
+        f"the rms is {number(worst.after.rms)} deg/h."
+    ]
+
+
+def _limits(outcomes: Sequence[LimitOutcome]) -> list[str]:
+    missed = [outcome for outcome in outcomes if not outcome.met]
+    if not outcomes:
+        return []
+    if not missed:
+        count = {1: "The stated limit is", 2: "Both stated limits are"}
+        return [count.get(len(outcomes), f"All {len(outcomes)} stated limits are") + " met."]
+    described = [
+        f"{label(o.quantity).lower()} {number(o.value)}, limit {stated(o.limit)} {unit_of(o.quantity)}"
+        for o in missed
+    ]
+    return [f"Not met: {'; '.join(described)}."]
+
+
+def _outside(runs: Sequence[RunJudgement]) -> list[str]:
+    outside = [run for run in runs if run.outside_training >= _NOTICED_SHARE]
+    if not outside:
+        return []
+    shares = listed([f"{percent(run.outside_training)} of {run.run}" for run in outside])
+    return [f"Outside the temperatures and rates of training: {shares}; there the model falls back."]
+
+
+def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
+    """Name and value of what a model tells of itself, for a definition list."""
+    rows = [("kind", str(model.get("kind", "")))]
+    if model.get("features"):
+        rows.append(("features", ", ".join(str(name) for name in model["features"])))
+    parameters = model.get("parameters")
+    if parameters is not None:
+        rows.append(("parameters", f"{parameters:,}".replace(",", "\u202f")))
+    if model.get("bytes") is not None:
+        rows.append(("weights", plural(int(model["bytes"]), "byte")))
+    for key, words, unit in (("window_s", "longest look-back", " s"), ("rows", "training rows", "")):
+        if model.get(key):
+            rows.append((words, f"{number(float(model[key]), 4) if unit else int(model[key])}{unit}"))
+    for key in ("unit", "axis"):
+        if model.get(key):
+            rows.append((key, str(model[key])))
+    return rows

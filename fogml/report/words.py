@@ -1,0 +1,91 @@
+"""Numbers and names as people read them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+_LABELS = {
+    "bias": "Bias",
+    "bias_stability": "Bias stability",
+    "bias_stability_10s": "Bias stability, 10 s averages",
+    "range": "Range",
+    "rms": "Rms",
+    "scale_factor_error": "Scale-factor error",
+    "temperature_sensitivity": "Bias temperature sensitivity",
+    "hysteresis": "Thermal hysteresis",
+    "design_index": "Design index (largest rms)",
+}
+_UNITS = {
+    "scale_factor_error": "ppm",
+    "temperature_sensitivity": "deg/h/°C",
+    "design_index": "deg/h",
+}
+MISSING = "–"
+
+
+def label(quantity: str) -> str:
+    """The name of a quantity of `Metrics` in words; an unknown one with spaces for underscores."""
+    return _LABELS.get(quantity, quantity.replace("_", " ").capitalize())
+
+
+def unit_of(quantity: str) -> str:
+    """The unit of a quantity of `Metrics`."""
+    return _UNITS.get(quantity, "deg/h")
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number to so many significant digits; a dash where there is none.
+
+    Powers of ten only below 1e-4 and from 1e7 on.
+    """
+    if value is None or not math.isfinite(value):
+        return MISSING if value is None or math.isnan(value) else ("∞" if value > 0 else "−∞")
+    if value == 0:
+        return "0"
+    exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
+    if exponent < -4 or exponent >= 7:
+        mantissa, power = f"{value:.{digits - 1}e}".split("e")
+        return f"{mantissa} × 10^{int(power)}".replace("-", "−")
+    return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
+
+
+def stated(value: float) -> str:
+    """A number that somebody stated, such as a limit, as they would write it."""
+    return f"{value:.10g}".replace("-", "−")
+
+
+def percent(share: float | None) -> str:
+    """A share (0 to 1) in percent; "under 0.1 %" rather than a zero that is none."""
+    if share is None or not math.isfinite(share):
+        return MISSING
+    if 0 < share < 0.001:
+        return "under 0.1 %"
+    if 0.999 < share < 1:
+        return "over 99.9 %"
+    return f"{100 * share:.1f} %" if share not in (0, 1) else f"{100 * share:.0f} %"
+
+
+def plural(count: int, word: str, words: str | None = None) -> str:
+    """``3 runs``, ``1 run``; thousands apart."""
+    return f"{count:,}".replace(",", " ") + " " + (word if count == 1 else words or word + "s")
+
+
+def listed(names: Sequence[str], most: int = 4) -> str:
+    """``a``, ``a and b``, ``a, b and c``; beyond ``most`` names the rest as a count."""
+    if len(names) > most:
+        return ", ".join(names[: most - 1]) + f" and {len(names) - most + 1} more"
+    if len(names) < 2:
+        return "".join(names)
+    return ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def duration(seconds: float) -> str:
+    """A span of time in the unit that reads best: ``36 s``, ``12.5 min``, ``7.58 h``, ``4.2 d``."""
+    if seconds < 120:
+        return f"{number(seconds)} s"
+    if seconds < 2 * 3600:
+        return f"{number(seconds / 60)} min"
+    if seconds < 3 * 86400:
+        return f"{number(seconds / 3600)} h"
+    return f"{number(seconds / 86400)} d"
