@@ -1,0 +1,200 @@
+"""Atoms: one operator on one signal, the factors that feature terms are products of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.signal import Signal, number_text
+from fogml.runs.run import Run
+from fogml.signals import windows
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Operator = Literal["value", "diff", "d", "sign"]
+Method = Literal["block", "slope", "exp", "first"]
+
+OPERATORS: tuple[Operator, ...] = get_args(Operator)
+METHODS: tuple[Method, ...] = get_args(Method)
+RATE_UNIT_S = 60.0
+"""Rates of temperature are per minute."""
+DEAD_BAND = 0.05
+"""Rates up to this size [degC/min], either way, count as standing still: direction 0."""
+EXPONENTIAL_MEMORY = 40.0
+"""Time constants after which an exponential window has forgotten to below float64 (e**-40)."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """How a difference or a rate is taken.
+
+    Attributes
+    ----------
+    method
+        ``block``: newest window's mean less the mean of the window before. ``slope``: least-squares
+        line over one window. ``exp``: exponential memory. ``first``: neighbouring samples.
+    length_s
+        Length of each window, or time constant of ``exp`` [s]; 0 for ``first``.
+    """
+
+    method: Method = "block"
+    length_s: float = 64.0
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise InputError(f"window: no method '{self.method}'; known are {', '.join(METHODS)}")
+        if self.method == "first":
+            object.__setattr__(self, "length_s", 0.0)
+        elif not (np.isfinite(self.length_s) and self.length_s > 0.0):
+            raise InputError(f"window: a length of {self.length_s} s; a positive number was expected")
+        else:
+            object.__setattr__(self, "length_s", float(self.length_s))
+
+    @property
+    def text(self) -> str:
+        """The option in brackets, empty for the default."""
+        if self == DEFAULT_WINDOW:
+            return ""
+        return "[first]" if self.method == "first" else f"[{self.method}, {number_text(self.length_s)} s]"
+
+    @property
+    def span_s(self) -> float:
+        """Time from the start until it is full [s], to within a sample interval."""
+        spans = {"block": 2.0, "slope": 1.0, "exp": windows.EXPONENTIAL_SPAN, "first": 0.0}
+        return spans[self.method] * self.length_s
+
+    @property
+    def memory_s(self) -> float:
+        """How far back samples still change its value, at float64 [s]."""
+        return EXPONENTIAL_MEMORY * self.length_s if self.method == "exp" else self.span_s
+
+
+DEFAULT_WINDOW = Window()
+
+
+@dataclass(frozen=True)
+class Atom:
+    """One operator on one signal.
+
+    Attributes
+    ----------
+    operator
+        ``value`` [degC]; ``diff`` difference [degC]; ``d`` rate [degC/min]; ``sign`` direction of
+        the rate: -1, 0 or +1, with a dead band of 0.05 degC/min.
+    signal
+        What it works on.
+    window
+        How differences and rates are taken; None for ``value``.
+    """
+
+    operator: Operator
+    signal: Signal
+    window: Window | None = None
+
+    def __post_init__(self) -> None:
+        if self.operator not in OPERATORS:
+            raise InputError(f"atom: no operator '{self.operator}'; known are {', '.join(OPERATORS)}")
+        if self.operator == "value":
+            object.__setattr__(self, "window", None)
+        elif self.window is None:
+            object.__setattr__(self, "window", DEFAULT_WINDOW)
+
+    def __str__(self) -> str:
+        return self.text
+
+    @property
+    def text(self) -> str:
+        """Text form, e.g. ``dT[slope, 60 s]``."""
+        signal = self.signal.text
+        if self.window is None:
+            return signal
+        if self.operator == "diff":
+            return f"diff({signal}){self.window.text}"
+        rate = (f"d{signal}" if self.signal.is_sensor else f"d({signal})") + self.window.text
+        return f"sign({rate})" if self.operator == "sign" else rate
+
+    @property
+    def factor_text(self) -> str:
+        """Text form as a factor of a product or under a power: sums stand in parentheses."""
+        plain = self.window is not None or self.signal.is_sensor
+        return self.text if plain else f"({self.text})"
+
+    @property
+    def unit(self) -> str:
+        """Unit of its values; empty for a direction."""
+        return {"value": "degC", "diff": "degC", "d": "degC/min", "sign": ""}[self.operator]
+
+    @property
+    def order(self) -> tuple[int, str]:
+        """Sort key among the factors of a term: values, differences, rates, directions."""
+        return OPERATORS.index(self.operator), self.text
+
+
+def windowed_values(
+    signal: FloatArray, clock: windows.Clock, window: Window, unit_s: float | None
+) -> tuple[FloatArray, BoolArray]:
+    """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
+    if window.method == "first":
+        return windows.first_difference(clock, signal, unit_s=unit_s)
+    operator = {"block": windows.block_difference, "slope": windows.slope, "exp": windows.exponential}
+    return operator[window.method](clock, signal, window.length_s, unit_s=unit_s)
+
+
+def direction(rate: FloatArray) -> FloatArray:
+    """-1, 0 or +1 for rates [degC/min] below, within and above the dead band."""
+    band = DEAD_BAND * (1.0 + 1e-9)  # a ramp at just the dead band's rate is 0 in spite of float noise
+    return np.subtract(rate > band, rate < -band, dtype=np.float64)
+
+
+def evaluate(
+    atoms: tuple[Atom, ...], run: Run, sample_s: float | None = None
+) -> tuple[FloatArray, BoolArray]:
+    """Values of atoms over a run, and where all their windows are full.
+
+    Parameters
+    ----------
+    atoms
+        The a atoms wanted.
+    run
+        The run.
+    sample_s
+        Nominal sample interval [s]; the run's own if None.
+
+    Returns
+    -------
+    values : (n, a) array
+        One column per atom, columns contiguous. Where `full` is False all windowed atoms are 0.
+    full : (n,) bool array
+    """
+    n = len(run)
+    clock = windows.Clock(run.time, run.sample_s if sample_s is None else sample_s)
+    values = np.empty((n, len(atoms)), order="F")
+    full = np.ones(n, dtype=np.bool_)
+    signals: dict[Signal, FloatArray] = {}
+    rates: dict[tuple[Signal, Window], FloatArray] = {}
+    for column, atom in enumerate(atoms):
+        signal = signals.get(atom.signal)
+        if signal is None:
+            signal = signals[atom.signal] = atom.signal.values(run)
+        if atom.window is None:
+            values[:, column] = signal
+            continue
+        if atom.operator == "diff":
+            values[:, column], atom_full = windowed_values(signal, clock, atom.window, None)
+            full &= atom_full
+            continue
+        key = (atom.signal, atom.window)
+        if key not in rates:
+            rates[key], atom_full = windowed_values(signal, clock, atom.window, RATE_UNIT_S)
+            full &= atom_full
+        values[:, column] = direction(rates[key]) if atom.operator == "sign" else rates[key]
+    windowed = [column for column, atom in enumerate(atoms) if atom.window is not None]
+    if windowed and not full.all():
+        partial = ~full
+        for column in windowed:
+            values[partial, column] = 0.0
+    return values, full

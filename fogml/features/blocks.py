@@ -1,0 +1,68 @@
+"""Atom values block by block, for recordings that don't fit into memory."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.runs.run import Run
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class FeatureBlocks:
+    """Atom values of consecutive blocks of one recording, equal to those of the whole.
+
+    Between blocks it keeps as much history as the longest memory of the windows needs.
+
+    Parameters
+    ----------
+    features
+        The features.
+    sample_s
+        Nominal sample interval [s].
+    """
+
+    def __init__(self, features: Features, sample_s: float) -> None:
+        self._features = features
+        self._sample_s = sample_s
+        self._history: Run | None = None
+
+    def push(self, block: Run) -> tuple[FloatArray, BoolArray]:
+        """Atom values (n, a) and full mask (n,) of the next block, as `Features.atom_values` gives.
+
+        Raises
+        ------
+        InputError
+            If the block does not begin after the last one's end, or lacks a temperature.
+        """
+        history = self._history
+        if history is not None and len(block) and len(history) and not block.time[0] > history.time[-1]:
+            raise InputError(
+                f"{block.name}: a block begins at {block.time[0]} s, not after the last one's end at "
+                f"{history.time[-1]} s; give the blocks in time order"
+            )
+        joined = block if history is None else _joined(history, block)
+        values, full = self._features.atom_values(joined, self._sample_s)
+        added = len(joined) - len(block)
+        if len(joined):
+            # Two intervals more than the memory, so that no window's edge can fall off.
+            oldest = joined.time[-1] - self._features.memory_s - 2.0 * self._sample_s
+            kept = min(int(np.searchsorted(joined.time, oldest)), len(joined) - 1)
+            names = ("time", "gyro", *joined.temperature_columns)
+            columns = {name: joined.columns[name][kept:].copy() for name in names}
+            self._history = Run(name=block.name, columns=columns)
+        return values[added:], full[added:]
+
+
+def _joined(history: Run, block: Run) -> Run:
+    missing = [name for name in history.columns if name not in block.columns]
+    if missing:
+        raise InputError(f"{block.name}: a block lacks {', '.join(missing)}, which the one before it held")
+    columns = {
+        name: np.concatenate([values, block.columns[name]]) for name, values in history.columns.items()
+    }
+    return Run(name=block.name, columns=columns)

@@ -1,0 +1,113 @@
+"""The trained box: the range of each atom in the training rows, and the smooth limit beyond it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+OVERSHOOT = 0.05
+"""How far beyond the box limited values can go, as a share of its span."""
+TOLERANCE = 0.01
+"""How far beyond the box counts as inside still, as a share of its span."""
+
+
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Lowest and highest value of each atom over the training rows.
+
+    Attributes
+    ----------
+    low, high
+        Bounds in the atoms' units, shape (a,) each.
+    """
+
+    low: FloatArray
+    high: FloatArray
+
+    def __post_init__(self) -> None:
+        for name in ("low", "high"):
+            object.__setattr__(self, name, np.array(getattr(self, name), dtype=np.float64))
+        if self.low.shape != self.high.shape or self.low.ndim != 1 or not np.all(self.low <= self.high):
+            raise InputError("trained box: each atom needs a low and a high bound, low not above high")
+
+    @classmethod
+    def around(cls, parts: Iterable[tuple[FloatArray, BoolArray]]) -> Box:
+        """The box around atom values (n, a), of the rows marked full (n,).
+
+        Raises
+        ------
+        InputError
+            If no row is full.
+        """
+        lows, highs = [], []
+        for values, full in parts:
+            if full.all() and len(values):
+                lows.append(values.min(axis=0))
+                highs.append(values.max(axis=0))
+            elif full.any():
+                lows.append([column[full].min() for column in values.T])
+                highs.append([column[full].max() for column in values.T])
+        if not lows:
+            raise InputError(
+                "features: no training row has a full window; give longer runs, or state shorter windows, "
+                "e.g. dT[block, 16 s]"
+            )
+        return cls(np.min(lows, axis=0), np.max(highs, axis=0))
+
+    @property
+    def span(self) -> FloatArray:
+        """Widths of the box, shape (a,); for an atom that never moved, float noise about its value."""
+        noise = 1e-9 * np.maximum(1.0, np.maximum(np.abs(self.low), np.abs(self.high)))
+        return np.maximum(self.high - self.low, noise)
+
+    def limit(self, values: ArrayLike, known: ArrayLike) -> tuple[FloatArray, BoolArray]:
+        r"""Limit atom values smoothly to the box, and tell which rows are outside.
+
+        Inside the box values stay as they are. A value e beyond a bound becomes
+
+        .. math:: m e/(m + e) \quad\text{beyond it},\ m = 5\,\%\ \text{of the span},
+
+        which goes on with slope 1 and never reaches m beyond: continuous with its first derivative.
+
+        Parameters
+        ----------
+        values
+            Atom values, shape (n, a).
+        known
+            Where a value is to be heeded, broadcastable to (n, a): values of windows that are not
+            full stay as they are.
+
+        Returns
+        -------
+        limited : (n, a) array
+            `values` itself where nothing exceeds the box.
+        outside : (n,) bool array
+            Rows with an atom more than 1 % of its span beyond the box.
+        """
+        values = np.asarray(values, dtype=np.float64)
+        known = np.broadcast_to(np.asarray(known, dtype=np.bool_), values.shape)
+        limited = values
+        outside = np.zeros(len(values), dtype=np.bool_)
+        for column, (low, high, span) in enumerate(zip(self.low, self.high, self.span)):
+            atom = values[:, column]
+            if not len(atom) or (atom.min() >= low and atom.max() <= high):
+                continue
+            rows = np.flatnonzero(((atom < low) | (atom > high)) & known[:, column])
+            if not len(rows):
+                continue
+            if limited is values:
+                limited = values.copy(order="K")
+            beyond = np.where(atom[rows] > high, atom[rows] - high, low - atom[rows])
+            outside[rows[beyond > TOLERANCE * span]] = True
+            margin = OVERSHOOT * span
+            soft = margin * beyond / (margin + beyond)
+            limited[rows, column] = np.where(atom[rows] > high, high + soft, low - soft)
+        return limited, outside

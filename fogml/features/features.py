@@ -1,0 +1,312 @@
+"""Features of a run's temperatures, as a scikit-learn style transformer over runs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+from fogml.features.atoms import Atom, evaluate
+from fogml.features.box import Box
+from fogml.features.grammar import parse_terms
+from fogml.features.terms import Term, compose, composition_plan, unique_terms
+from fogml.runs.run import Run
+
+if TYPE_CHECKING:
+    from fogml.features.blocks import FeatureBlocks
+    from fogml.features.stream import FeatureStream
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+
+class Features:
+    """An ordered tuple of feature terms, each a product of powers of atoms.
+
+    ``Features("T, dT, T*dT")`` builds them from feature text; ``a + b`` puts two beside each other
+    (repeats dropped), ``a * b`` makes all products of a term of one and a term of the other.
+    Every feature is causal. Two are equal where their terms are, in the same order, whatever box
+    they have learned.
+
+    Parameters
+    ----------
+    text
+        Feature text; the grammar is in `fogml.features.grammar`.
+
+    Raises
+    ------
+    InputError
+        If the text is not understood; the message points at the place.
+    """
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+
+    @classmethod
+    def from_terms(cls, terms: Iterable[Term]) -> Self:
+        """Features from terms, repeats dropped."""
+        return cls(", ".join(term.text for term in unique_terms(terms)))
+
+    @property
+    def text(self) -> str:
+        """Canonical feature text: equal features have equal texts, and it parses to the same features."""
+        return self._text
+
+    @text.setter
+    def text(self, text: str) -> None:
+        if not isinstance(text, str):
+            raise InputError(
+                f"features: a text such as 'T, dT, T*dT' was expected, not {type(text).__name__}"
+            )
+        self._terms = parse_terms(text)
+        canonical = ", ".join(term.text for term in self._terms)
+        # scikit-learn's clone asks for the very object that it passed in.
+        self._text = text if text == canonical else canonical
+        self._atoms = tuple(dict.fromkeys(atom for term in self._terms for atom in term.atoms))
+        self._plan = composition_plan(self._terms, self._atoms)
+        self._box: Box | None = None
+
+    def __repr__(self) -> str:
+        return f"Features({self.text!r})"
+
+    def __len__(self) -> int:
+        return len(self._terms)
+
+    def __eq__(self, other: object) -> bool:
+        return self._terms == other._terms if isinstance(other, Features) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self._terms)
+
+    def __add__(self, other: Features) -> Features:
+        if not isinstance(other, Features):
+            return NotImplemented
+        return Features.from_terms(self.terms + other.terms)
+
+    def __mul__(self, other: Features) -> Features:
+        if not isinstance(other, Features):
+            return NotImplemented
+        return Features.from_terms(mine * theirs for mine in self.terms for theirs in other.terms)
+
+    def names(self) -> list[str]:
+        """Names of the k columns, each the text form of its term."""
+        return [term.text for term in self._terms]
+
+    def get_feature_names_out(self, input_features: object = None) -> NDArray[Any]:
+        """`names` as an array, the way scikit-learn asks for them."""
+        return np.array(self.names(), dtype=object)
+
+    @property
+    def terms(self) -> tuple[Term, ...]:
+        """The k terms, in order."""
+        return self._terms
+
+    @property
+    def atoms(self) -> tuple[Atom, ...]:
+        """The a atoms that the terms are made of, in order of first use."""
+        return self._atoms
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Temperatures needed, by their names in formulas."""
+        return tuple(dict.fromkeys(name for atom in self._atoms for name in atom.signal.sensors))
+
+    @property
+    def window_s(self) -> float:
+        """Longest look-back until every window is full [s]; 0 where no atom has a window."""
+        return max((atom.window.span_s for atom in self._atoms if atom.window is not None), default=0.0)
+
+    @property
+    def memory_s(self) -> float:
+        """History [s] beyond which samples no longer change the values at float64."""
+        return max((atom.window.memory_s for atom in self._atoms if atom.window is not None), default=0.0)
+
+    def get_params(self, deep: bool = True) -> dict[str, Any]:
+        """Parameters, as in scikit-learn."""
+        return {"text": self.text}
+
+    def set_params(self, **params: Any) -> Self:
+        """Set parameters, as in scikit-learn; what was learned is dropped."""
+        for name, value in params.items():
+            if name != "text":
+                raise InputError(f"features: no parameter '{name}'; the only one is text")
+            self.text = value
+        return self
+
+    def __sklearn_tags__(self) -> Any:
+        from sklearn.utils import Tags, TargetTags, TransformerTags
+
+        return Tags(
+            estimator_type=None, target_tags=TargetTags(required=False), transformer_tags=TransformerTags()
+        )
+
+    def __sklearn_is_fitted__(self) -> bool:
+        return True
+
+    def fit(self, runs: Run | Sequence[Run], y: object = None) -> Self:
+        """Learn the box: each atom's lowest and highest value over the runs' rows with full windows.
+
+        Parameters
+        ----------
+        runs
+            Training runs.
+        y
+            Not used; there for scikit-learn's pipelines.
+
+        Raises
+        ------
+        InputError
+            If a run lacks a temperature, or no row has a full window.
+        """
+        group = [runs] if isinstance(runs, Run) else runs
+        self._box = Box.around(self.atom_values(run) for run in group)
+        return self
+
+    @property
+    def fitted(self) -> bool:
+        """Whether a box was learned or taken over."""
+        return self._box is not None
+
+    @property
+    def box(self) -> Mapping[str, tuple[float, float]]:
+        """The learned box: text of each atom to its (low, high), in the atom's unit.
+
+        Raises
+        ------
+        InputError
+            If nothing was learned yet.
+        """
+        box = self._learned_box()
+        pairs = zip(self._atoms, box.low.tolist(), box.high.tolist())
+        return MappingProxyType({atom.text: (low, high) for atom, low, high in pairs})
+
+    def set_box(self, box: Mapping[str, tuple[float, float]]) -> Self:
+        """Take over a box as `box` gives it, for example from a saved model.
+
+        Raises
+        ------
+        InputError
+            If an atom's bounds are missing.
+        """
+        missing = [atom.text for atom in self._atoms if atom.text not in box]
+        if missing:
+            raise InputError(f"trained box: no bounds of {', '.join(missing)}")
+        low, high = zip(*(box[atom.text] for atom in self._atoms))
+        self._box = Box(np.array(low), np.array(high))
+        return self
+
+    def _learned_box(self) -> Box:
+        if self._box is None:
+            raise InputError("features: no box was learned yet; fit them to training runs first")
+        return self._box
+
+    def atom_values(self, run: Run, sample_s: float | None = None) -> tuple[FloatArray, BoolArray]:
+        """Values of the atoms, and where all their windows are full.
+
+        Parameters
+        ----------
+        run
+            A run with the temperatures in `sensors`.
+        sample_s
+            Nominal sample interval [s]; the run's median interval if None.
+
+        Returns
+        -------
+        values : (n, a) array
+            Column by column contiguous. Where `full` is False every windowed atom is 0, so that of
+            the composed features only the static part is left.
+        full : (n,) bool array
+
+        Raises
+        ------
+        InputError
+            If a temperature is missing, or a window is shorter than the sample interval.
+        """
+        try:
+            return evaluate(self._atoms, run, sample_s)
+        except InputError as error:
+            message = str(error)
+            raise InputError(message if message.startswith(run.name) else f"{run.name}: {message}") from error
+
+    def compose(self, atom_values: ArrayLike) -> FloatArray:
+        """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
+        values = np.asarray(atom_values, dtype=np.float64)
+        if values.ndim != 2 or values.shape[1] != len(self._atoms):
+            raise InputError(
+                f"features: atom values of shape {values.shape}, (n, {len(self._atoms)}) was expected"
+            )
+        return compose(self._plan, values)
+
+    def limit(self, atom_values: ArrayLike, full: ArrayLike | None = None) -> tuple[FloatArray, BoolArray]:
+        """Limit atom values smoothly to the learned box.
+
+        Inside the box they stay as they are; beyond it they level off, with a continuous first
+        derivative, before 5 % of the span, so that models fall back smoothly.
+
+        Parameters
+        ----------
+        atom_values
+            Shape (n, a).
+        full
+            Where the windows are full, as `atom_values` tells, shape (n,). Elsewhere windowed
+            atoms stay 0 and don't count as outside. None takes all as full.
+
+        Returns
+        -------
+        limited : (n, a) array
+            `atom_values` itself where nothing exceeds the box.
+        outside : (n,) bool array
+            Rows with an atom more than 1 % of its span beyond the box.
+        """
+        known: ArrayLike = True
+        if full is not None:
+            static = np.array([atom.window is None for atom in self._atoms])
+            known = np.asarray(full, dtype=np.bool_)[:, None] | static
+        return self._learned_box().limit(atom_values, known)
+
+    def transform(self, run: Run, *, limited: bool = False) -> FloatArray:
+        """Feature columns of a run, shape (n, k).
+
+        Parameters
+        ----------
+        run
+            A run with the temperatures in `sensors`.
+        limited
+            Whether atoms are limited to the learned box first.
+        """
+        values, full = self.atom_values(run)
+        return self.compose(self.limit(values, full)[0] if limited else values)
+
+    def fit_transform(self, run: Run, y: object = None) -> FloatArray:
+        """`fit` to one run, then its feature columns, shape (n, k)."""
+        return self.fit(run).transform(run)
+
+    def stream(self, sample_s: float, *, limited: bool = False) -> FeatureStream:
+        """The same features sample by sample, in bounded memory.
+
+        Parameters
+        ----------
+        sample_s
+            Nominal sample interval [s].
+        limited
+            Whether atoms are limited to the learned box first.
+        """
+        from fogml.features.stream import FeatureStream
+
+        return FeatureStream(self, sample_s, limited=limited)
+
+    def blocks(self, sample_s: float) -> FeatureBlocks:
+        """The same atom values block by block of a long run, in bounded memory.
+
+        Parameters
+        ----------
+        sample_s
+            Nominal sample interval [s].
+        """
+        from fogml.features.blocks import FeatureBlocks
+
+        return FeatureBlocks(self, sample_s)

@@ -1,0 +1,133 @@
+"""Features sample by sample, as on board: the streaming twin of `Features`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.atoms import RATE_UNIT_S, Atom, Window, direction
+from fogml.features.features import Features
+from fogml.features.signal import Signal
+from fogml.signals import window_streams
+
+FloatArray = NDArray[np.float64]
+
+
+class StreamStep(NamedTuple):
+    """What a stream gives after one sample.
+
+    Attributes
+    ----------
+    values
+        Features, shape (k,).
+    atoms
+        Atom values before any limit, shape (a,); windowed atoms are 0 where not full.
+    full
+        Whether all windows are full.
+    outside
+        Whether an atom is outside the learned box; False where none was learned.
+    """
+
+    values: FloatArray
+    atoms: FloatArray
+    full: bool
+    outside: bool
+
+
+class FeatureStream:
+    """`Features` fed one sample at a time, in memory bounded by the longest window.
+
+    Parameters
+    ----------
+    features
+        The features, with their box if `outside` is to be told.
+    sample_s
+        Nominal sample interval [s].
+    limited
+        Whether atoms are limited to the learned box before features are composed.
+
+    Raises
+    ------
+    InputError
+        If a window is shorter than the sample interval, or `limited` without a box.
+    """
+
+    def __init__(self, features: Features, sample_s: float, *, limited: bool = False) -> None:
+        self._features = features
+        self._limited = limited
+        self._judged = limited or features.fitted
+        if limited:
+            _ = features.box
+        self._last_s = -np.inf
+        self._weights: dict[Signal, dict[str, float]] | None = None
+        self._operators = {
+            key: _operator(key[1], sample_s, key[2])
+            for key in map(_operator_key, features.atoms)
+            if key is not None
+        }
+
+    def step(self, time_s: float, temperatures: Mapping[str, float]) -> StreamStep:
+        """Take one sample.
+
+        Parameters
+        ----------
+        time_s
+            Its time [s], later than the last one's.
+        temperatures
+            Recorded temperatures [degC] by column name; the same columns at every step.
+
+        Raises
+        ------
+        InputError
+            If time does not go up, or a temperature is missing.
+        """
+        if not time_s > self._last_s:
+            raise InputError(f"feature stream: time {time_s} s after {self._last_s} s; it must go up")
+        if self._weights is None:
+            signals = {atom.signal for atom in self._features.atoms}
+            self._weights = {signal: signal.weights(temperatures) for signal in signals}
+        try:
+            signal_values = {
+                signal: sum(weight * temperatures[name] for name, weight in weights.items())
+                for signal, weights in self._weights.items()
+            }
+        except KeyError as error:
+            raise InputError(f"feature stream: no temperature {error} at {time_s} s") from error
+        self._last_s = time_s
+        steps = {
+            key: operator.step(time_s, signal_values[key[0]]) for key, operator in self._operators.items()
+        }
+        full = all(step[1] for step in steps.values())
+        atoms = np.zeros((1, len(self._features.atoms)))
+        for column, atom in enumerate(self._features.atoms):
+            key = _operator_key(atom)
+            if key is None:
+                atoms[0, column] = signal_values[atom.signal]
+            elif full:
+                value = steps[key][0]
+                atoms[0, column] = direction(np.array(value)) if atom.operator == "sign" else value
+        heeded, outside = self._features.limit(atoms, [full]) if self._judged else (atoms, np.array([False]))
+        values = self._features.compose(heeded if self._limited else atoms)
+        return StreamStep(values[0], atoms[0], full, bool(outside[0]))
+
+
+def _operator_key(atom: Atom) -> tuple[Signal, Window, float | None] | None:
+    """What tells running operators apart: a rate and its direction share one."""
+    if atom.window is None:
+        return None
+    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S
+
+
+def _operator(window: Window, sample_s: float, unit_s: float | None) -> window_streams.WindowStream:
+    if window.method == "first":
+        return window_streams.FirstDifferenceStream(sample_s, unit_s)
+    kinds: dict[str, Callable[[float, float, float | None], window_streams.WindowStream]] = {
+        "block": window_streams.BlockDifferenceStream,
+        "slope": window_streams.SlopeStream,
+        "exp": window_streams.ExponentialStream,
+    }
+    return kinds[window.method](window.length_s, sample_s, unit_s)

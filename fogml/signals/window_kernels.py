@@ -1,0 +1,162 @@
+"""Compiled loops of the window operators, for times off a regular grid.
+
+Each fills `values` and `full`, which come in zeroed. `sample_s` is the nominal interval, `gap_s`
+the longest interval that may be spanned; see `fogml.signals.windows` for the rules.
+"""
+
+from __future__ import annotations
+
+import math
+
+from numba import boolean, float64, njit, types
+
+from fogml.signals.windows import EDGE_TOLERANCE, EXPONENTIAL_SPAN, BoolArray, FloatArray
+
+# Declared read-only, the inputs take both the frozen columns of a run and ordinary arrays.
+_INPUT = types.Array(float64, 1, "C", readonly=True)
+_KERNEL = types.void(
+    _INPUT,
+    _INPUT,
+    float64,
+    float64,
+    float64,
+    float64,
+    types.Array(float64, 1, "C"),
+    types.Array(boolean, 1, "C"),
+)
+_FEWEST_STEPS = 32
+
+
+@njit(_KERNEL, cache=True, nogil=True)
+def block_kernel(
+    time: FloatArray,
+    x: FloatArray,
+    window_s: float,
+    sample_s: float,
+    gap_s: float,
+    unit_s: float,
+    values: FloatArray,
+    full: BoolArray,
+) -> None:
+    """Newest mean less the mean before; divided by their time distance where unit_s > 0."""
+    edge = EDGE_TOLERANCE * sample_s
+    needed = 2.0 * window_s - sample_s - edge
+    start = newest = before = afresh = 0
+    time_0 = x_0 = 0.0
+    newest_t = newest_x = before_t = before_x = 0.0
+    for i in range(len(time)):
+        if i > 0 and time[i] - time[i - 1] > gap_s:
+            start = newest = before = afresh = i
+        if i >= afresh:
+            # Summing afresh once per window, about the newest sample, keeps running sums exact.
+            time_0, x_0 = time[i], x[i]
+            newest_t = newest_x = before_t = before_x = 0.0
+            for j in range(before, newest):
+                before_t += time[j] - time_0
+                before_x += x[j] - x_0
+            for j in range(newest, i):
+                newest_t += time[j] - time_0
+                newest_x += x[j] - x_0
+            afresh = i + max(i - before, _FEWEST_STEPS)
+        newest_t += time[i] - time_0
+        newest_x += x[i] - x_0
+        while time[i] - time[newest] >= window_s - edge:
+            newest_t -= time[newest] - time_0
+            newest_x -= x[newest] - x_0
+            before_t += time[newest] - time_0
+            before_x += x[newest] - x_0
+            newest += 1
+        while time[i] - time[before] >= 2.0 * window_s - edge:
+            before_t -= time[before] - time_0
+            before_x -= x[before] - x_0
+            before += 1
+        if newest > before and time[i] - time[start] >= needed:
+            in_newest, in_before = i - newest + 1, newest - before
+            difference = newest_x / in_newest - before_x / in_before
+            if unit_s > 0.0:
+                difference *= unit_s / (newest_t / in_newest - before_t / in_before)
+            values[i] = difference
+            full[i] = True
+
+
+@njit(_KERNEL, cache=True, nogil=True)
+def slope_kernel(
+    time: FloatArray,
+    x: FloatArray,
+    window_s: float,
+    sample_s: float,
+    gap_s: float,
+    unit_s: float,
+    values: FloatArray,
+    full: BoolArray,
+) -> None:
+    """Least-squares slope over the window, times unit_s."""
+    edge = EDGE_TOLERANCE * sample_s
+    needed = window_s - sample_s - edge
+    start = oldest = afresh = 0
+    time_0 = x_0 = 0.0
+    sum_t = sum_tt = sum_x = sum_tx = 0.0
+    for i in range(len(time)):
+        if i > 0 and time[i] - time[i - 1] > gap_s:
+            start = oldest = afresh = i
+        if i >= afresh:
+            time_0, x_0 = time[i], x[i]
+            sum_t = sum_tt = sum_x = sum_tx = 0.0
+            for j in range(oldest, i):
+                t, v = time[j] - time_0, x[j] - x_0
+                sum_t += t
+                sum_tt += t * t
+                sum_x += v
+                sum_tx += t * v
+            afresh = i + max(i - oldest, _FEWEST_STEPS)
+        t, v = time[i] - time_0, x[i] - x_0
+        sum_t += t
+        sum_tt += t * t
+        sum_x += v
+        sum_tx += t * v
+        while time[i] - time[oldest] >= window_s - edge:
+            t, v = time[oldest] - time_0, x[oldest] - x_0
+            sum_t -= t
+            sum_tt -= t * t
+            sum_x -= v
+            sum_tx -= t * v
+            oldest += 1
+        count = i - oldest + 1
+        if count > 1 and time[i] - time[start] >= needed:
+            mean_t = sum_t / count
+            values[i] = unit_s * (sum_tx - mean_t * sum_x) / (sum_tt - mean_t * sum_t)
+            full[i] = True
+
+
+@njit(_KERNEL, cache=True, nogil=True)
+def exponential_kernel(
+    time: FloatArray,
+    x: FloatArray,
+    window_s: float,
+    sample_s: float,
+    gap_s: float,
+    unit_s: float,
+    values: FloatArray,
+    full: BoolArray,
+) -> None:
+    """Exponentially remembered rate with time constant window_s, times unit_s."""
+    needed = EXPONENTIAL_SPAN * window_s - sample_s * (1.0 + EDGE_TOLERANCE)
+    start = 0
+    rate = 0.0
+    last_interval = weight = 0.0
+    for i in range(1, len(time)):
+        interval = time[i] - time[i - 1]
+        if interval > gap_s:
+            start = i
+            rate = 0.0
+            continue
+        if interval != last_interval:
+            last_interval = interval
+            weight = -math.expm1(-interval / window_s)
+        rate += weight * ((x[i] - x[i - 1]) / interval - rate)
+        if time[i] - time[start] >= needed:
+            values[i] = unit_s * rate
+            full[i] = True
+
+
+__all__ = ["block_kernel", "exponential_kernel", "slope_kernel"]

@@ -1,0 +1,306 @@
+"""Differences and rates over causal time windows, with true times and gaps.
+
+Every operator looks back from each sample, the newest sample included, and gives one value per
+sample and a mask of the samples whose window was full. Values are 0 where it was not.
+
+The rules, shared by all:
+
+- A window of w seconds at time t holds the samples in (t - w, t]. Its edges forgive float noise
+  of 1e-6 sample intervals.
+- A *gap* is an interval longer than three sample intervals. A gap longer than a quarter of the
+  window restarts the operator, a shorter one is spanned with true times.
+- A window is full once the time since the start, or since the last restart, reaches its span less
+  one sample interval: 2w for `block_difference`, w for `slope`, three time constants for
+  `exponential`, one earlier sample for `first_difference`.
+
+Each operator gives a difference (``unit_s=None``, in the unit of x), or a rate per ``unit_s``
+seconds (60: per minute).
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+EDGE_TOLERANCE = 1e-6
+"""Float noise forgiven at window edges, in sample intervals."""
+GAP_INTERVALS = 3.0
+"""A gap is an interval longer than this many sample intervals."""
+GAP_SHARE = 0.25
+"""A gap longer than this share of the window restarts the operator."""
+EXPONENTIAL_SPAN = 3.0
+"""Time constants until an exponential window counts as full."""
+
+_CHUNK = 1 << 15
+_GRID_TOLERANCE = 2e-10
+
+
+class Clock:
+    """The sample times of one recording, with what the window operators need to know of them.
+
+    Build it once and hand it to several operators in place of the times; that spares the check
+    for a regular grid each time.
+
+    Parameters
+    ----------
+    time
+        Sample times [s], shape (n,), strictly increasing.
+    sample_s
+        Nominal sample interval [s]; the median interval if None.
+    """
+
+    def __init__(self, time: ArrayLike, sample_s: float | None = None) -> None:
+        self.time: FloatArray = np.ascontiguousarray(time, dtype=np.float64)
+        if self.time.ndim != 1:
+            raise InputError(f"sample times: an array of one dimension was expected, not {self.time.ndim}")
+        if sample_s is None:
+            sample_s = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
+        self.sample_s = sample_s
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def grid_s(self) -> float | None:
+        """Interval [s] of the regular grid that the times lie on, or None where they don't.
+
+        Regular means: no time is off the grid by more than float noise, so that index arithmetic
+        gives the same rates as true times do to better than 1e-9.
+        """
+        time, n = self.time, len(self.time)
+        if n < 2 or self.sample_s <= 0.0:
+            return None
+        interval = float(time[-1] - time[0]) / (n - 1)
+        noise = float(np.spacing(max(abs(time[0]), abs(time[-1]))))
+        tolerance = _GRID_TOLERANCE * self.sample_s + 2.0 * noise
+        if abs(interval - self.sample_s) > EDGE_TOLERANCE * self.sample_s + 4.0 * noise:
+            return None
+        grid = interval * np.arange(min(_CHUNK, n))
+        for low in range(0, n, _CHUNK):
+            off = time[low : low + _CHUNK] - (time[0] + low * interval)
+            off -= grid[: len(off)]
+            if off.max() > tolerance or off.min() < -tolerance:
+                return None
+        return interval
+
+
+def longest_gap_s(window_s: float, sample_s: float) -> float:
+    """Longest interval [s] that a window of `window_s` may span."""
+    return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s)
+
+
+def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:
+    """Refuse a window that is no positive number, or shorter than so many sample intervals.
+
+    Raises
+    ------
+    InputError
+        Naming `what`, and the length to widen it to.
+    """
+    if not window_s > 0.0 or not np.isfinite(window_s):
+        raise InputError(f"{what} of {window_s:g} s: a positive number of seconds was expected")
+    if window_s < intervals * sample_s * (1.0 - EDGE_TOLERANCE):
+        raise InputError(
+            f"{what} of {window_s:g} s is too short for samples {sample_s:g} s apart; "
+            f"widen it to at least {intervals * sample_s:g} s"
+        )
+
+
+def block_difference(
+    time: ArrayLike | Clock,
+    x: ArrayLike,
+    window_s: float,
+    sample_s: float | None = None,
+    *,
+    unit_s: float | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    """Mean of the newest window less the mean of the window before it.
+
+    The newest is (t - w, t], the one before is (t - 2w, t - w]. As a rate, the difference is
+    divided by the difference of the two windows' mean sample times.
+
+    Parameters
+    ----------
+    time
+        Sample times [s], shape (n,), strictly increasing; or a `Clock`.
+    x
+        Values, shape (n,).
+    window_s
+        Length w of each of the two windows [s].
+    sample_s
+        Nominal sample interval [s]; the median interval if None. A `Clock` brings its own.
+    unit_s
+        None for the difference itself, or the length [s] of the time unit of a rate.
+
+    Returns
+    -------
+    values : (n,) array
+        Differences or rates; 0 where the windows are not full.
+    full : (n,) bool array
+        Where both windows are full.
+
+    Raises
+    ------
+    InputError
+        If the window is shorter than the sample interval.
+
+    Notes
+    -----
+    On a regular grid cumulative sums are taken in chunks, each about its own first value, so the
+    error stays at a few units in the last place however long the recording. Elsewhere running
+    sums are taken afresh once per window.
+    """
+    clock, x = _prepared(time, x, sample_s)
+    check_window(window_s, clock.sample_s, 1, "a block window")
+    grid = clock.grid_s
+    if grid is not None:
+        return _block_on_grid(x, grid, clock.sample_s, window_s, unit_s)
+    from fogml.signals.window_kernels import block_kernel
+
+    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
+    gap_s = longest_gap_s(window_s, clock.sample_s)
+    block_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or 0.0, values, full)
+    return values, full
+
+
+def slope(
+    time: ArrayLike | Clock,
+    x: ArrayLike,
+    window_s: float,
+    sample_s: float | None = None,
+    *,
+    unit_s: float | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    """Least-squares slope over the window (t - w, t].
+
+    Parameters and results are those of `block_difference`. As a difference (``unit_s=None``) it
+    is the change of the fitted line over the window's length.
+
+    Raises
+    ------
+    InputError
+        If the window is shorter than two sample intervals.
+    """
+    clock, x = _prepared(time, x, sample_s)
+    check_window(window_s, clock.sample_s, 2, "a slope's window")
+    from fogml.signals.window_kernels import slope_kernel
+
+    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
+    gap_s = longest_gap_s(window_s, clock.sample_s)
+    slope_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or window_s, values, full)
+    return values, full
+
+
+def exponential(
+    time: ArrayLike | Clock,
+    x: ArrayLike,
+    window_s: float,
+    sample_s: float | None = None,
+    *,
+    unit_s: float | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    r"""Rate with exponential memory: :math:`r(t) = (x - m)/\tau` with :math:`\dot m = (x - m)/\tau`.
+
+    Parameters and results are those of `block_difference`; `window_s` is the time constant. As a
+    difference (``unit_s=None``) it is x less its lagged mean m.
+
+    Between samples x is taken as a straight line, for which the recurrence
+
+    .. math:: r_i = e^{-h/\tau} r_{i-1} + (1 - e^{-h/\tau}) (x_i - x_{i-1})/h
+
+    with the true interval h is exact: a steady ramp gives its rate, whatever the sampling. It
+    begins at rate 0.
+
+    Raises
+    ------
+    InputError
+        If the time constant is shorter than the sample interval.
+    """
+    clock, x = _prepared(time, x, sample_s)
+    check_window(window_s, clock.sample_s, 1, "a time constant")
+    from fogml.signals.window_kernels import exponential_kernel
+
+    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
+    gap_s = longest_gap_s(window_s, clock.sample_s)
+    exponential_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or window_s, values, full)
+    return values, full
+
+
+def first_difference(
+    time: ArrayLike | Clock,
+    x: ArrayLike,
+    sample_s: float | None = None,
+    *,
+    unit_s: float | None = None,
+) -> tuple[FloatArray, BoolArray]:
+    """Each sample less the one before it, never across a gap.
+
+    Parameters and results are those of `block_difference`; there is no window.
+    """
+    clock, x = _prepared(time, x, sample_s)
+    n = len(x)
+    values, full = np.zeros(n), np.ones(n, dtype=np.bool_)
+    full[:1] = False
+    if n < 2:
+        return values, full
+    np.subtract(x[1:], x[:-1], out=values[1:])
+    grid = clock.grid_s
+    if grid is not None:
+        if unit_s is not None:
+            values *= unit_s / grid
+        return values, full
+    interval = np.diff(clock.time)
+    np.less_equal(interval, GAP_INTERVALS * clock.sample_s, out=full[1:])
+    if unit_s is not None:
+        values[1:] *= unit_s / interval
+    values[~full] = 0.0
+    return values, full
+
+
+def _prepared(time: ArrayLike | Clock, x: ArrayLike, sample_s: float | None) -> tuple[Clock, FloatArray]:
+    clock = time if isinstance(time, Clock) else Clock(time, sample_s)
+    values = np.ascontiguousarray(x, dtype=np.float64)
+    if values.shape != clock.time.shape:
+        raise InputError(f"window operator: {values.shape} values for {clock.time.shape} sample times")
+    return clock, values
+
+
+def _block_on_grid(
+    x: FloatArray, grid_s: float, sample_s: float, window_s: float, unit_s: float | None
+) -> tuple[FloatArray, BoolArray]:
+    """Block differences by index arithmetic and chunked cumulative sums."""
+    n = len(x)
+    edge = EDGE_TOLERANCE * sample_s
+    newest = int(np.ceil((window_s - edge) / grid_s))
+    both = int(np.ceil((2.0 * window_s - edge) / grid_s))
+    before = both - newest
+    values, full = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    full[both - 1 :] = True
+    # The two windows' mean times lie half of both counts apart.
+    scale = 1.0 if unit_s is None else unit_s / (0.5 * both * grid_s)
+    at_end, at_middle, at_begin = scale / newest, -scale * (1.0 / newest + 1.0 / before), scale / before
+    step = max(_CHUNK, 4 * both)
+    sums = np.zeros(min(step, n) + both)
+    part = np.empty(min(step, n))
+    for low in range(both - 1, n, step):
+        high = min(low + step, n)
+        origin = low - both + 1
+        size = high - low
+        # sums[k] is the sum of the k samples from origin on, about the first of them.
+        held = sums[1 : high - origin + 1]
+        np.subtract(x[origin:high], x[origin], out=held)
+        np.cumsum(held, out=held)
+        out = values[low:high]
+        np.multiply(sums[both : both + size], at_end, out=out)
+        np.multiply(sums[before : before + size], at_middle, out=part[:size])
+        out += part[:size]
+        np.multiply(sums[:size], at_begin, out=part[:size])
+        out += part[:size]
+    return values, full
