@@ -1,0 +1,168 @@
+"""Judgements with known answers: which reference, which rows, which limit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.facts import EARTH_RATE_DEG_H, Facts
+from fogml.runs.run import Run
+from fogml.validation.judge import judge
+from tests.validation.known_drift import KnownDrift
+
+LATITUDE = 30.0
+EARTH = EARTH_RATE_DEG_H * 0.5
+
+
+def ramp_run(name: str, bias: float, *, facts: Facts | None = None, low: float = 0.0, n: int = 4000) -> Run:
+    """A ramp from `low` over 40 degC at 1 Hz; error = bias + 0.01 T, no noise."""
+    time = np.arange(float(n))
+    temperature = low + 40.0 * time / n
+    facts = facts or Facts()
+    earth = facts.earth_rate_deg_h or 0.0
+    return Run.from_columns(name, facts, time=time, gyro=earth + bias + 0.01 * temperature, T=temperature)
+
+
+def slope_law(run):
+    return 0.01 * run.temperature("T")
+
+
+KNOWN = Facts(latitude=LATITUDE, input_axis="up")
+
+
+def test_known_earth_rate_is_taken_off_and_nothing_else():
+    train, test = ramp_run("a.csv", 0.3, facts=KNOWN), ramp_run("b.csv", 0.5, facts=KNOWN)
+    result = judge(KnownDrift(slope_law).fit(train), train, test)
+    (run,) = result.test
+    assert run.bias_reference == "earth rate"
+    assert run.after.bias == pytest.approx(0.5)
+    assert run.before.bias == pytest.approx(0.7, abs=0.01)
+    assert run.after.bias_stability == pytest.approx(0.0, abs=1e-12)
+
+
+def test_unknown_earth_rate_takes_the_training_mean_off_both():
+    train, test = ramp_run("a.csv", EARTH), ramp_run("b.csv", EARTH + 0.2)
+    result = judge(KnownDrift(slope_law).fit(train), train, test)
+    (run,) = result.test
+    assert run.bias_reference == "training mean"
+    assert run.before.bias == pytest.approx(0.2, abs=1e-9)
+    assert run.after.bias == pytest.approx(0.2, abs=1e-9)
+    assert result.train[0].after.bias == pytest.approx(0.0, abs=1e-9)
+    assert any("constant is estimated" in note for note in result.notes)
+
+
+def test_no_model_leaves_before_and_after_the_same():
+    train, test = ramp_run("a.csv", 3.0), ramp_run("b.csv", 3.4)
+    (run,) = judge(KnownDrift().fit(train), train, test).test
+    assert run.before == run.after
+
+
+def test_earth_rate_known_for_some_runs_only_is_said():
+    train, test = ramp_run("a.csv", 0.1, facts=KNOWN), ramp_run("b.csv", EARTH)
+    result = judge(KnownDrift(slope_law).fit(train), train, test)
+    assert any("not for b.csv" in note for note in result.notes)
+
+
+def test_rows_without_a_full_window_are_left_out():
+    train = ramp_run("a.csv", 0.0)
+    spoiled = np.where(train.time < 500.0, 1e6, 0.0)
+    test = train.with_columns(gyro=train.gyro + spoiled)
+    test = replace(test, name="b.csv")
+    model = KnownDrift(slope_law, full_from_s=500.0).fit(train)
+    (run,) = judge(model, train, test).test
+    assert run.after.rms == pytest.approx(0.0, abs=1e-9)
+    assert (run.rows_used, run.rows_left_out) == (3500, 500)
+
+
+def test_turns_tell_the_scale_factor_and_not_the_bias():
+    rate = np.zeros(6000)
+    rate[3000:3060], rate[3060:3120] = 10.0, -10.0
+    time = np.arange(6000.0)
+    columns = {"time": time, "rate": rate, "T": 20.0 + time / 600.0}
+    train = Run.from_columns("a.csv", KNOWN, gyro=EARTH + 3600.0 * rate * (1 + 200e-6), **columns)
+    (run,) = judge(KnownDrift().fit(train), train, train).test
+    assert run.before.scale_factor_error == pytest.approx(200.0, rel=1e-9)
+    assert run.before.rms == pytest.approx(0.0, abs=1e-9)
+
+
+def test_share_outside_training_is_of_the_rows_that_count():
+    train, test = ramp_run("a.csv", 0.0), ramp_run("b.csv", 0.0, low=10.0)
+    model = KnownDrift(slope_law, hottest=40.0).fit(train)
+    (run,) = judge(model, train, test).test
+    assert run.outside_training == pytest.approx(0.25, abs=0.001)
+    assert [finding.code for finding in run.findings] == ["outside_training"]
+    assert judge(model, train, train).train[0].outside_training == 0.0
+
+
+def test_limits_take_the_worst_test_run():
+    train = ramp_run("a.csv", 0.0, facts=KNOWN)
+    tests = [ramp_run("b.csv", -0.5, facts=KNOWN), ramp_run("c.csv", 0.2, facts=KNOWN)]
+    model = KnownDrift(slope_law).fit(train)
+    result = judge(model, train, tests, design_index=0.4, limits={"bias": 0.6})
+    assert result.design_index is not None
+    assert result.design_index.value == pytest.approx(0.5)
+    assert not result.design_index.met
+    assert result.limits[0].value == pytest.approx(0.5)
+    assert result.limits[0].met
+    assert not result.met
+    assert judge(model, train, tests, design_index=0.6).met
+
+
+def test_an_unknown_limit_lists_the_known():
+    train = ramp_run("a.csv", 0.0)
+    with pytest.raises(InputError, match=r"'stability'.*bias_stability.*scale_factor_error"):
+        judge(KnownDrift().fit(train), train, train, limits={"stability": 1.0})
+
+
+@pytest.mark.parametrize("limit", [0.0, -1.0, float("nan")])
+def test_a_limit_that_is_no_positive_number(limit):
+    train = ramp_run("a.csv", 0.0)
+    with pytest.raises(InputError, match="positive"):
+        judge(KnownDrift().fit(train), train, train, limits={"rms": limit})
+    with pytest.raises(InputError, match="positive"):
+        judge(KnownDrift().fit(train), train, train, design_index=limit)
+
+
+def test_a_limit_that_no_run_tells_is_an_error():
+    train = ramp_run("a.csv", 0.0)
+    with pytest.raises(InputError, match="no test run tells it"):
+        judge(KnownDrift().fit(train), train, train, limits={"scale_factor_error": 10.0})
+
+
+def test_another_axis_is_refused_unless_allowed():
+    train = ramp_run("a.csv", 0.0, facts=Facts(axis="x"))
+    test = ramp_run("b.csv", 0.0, facts=Facts(axis="y"))
+    model = KnownDrift(slope_law).fit(train)
+    with pytest.raises(InputError, match="axis 'y'"):
+        judge(model, train, test)
+    (run,) = judge(model, train, test, any_unit=True).test
+    assert any("axis 'y'" in note for note in run.notes)
+
+
+def test_a_test_run_that_was_trained_on_is_said():
+    train = ramp_run("a.csv", 0.0)
+    (run,) = judge(KnownDrift().fit(train), train, replace(train, name="copy.csv")).test
+    assert [finding.code for finding in run.findings] == ["seen_in_training"]
+
+
+def test_series_for_the_figures():
+    train = ramp_run("a.csv", 0.0)
+    (run,) = judge(KnownDrift(slope_law, half_width=0.3).fit(train), train, train).test
+    series = run.series
+    assert len(series.time) == 40
+    np.testing.assert_allclose(series.rate, 40.0 / 4000 * 60, rtol=1e-9)
+    np.testing.assert_allclose(series.upper, 0.3)
+    np.testing.assert_allclose(series.lower, -0.3)
+    np.testing.assert_allclose(series.before.std(), run.before.bias_stability)
+    assert series.regime.shape == series.flag.shape == (40,)
+
+
+def test_the_floor_is_the_noise_and_not_the_drift():
+    train = ramp_run("a.csv", 0.0, n=40_000)
+    noise = np.random.default_rng(5).normal(scale=2.0, size=len(train))
+    test = replace(train.with_columns(gyro=train.gyro + noise), name="b.csv")
+    (run,) = judge(KnownDrift().fit(train), train, test).test
+    assert run.floor == pytest.approx(0.2, rel=0.1)
