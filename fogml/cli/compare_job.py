@@ -19,6 +19,8 @@ from fogml.validation.compare import Comparison, compare
 from fogml.validation.report_json import comparison_json
 from fogml.validation.strict import hold_strict
 
+_OWN_CHOICE = ("auto", "polynomial", "rbf")
+
 
 class CompareSettings(LimitSettings):
     """Settings of ``fogml compare``."""
@@ -74,15 +76,18 @@ def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:
 
 
 def _makers(settings: CompareSettings) -> dict[str, partial]:
+    """Name to the maker of each model; an unknown name is an error before any run is read."""
     from fogml.models.names import MODEL_NAMES, make_model
 
     names: list[str] = []
     for name in settings.models:
         names += MODEL_NAMES if name == "all" else [name]
-    makers = {name: partial(make_model, name, settings.features, settings.seed) for name in names}
-    for name, make in makers.items():
-        if name not in MODEL_NAMES:
-            make()  # an unknown name is an error before any run is read
+    makers = {}
+    for name in names:
+        # Models of a document's own form keep their columns; features are for the others.
+        features = settings.features if name in _OWN_CHOICE or "." in name else None
+        makers[name] = partial(make_model, name, features, settings.seed)
+        makers[name]()
     return makers
 
 

@@ -19,6 +19,7 @@ from fogml.validation.results import Judgement
 from fogml.validation.strict import hold_strict
 
 if TYPE_CHECKING:
+    from fogml.cli.compare_job import CompareSettings
     from fogml.models.base import DriftModel
 
 
@@ -61,7 +62,7 @@ def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
     return judgement
 
 
-def check_settings(settings: LimitSettings) -> None:
+def check_settings(settings: TrainSettings | CompareSettings) -> None:
     """Check what can be checked before a run is read.
 
     Raises
@@ -73,6 +74,10 @@ def check_settings(settings: LimitSettings) -> None:
     check_design_index(settings.design_index)
     if not settings.averaging > 0.0:
         raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
+    if settings.features is not None:
+        from fogml.features.parse import parse_features
+
+        parse_features(settings.features)
 
 
 def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:

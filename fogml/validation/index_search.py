@@ -1,8 +1,9 @@
 """Training again until the design index is met, without ever looking at the test run.
 
 The method of the temperature product (Sensors 2015, 15(5), 11189) trains again whenever the
-validation run misses the design index, which makes the validation run part of the training. Here sizes and features are tried on folds of the training runs, from small to large,
-until the index is met there; the test run is judged once, by what was found.
+validation run misses the design index, which makes the validation run part of the training.
+Here sizes and features are tried on folds of the training runs, from small to large, until the
+index is met there; the test run is judged once, by what was found.
 """
 
 from __future__ import annotations
