@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
+from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.intervals import Intervals
 from fogml.runs.run import BoolArray, FloatArray, Run
@@ -67,6 +68,11 @@ class Compensation:
         }
 
 
+def compensation_of(run: Run, evaluation: Evaluation) -> Compensation:
+    """What an evaluation makes of a run's output."""
+    return Compensation(evaluation.drift, run.gyro_deg_h - evaluation.drift, evaluation.flag)
+
+
 class DriftModel(BaseEstimator, ABC):
     """A model of a gyro's temperature drift.
 
@@ -84,12 +90,15 @@ class DriftModel(BaseEstimator, ABC):
         Where the fitted model comes from.
     intervals_
         Half-widths of the prediction interval.
+    features_
+        The features that the model evaluates, their box learned; None where it has none.
     """
 
     form: ClassVar[str]
     kind: str
     card_: TrainingCard
     intervals_: Intervals
+    features_: Features | None = None
 
     @abstractmethod
     def fit(self, runs: Run | Sequence[Run]) -> Self:
@@ -101,9 +110,31 @@ class DriftModel(BaseEstimator, ABC):
             If the runs don't belong together or don't hold what the model needs.
         """
 
-    @abstractmethod
     def evaluate(self, run: Run) -> Evaluation:
         """Drift with window fullness and distance from the trained box, at every sample."""
+        self._check_fitted()
+        if self.features_ is None:
+            return self.evaluate_atoms(run, np.empty((len(run), 0)), np.ones(len(run), dtype=np.bool_))
+        return self.evaluate_atoms(run, *self.features_.atom_values(run))
+
+    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+        """As `evaluate`, from the values of the features' atoms and where their windows are full.
+
+        Parameters
+        ----------
+        run
+            A run, or a block of one.
+        atoms
+            Values of the atoms of ``features_``, shape (n, a).
+        full
+            Where every window is full, shape (n,).
+        """
+        raise NotImplementedError(f"{type(self).__name__} does not evaluate atoms")
+
+    @property
+    def acting(self) -> DriftModel:
+        """The model that evaluates: this one, unless it stands for another that it chose."""
+        return self
 
     @abstractmethod
     def weights(self) -> dict[str, NDArray[Any]]:
@@ -131,13 +162,13 @@ class DriftModel(BaseEstimator, ABC):
 
     @property
     def window_s(self) -> float:
-        """Longest look-back of the features [s]: how much history a sample needs."""
-        return 0.0
+        """Longest look-back until every feature window is full [s]."""
+        return 0.0 if self.features_ is None else float(self.features_.window_s)
 
     @property
     def sensors(self) -> tuple[str, ...]:
         """Temperatures that the model needs, by their names in formulas."""
-        return ()
+        return () if self.features_ is None else tuple(self.features_.sensors)
 
     def predict(self, run: Run) -> FloatArray:
         """Drift [deg/h] at every sample, shape (n,)."""
@@ -161,8 +192,7 @@ class DriftModel(BaseEstimator, ABC):
 
     def compensate(self, run: Run) -> Compensation:
         """Subtract the drift; flag what is outside the trained box or has no full window."""
-        evaluation = self.evaluate(run)
-        return Compensation(evaluation.drift, run.gyro_deg_h - evaluation.drift, evaluation.flag)
+        return compensation_of(run, self.evaluate(run))
 
     def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
         """Notes on using the model on a run.

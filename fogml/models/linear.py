@@ -109,10 +109,23 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         """As `predict`, for columns known to be finite float64 of shape (n, k)."""
         return np.asarray(X @ self.coef_ + self.intercept_)
 
+    def refitted(self, X: ArrayLike, y: ArrayLike) -> LinearRegressor:
+        """A new regressor fitted to other rows with the ridge of this one."""
+        check_is_fitted(self)
+        return LinearRegressor(ridge=self.ridge_, fit_intercept=self.fit_intercept).fit(X, y)
+
     def standard_errors(self) -> FloatArray:
         """Standard errors of (intercept, coefficients) for white residuals, shape (k + 1,)."""
         check_is_fitted(self)
         return np.asarray(np.sqrt(np.diag(self.covariance_)))
+
+    def coefficient_table(self, names: Sequence[str]) -> dict[str, dict[str, float]]:
+        """Value and standard error of each coefficient by its column's name; the intercept is ``1``."""
+        errors = self.standard_errors().tolist()
+        table = {"1": {"value": self.intercept_, "se": errors[0]}} if self.fit_intercept else {}
+        for name, value, error in zip(names, self.coef_.tolist(), errors[1:], strict=True):
+            table[name] = {"value": value, "se": error}
+        return table
 
     @property
     def parameter_count(self) -> int:
@@ -175,7 +188,9 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         self.rank_ = system.rank
         self.coef_ = solution[1:] / condensed.scale
         self.intercept_ = (
-            float(solution[0] + condensed.y_shift - condensed.shift @ self.coef_) if self.fit_intercept else 0.0
+            float(solution[0] + condensed.y_shift - condensed.shift @ self.coef_)
+            if self.fit_intercept
+            else 0.0
         )
         freedom = count - system.effective_parameters(ridge) - int(self.fit_intercept)
         variance = float(left @ left) / freedom if freedom > 0 else 0.0
@@ -193,7 +208,7 @@ class _System:
         self._frame, self._count, self._intercept = frame, count, intercept
         if intercept:
             # The column of ones stands first: what QR leaves below its row is centred.
-            triangle = np.linalg.qr(rows, mode="r")
+            triangle: FloatArray = np.asarray(np.linalg.qr(rows, mode="r"))
             self._mean = triangle[0] / triangle[0, 0]
             columns, target = triangle[1:, 1:-1], triangle[1:, -1]
             level = frame.shift / frame.scale

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +16,8 @@ from fogml.signals.averages import block_averages
 
 TURNING_DEG_S = 1e-3
 """A table rate above this is turning [deg/s]; 3.6 deg/h."""
+Compose = Callable[[FloatArray], FloatArray]
+"""Gives the columns of a model, shape (m, k), from rows of atom values, shape (m, a)."""
 _COMPOSED_VALUES = 1 << 19
 # Values composed at once while averaging: 4 MiB, which stays in the cache.
 
@@ -89,7 +91,7 @@ def training_table(runs: Sequence[Run], features: Features, max_rows: int | None
         If no row has a full window.
     """
     rows = [run_rows(run, features) for run in runs]
-    return table_of_rows(rows, features, max_rows)
+    return table_of_rows(rows, features.compose, max_rows)
 
 
 def run_rows(run: Run, features: Features) -> RunRows:
@@ -129,29 +131,24 @@ def usable_rows(run: Run, full: BoolArray) -> tuple[BoolArray, tuple[str, ...]]:
     return used, tuple(notes)
 
 
-def table_of_rows(rows: Sequence[RunRows], features: Features, max_rows: int | None = None) -> TrainingTable:
+def table_of_rows(rows: Sequence[RunRows], compose: Compose, max_rows: int | None = None) -> TrainingTable:
     """The table of rows that `run_rows` gave."""
-    count = sum(len(part.y) for part in rows)
-    if count == 0:
-        raise InputError(
-            "no training row has a full feature window; give longer runs, or state shorter windows in the "
-            "features, e.g. dT[block, 16 s]"
-        )
+    count = row_count(rows)
     averaging_s = 0.0
     if max_rows is not None and count > max_rows:
         averaging_s = recorded_s(rows) / max_rows
-    return averaged_table(rows, features, averaging_s)
+    return averaged_table(rows, compose, averaging_s)
 
 
-def averaged_table(rows: Sequence[RunRows], features: Features, averaging_s: float) -> TrainingTable:
+def averaged_table(rows: Sequence[RunRows], compose: Compose, averaging_s: float) -> TrainingTable:
     """The table of rows averaged over `averaging_s` seconds; 0 leaves them as they are."""
     X, y, time_s, index, block = [], [], [], [], []
     first_block = 0
     for number, part in enumerate(rows):
         if averaging_s > 0.0:
-            columns, target, time = _averages(part, features, averaging_s)
+            columns, target, time = _averages(part, compose, averaging_s)
         else:
-            columns, target, time = features.compose(part.atoms), part.y, part.time_s
+            columns, target, time = compose(part.atoms), part.y, part.time_s
         X.append(columns)
         y.append(target)
         time_s.append(time)
@@ -170,6 +167,23 @@ def averaged_table(rows: Sequence[RunRows], features: Features, averaging_s: flo
     )
 
 
+def row_count(rows: Sequence[RunRows]) -> int:
+    """Number of training rows.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    count = sum(len(part.y) for part in rows)
+    if count == 0:
+        raise InputError(
+            "no training row has a full feature window; give longer runs, or state shorter windows in the "
+            "features, e.g. dT[block, 16 s]"
+        )
+    return count
+
+
 def recorded_s(rows: Sequence[RunRows]) -> float:
     """Time that the rows stand for [s]: their number times the median interval, run by run."""
     return float(sum(len(part.y) * _sample_s(part.time_s) for part in rows))
@@ -180,7 +194,7 @@ def _sample_s(time_s: FloatArray) -> float:
 
 
 def _averages(
-    part: RunRows, features: Features, averaging_s: float
+    part: RunRows, compose: Compose, averaging_s: float
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Averages of the composed features, of y and of time, over windows at least half full.
 
@@ -189,14 +203,14 @@ def _averages(
     from scipy.sparse import csr_array
 
     means = block_averages(part.time_s, part.y, window_s=averaging_s)
+    width = compose(part.atoms[:1]).shape[1]
     if len(means) == 0:
-        return np.empty((0, len(features.names()))), np.empty(0), np.empty(0)
-    width = max(1, len(features.names()))
-    per_piece = max(1, _COMPOSED_VALUES // (width * int(means.counts.max())))
+        return np.empty((0, width)), np.empty(0), np.empty(0)
+    per_piece = max(1, _COMPOSED_VALUES // (max(1, width) * int(means.counts.max())))
     pieces = []
     for start in range(0, len(means), per_piece):
         starts, stops = means.starts[start : start + per_piece], means.stops[start : start + per_piece]
-        composed = features.compose(part.atoms[starts[0] : stops[-1]])
+        composed = compose(part.atoms[starts[0] : stops[-1]])
         counts = stops - starts
         # Row i of the operator holds 1/count over the samples of window i.
         samples = np.repeat(starts - starts[0] - np.concatenate(([0], counts.cumsum()[:-1])), counts)

@@ -27,6 +27,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -64,8 +65,8 @@ class Part:
 
     def pieces(self) -> Iterator[tuple[slice, int]]:
         """Slices of at most `PIECE_ROWS` rows of one fold, with the fold."""
-        edges = np.concatenate(([0], np.flatnonzero(np.diff(self.folds)) + 1, [len(self.target)]))
-        for start, stop in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        edges = [0, *(np.flatnonzero(np.diff(self.folds)) + 1).tolist(), len(self.target)]
+        for start, stop in pairwise(edges):
             for first in range(start, stop, PIECE_ROWS):
                 yield slice(first, min(first + PIECE_ROWS, stop)), int(self.folds[start])
 
@@ -199,7 +200,7 @@ def _run_streams(parts: Sequence[Part], stream: Callable[[list[tuple[Part, slice
     if len(pieces) < 2 * _STREAMS:
         return [stream(pieces)]
     edges = np.linspace(0, len(pieces), _STREAMS + 1).astype(int).tolist()
-    shares = [pieces[start:stop] for start, stop in zip(edges[:-1], edges[1:], strict=True)]
+    shares = [pieces[start:stop] for start, stop in pairwise(edges)]
     with one_blas_thread(), ThreadPoolExecutor(max_workers=min(_STREAMS, available_cores())) as pool:
         return list(pool.map(stream, shares))
 

@@ -1,0 +1,111 @@
+"""Baselines: no compensation, and the training runs' mean error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.models.base import DriftModel, Evaluation
+from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.out_of_fold import interval_averaging_s, out_of_fold_intervals
+from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count, usable_rows
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+
+class _ConstantModel(DriftModel):
+    """Drift that is one number."""
+
+    bias_: float
+
+    def fit(self, runs: Run | Sequence[Run]) -> Self:
+        """Fit to training runs."""
+        group = checked_runs(runs)
+        rows = []
+        for run in group:
+            used, notes = usable_rows(run, np.ones(len(run), dtype=bool))
+            y = run.error_deg_h[used]
+            rows.append(RunRows(np.empty((len(y), 0)), y, run.time[used], notes))
+        count = row_count(rows)
+        self.bias_ = self._bias(np.concatenate([part.y for part in rows]))
+        self.card_ = training_card(group, rows=count, notes=[note for part in rows for note in part.notes])
+        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
+        table = averaged_table(rows, lambda atoms: atoms, averaging_s)
+        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold)
+        return self
+
+    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+        """The constant at every sample; it has no windows and no box."""
+        count = len(run)
+        return Evaluation(np.full(count, self.bias_), full, np.zeros(count, dtype=np.bool_), np.zeros(count))
+
+    def _bias(self, error: FloatArray) -> float:
+        raise NotImplementedError
+
+    def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
+        return np.full(len(held), self._bias(fitted.y))
+
+
+class NoCompensation(_ConstantModel):
+    """The output as it is: the drift is 0."""
+
+    form: ClassVar[str] = "none"
+    kind = "none"
+
+    def _bias(self, error: FloatArray) -> float:
+        return 0.0
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """Nothing."""
+        return {}
+
+    def parameter_count(self) -> int:
+        """0."""
+        return 0
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """Nothing beside card and intervals."""
+        return {}, {}
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> NoCompensation:
+        """The model that `to_saved` gave."""
+        model = cls()
+        model.bias_ = 0.0
+        return model
+
+
+class MeanModel(_ConstantModel):
+    """The drift is the mean error of the training rows [deg/h]."""
+
+    form: ClassVar[str] = "mean"
+    kind = "mean"
+
+    def _bias(self, error: FloatArray) -> float:
+        return float(error.mean())
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """The mean error [deg/h]."""
+        self._check_fitted()
+        return {"bias": np.array([self.bias_])}
+
+    def parameter_count(self) -> int:
+        """1."""
+        return 1
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The mean error."""
+        return {}, self.weights()
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> MeanModel:
+        """The model that `to_saved` gave."""
+        model = cls()
+        model.bias_ = float(np.asarray(arrays["bias"]).reshape(()))
+        return model

@@ -1,0 +1,219 @@
+"""The drift model made of features and a regressor that maps their columns to drift."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+
+from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.features.parse import parse_features
+from fogml.models.base import DriftModel, Evaluation
+from fogml.models.box import distance_outside, learn_box
+from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.folds import dealt_folds
+from fogml.models.linear import LinearRegressor
+from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
+from fogml.models.regressors import (
+    fit_regressor,
+    parameter_count,
+    predict_rows,
+    regressor_from_saved,
+    regressor_to_saved,
+)
+from fogml.models.table import RunRows, averaged_table, recorded_s, row_count, run_rows, table_of_rows
+from fogml.models.tall_least_squares import Part
+from fogml.runs.columns import coil_sensor_number
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+_EACH_SENSOR = "{sensor}"
+_PREDICTED_VALUES = 1 << 19
+# Feature values composed at once: 4 MiB, which stays in the cache.
+
+
+class FeatureModel(DriftModel):
+    """Drift as a regressor's value of features of the temperatures.
+
+    Parameters
+    ----------
+    features
+        Features, or their text. A term with ``{sensor}`` in its text stands for one such term for
+        each coil sensor that every training run holds (T1, T2, ...; else T_in and T_out; else T).
+    regressor
+        Any regressor with scikit-learn's ``fit`` and ``predict``; by default `LinearRegressor`.
+    kind
+        Name by which reports call the model.
+    max_rows
+        Training rows are averaged over blocks of time down to this number; None uses all.
+
+    Attributes
+    ----------
+    features_ : Features
+        The features, their box learned.
+    regressor_
+        The fitted regressor.
+    """
+
+    form: ClassVar[str] = "features"
+    features_: Features
+
+    def __init__(
+        self,
+        features: str | Features = "T, dT, T*dT",
+        regressor: Any = None,
+        kind: str = "features",
+        max_rows: int | None = None,
+    ) -> None:
+        self.features = features
+        self.regressor = regressor
+        self.kind = kind
+        self.max_rows = max_rows
+
+    def fit(self, runs: Run | Sequence[Run]) -> Self:
+        """Fit to training runs.
+
+        Raises
+        ------
+        InputError
+            If the runs don't belong together, lack a temperature, or are too short.
+        """
+        group = checked_runs(runs)
+        features = resolve_features(self.features, group)
+        rows = [run_rows(run, features) for run in group]
+        count = row_count(rows)
+        learn_box(features, [part.atoms for part in rows])
+        regressor = self._make_regressor(len(features.names()))
+        self.features_ = features
+        if isinstance(regressor, LinearRegressor) and self.max_rows is None:
+            self.regressor_ = regressor.fit_parts([_part(part, features) for part in rows])
+        else:
+            table = table_of_rows(rows, features.compose, self.max_rows)
+            count = len(table)
+            self.regressor_ = fit_regressor(regressor, table)
+        notes = [note for part in rows for note in part.notes]
+        self.card_ = training_card(group, rows=count, box=features.box, notes=notes)
+        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
+        table = averaged_table(rows, features.compose, averaging_s)
+        self.intervals_ = regressor_intervals(self.regressor_, table, guard_s=features.window_s)
+        return self
+
+    def _make_regressor(self, width: int) -> Any:
+        """An unfitted regressor for `width` columns."""
+        return LinearRegressor() if self.regressor is None else clone(self.regressor)
+
+    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+        """The regressor's value of the features, atoms limited to the trained box."""
+        limited, outside = self.features_.limit(atoms, full)
+        drift = np.empty(len(atoms))
+        step = max(1, _PREDICTED_VALUES // len(self.features_))
+        for start in range(0, len(atoms), step):
+            piece = slice(start, start + step)
+            drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
+        return Evaluation(drift, full, outside, distance_outside(atoms, outside, self.features_))
+
+    @property
+    def feature_names(self) -> list[str]:
+        """Names of the features, those of the text before a fit."""
+        if hasattr(self, "features_"):
+            return list(self.features_.names())
+        return [self.features] if isinstance(self.features, str) else list(self.features.names())
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """The regressor's arrays."""
+        self._check_fitted()
+        return regressor_to_saved(self.regressor_)[1]
+
+    def parameter_count(self) -> int:
+        """Number of the regressor's fitted parameters."""
+        self._check_fitted()
+        return parameter_count(self.regressor_)
+
+    def describe(self) -> dict[str, Any]:
+        """What reports say of the model; for linear models with coefficients and standard errors."""
+        description = super().describe()
+        regressor = self.regressor_
+        description["regressor"] = type(regressor).__name__
+        if isinstance(regressor, LinearRegressor):
+            description["ridge"] = regressor.ridge_
+            description["coefficients"] = regressor.coefficient_table(self.feature_names)
+        elif hasattr(regressor, "describe"):
+            description["regressor_details"] = regressor.describe()
+        return description
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted model as JSON-ready values and arrays."""
+        self._check_fitted()
+        values, arrays = regressor_to_saved(self.regressor_)
+        return {
+            "features": self.features_.text,
+            "asked_features": self.features if isinstance(self.features, str) else self.features.text,
+            "max_rows": self.max_rows,
+            "regressor": values,
+        }, arrays
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> FeatureModel:
+        """The model that `to_saved` gave."""
+        model = cls(
+            features=str(values["asked_features"]),
+            kind=str(values.get("kind", "features")),
+            regressor=clone(regressor_from_saved(values["regressor"], arrays)),
+            max_rows=values["max_rows"],
+        )
+        model._restore(values, arrays, card)
+        return model
+
+    def _restore(self, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard) -> None:
+        """Set what a fit learned."""
+        self.features_ = parse_features(str(values["features"]))
+        self.features_.set_box(card.box)
+        self.regressor_ = regressor_from_saved(values["regressor"], arrays)
+
+
+def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:
+    """Features of one's own from their text, terms with ``{sensor}`` written out for the runs' sensors."""
+    if not isinstance(features, str):
+        return parse_features(features.text)
+    if _EACH_SENSOR in features:
+        features = _written_out(features, shared_sensors(runs))
+    return parse_features(features)
+
+
+def shared_sensors(runs: Sequence[Run]) -> list[str]:
+    """The coil sensors that every run holds: T1, T2, ..., else T_in and T_out, else T.
+
+    Raises
+    ------
+    InputError
+        If the runs share no temperature of the coil.
+    """
+    held = set.intersection(*[set(run.temperature_columns) for run in runs])
+    numbered = sorted(number for name in held if (number := coil_sensor_number(name)) is not None)
+    if numbered:
+        return [f"T{number}" for number in numbered]
+    faces: list[str] = [name for name in ("T_in", "T_out") if name in held]
+    if faces:
+        return faces
+    if "T" in held:
+        return ["T"]
+    raise InputError(
+        f"{runs[0].name}: the training runs share no coil temperature (T1 ..., T_in, T_out or T)"
+    )
+
+
+def _written_out(text: str, sensors: Sequence[str]) -> str:
+    terms = [term.strip() for term in re.split(r",(?![^\[]*\])", text)]
+    fixed = [term for term in terms if _EACH_SENSOR not in term]
+    each = [term for term in terms if _EACH_SENSOR in term]
+    return ", ".join([*fixed, *[term.replace(_EACH_SENSOR, name) for name in sensors for term in each]])
+
+
+def _part(rows: RunRows, features: Features) -> Part:
+    return Part(rows.y, lambda piece: features.compose(rows.atoms[piece]), dealt_folds(len(rows.y)))

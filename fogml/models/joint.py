@@ -1,0 +1,238 @@
+"""Scale factor and bias over temperature from one run with turns.
+
+The output D, as recorded, and temperatures give the rate in one linear model (patent
+CN105333888A), here with an intercept and with Earth rate in the reference y [deg/h]::
+
+    y = (a0 + a1 T + a2 T^2) D + b0 + b1 T + b2 (T_in - T_out) + b3 dT (+ b4 T dT)
+
+It is solved by QR on centred, scaled columns. The patent's own form has six columns, neither
+intercept nor Earth rate, and the difference of block means ``diff(T)`` in place of the rate dT;
+without an intercept a static residual of some 0.1 to 0.7 deg/h stays, and Earth rate is lost.
+
+The noisy output stands among the regressors, which pulls the scale factor towards zero by
+var(noise)/var(D). With 1 deg/h of noise at a sample and 24 minutes of 10 h at 10 deg/s that is
+2e-8: far below 1 ppm. Without turns var(D) is the noise itself and the model would only fit the
+gyro to its own output; such runs are refused.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.features.parse import parse_features
+from fogml.models.base import DriftModel, Evaluation
+from fogml.models.box import distance_outside, learn_box
+from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.folds import dealt_folds
+from fogml.models.linear import LinearRegressor
+from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
+from fogml.models.table import RunRows, averaged_table, recorded_s, row_count
+from fogml.models.tall_least_squares import Part
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+_LEAST_TURN_DEG_S = 0.1
+# Under this a turn tells the scale factor worse than 100 ppm at 0.1 deg/h of drift: no calibration.
+_LEAST_TURNING_ROWS = 10
+
+
+class JointModel(DriftModel):
+    """Scale factor and bias over temperature, fitted together to runs with turns.
+
+    ``compensated`` is the rate that the model makes of the output [deg/h]; the drift is the
+    output as rate less that, so it holds the scale factor's error too.
+
+    Parameters
+    ----------
+    patent
+        The patent's own six columns, without intercept and Earth rate.
+    product
+        With a column T*dT; not in the patent's form.
+
+    Attributes
+    ----------
+    regressor_ : LinearRegressor
+        The solution; `column_names` tells its columns.
+    gradient_ : bool
+        Whether there is a column T_in-T_out: whether every training run holds T_out.
+    """
+
+    form: ClassVar[str] = "joint"
+    features_: Features
+
+    def __init__(self, patent: bool = False, product: bool = False) -> None:
+        self.patent = patent
+        self.product = product
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """``joint`` or ``joint-patent``."""
+        return "joint-patent" if self.patent else "joint"
+
+    def fit(self, runs: Run | Sequence[Run]) -> Self:
+        """Fit to training runs with turns.
+
+        Raises
+        ------
+        InputError
+            If no training run turns, the runs don't belong together, or lack a temperature.
+        """
+        if self.patent and self.product:
+            raise InputError("joint-patent: the patent's form has six columns and none of T*dT; use joint")
+        group = checked_runs(runs)
+        if len({run.gyro_unit for run in group}) > 1:
+            raise InputError(
+                "joint: the training runs' outputs are partly in counts and partly in deg/h, "
+                "and the model works on the output as recorded; give runs of one kind"
+            )
+        self.gradient_ = all(_has_gradient(run) for run in group)
+        notes = (
+            [] if self.gradient_ else ["no T_out in every training run: the column T_in-T_out is left out"]
+        )
+        if not group[0].earth_known and not self.patent:
+            notes.append("Earth rate is not known: the intercept holds that of the training attitude")
+        self.features_ = parse_features(self._feature_text())
+        rows = [self._rows(run) for run in group]
+        _check_turns(group, rows)
+        learn_box(self.features_, [part.atoms[:, 1:] for part in rows])
+        parts = [self._part(part) for part in rows]
+        self.regressor_ = LinearRegressor(fit_intercept=not self.patent).fit_parts(parts)
+        notes += [note for part in rows for note in part.notes]
+        self.card_ = training_card(group, rows=row_count(rows), box=self.features_.box, notes=notes)
+        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
+        table = averaged_table(rows, self._columns, averaging_s)
+        self.intervals_ = regressor_intervals(self.regressor_, table, guard_s=self.features_.window_s)
+        return self
+
+    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+        """Drift: output as rate less the model's rate; with distance from the trained box."""
+        limited, outside = self.features_.limit(atoms, full)
+        rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
+        distance = distance_outside(atoms, outside, self.features_)
+        return Evaluation(run.gyro_deg_h - rate, full, outside, distance)
+
+    def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
+        """As for every model; besides, the output must be in the unit of training.
+
+        Raises
+        ------
+        InputError
+            If unit or axis differ and `any_unit` is not set, or counts are mixed with deg/h.
+        """
+        notes = super().check_applies(run, any_unit)
+        if run.gyro_unit != self.card_.gyro_unit:
+            raise InputError(
+                f"{run.name}: column 'gyro' is in {run.gyro_unit}, the joint model was trained on "
+                f"{self.card_.gyro_unit} and works on the output as recorded; give the run in that unit"
+            )
+        return notes
+
+    @property
+    def column_names(self) -> list[str]:
+        """Names of the columns that the coefficients belong to; D is the output as recorded."""
+        self._check_fitted()
+        return ["D", "T*D", "T^2*D", *self.features_.names()]
+
+    @property
+    def feature_names(self) -> list[str]:
+        """The columns' names; none before a fit."""
+        return self.column_names if hasattr(self, "features_") else []
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """Coefficients and intercept."""
+        self._check_fitted()
+        return self.regressor_.to_saved()[1]
+
+    def parameter_count(self) -> int:
+        """Number of coefficients, the intercept included."""
+        self._check_fitted()
+        return self.regressor_.parameter_count
+
+    def describe(self) -> dict[str, Any]:
+        """What reports say of the model, with coefficients and standard errors."""
+        description = super().describe()
+        description["coefficients"] = self.regressor_.coefficient_table(self.column_names)
+        return description
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted model as JSON-ready values and arrays."""
+        self._check_fitted()
+        values, arrays = self.regressor_.to_saved()
+        own = {"patent": self.patent, "product": self.product, "gradient": self.gradient_}
+        return {**own, "regressor": values}, arrays
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> JointModel:
+        """The model that `to_saved` gave."""
+        model = cls(patent=bool(values["patent"]), product=bool(values["product"]))
+        model.gradient_ = bool(values["gradient"])
+        model.features_ = parse_features(model._feature_text())
+        model.features_.set_box(card.box)
+        model.regressor_ = LinearRegressor.from_saved(values["regressor"], arrays)
+        if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
+            raise ValueError("coefficients and columns differ in number")
+        return model
+
+    def _feature_text(self) -> str:
+        terms = ["T"]
+        if self.gradient_:
+            terms.append("T_in-T_out")
+        terms.append("diff(T)" if self.patent else "dT")
+        if self.product:
+            terms.append("T*dT")
+        return ", ".join(terms)
+
+    def _rows(self, run: Run) -> RunRows:
+        atoms, used = self.features_.atom_values(run)
+        notes = []
+        if "rate" in run.columns:
+            from fogml.runs.transitions import transition_mask
+
+            cut = transition_mask(run)
+            used = used & ~cut
+            notes = [f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out"]
+        y = 3600.0 * run.rate if self.patent else run.reference_deg_h
+        return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], tuple(notes))
+
+    def _part(self, rows: RunRows) -> Part:
+        return Part(rows.y, lambda piece: self._columns(rows.atoms[piece]), dealt_folds(len(rows.y)))
+
+    def _columns(self, rows: FloatArray) -> FloatArray:
+        """The model's columns from rows of [output, atoms...]."""
+        features = self.features_.compose(rows[:, 1:])
+        columns = np.empty((len(rows), 3 + features.shape[1]), order="F")
+        columns[:, 0] = rows[:, 0]
+        np.multiply(rows[:, 0], features[:, 0], out=columns[:, 1])
+        np.multiply(columns[:, 1], features[:, 0], out=columns[:, 2])
+        columns[:, 3:] = features
+        return columns
+
+
+def _has_gradient(run: Run) -> bool:
+    try:
+        run.temperature("T_in"), run.temperature("T_out")
+    except InputError:
+        return False
+    return True
+
+
+def _check_turns(runs: Sequence[Run], rows: Sequence[RunRows]) -> None:
+    """Refuse training rows from which no scale factor can be told."""
+    row_count(rows)
+    y = np.concatenate([part.y for part in rows])
+    middle = np.median(y)
+    away = np.abs(y - middle) > 3600.0 * _LEAST_TURN_DEG_S
+    if np.count_nonzero(away) < _LEAST_TURNING_ROWS:
+        names = ", ".join(run.name for run in runs)
+        raise InputError(
+            f"{names}: no turns: the joint model needs turns of the table, both ways and at several "
+            f"temperatures, in a column 'rate [deg/s]' (at least {_LEAST_TURNING_ROWS} samples at rates "
+            f"{_LEAST_TURN_DEG_S} deg/s apart); use a drift model such as polynomial for a run at rest"
+        )

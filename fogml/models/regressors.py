@@ -1,0 +1,131 @@
+"""What drift models ask of bare regressors: fit to a table, predict, refit, count, save.
+
+A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may also have
+
+``fit(X, y, groups=..., time=..., folds=...)``
+    any of these: the run of each row, its time [s], the fold of time it falls in;
+``predict_unchecked(X)``
+    predict for columns known to be finite float64;
+``refitted(X, y)``
+    a new regressor fitted to other rows, what was tuned (shape, size, ridge) being kept;
+``parameter_count``
+    number of fitted parameters;
+``to_saved()`` and ``from_saved(values, arrays)``
+    JSON-ready values and arrays, and back.
+"""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from sklearn.base import clone
+
+from fogml.errors import InputError
+from fogml.models.folds import FOLDS
+from fogml.models.table import TrainingTable
+from fogml.runs.run import FloatArray
+
+FORMS = {
+    "linear": "fogml.models.linear:LinearRegressor",
+    "rbf": "fogml.models.rbf:RBFRegressor",
+    "rbf-patent": "fogml.models.rbf:PatentRBFRegressor",
+}
+"""Forms of saved regressors, and where their classes are."""
+SKOPS = "skops"
+_PREDICTED_ROWS = 4096
+
+
+def fit_regressor(regressor: Any, table: TrainingTable) -> Any:
+    """Fit a regressor to a table, telling it runs, times and folds where its fit asks for them."""
+    asked = inspect.signature(regressor.fit).parameters
+    told = {
+        "groups": table.run_index,
+        "time": table.time_s,
+        "folds": table.block % FOLDS,
+    }
+    return regressor.fit(table.X, table.y, **{name: told[name] for name in told if name in asked})
+
+
+def refit(regressor: Any, table: TrainingTable) -> Any:
+    """A new regressor fitted to other rows, what was tuned being kept where the regressor can."""
+    if hasattr(regressor, "refitted"):
+        return regressor.refitted(table.X, table.y)
+    return fit_regressor(clone(regressor), table)
+
+
+def predict_rows(regressor: Any, columns: FloatArray) -> FloatArray:
+    """Values for columns that are finite float64, shape (n,)."""
+    if hasattr(regressor, "predict_unchecked"):
+        return np.asarray(regressor.predict_unchecked(columns))
+    # Kernel methods hold a value for each row and each training row; so few rows at a time.
+    starts = range(0, len(columns), _PREDICTED_ROWS)
+    values = [np.asarray(regressor.predict(columns[start : start + _PREDICTED_ROWS])) for start in starts]
+    return np.concatenate(values).reshape(-1) if values else np.empty(0)
+
+
+def parameter_count(regressor: Any) -> int:
+    """Number of fitted parameters; of a scikit-learn regressor, of the numbers in its fitted arrays."""
+    count = getattr(regressor, "parameter_count", None)
+    if count is not None:
+        return int(count() if callable(count) else count)
+    return _count_numbers(regressor)
+
+
+def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+    """A fitted regressor as JSON-ready values, with its form, and arrays.
+
+    Raises
+    ------
+    InputError
+        If it is neither fogml's nor scikit-learn's.
+    """
+    for form, home in FORMS.items():
+        module, name = home.split(":")
+        kind = type(regressor)
+        if kind.__name__ == name and kind.__module__.startswith(module.rsplit(".", 1)[0]):
+            values, arrays = regressor.to_saved()
+            return {"form": form, **values}, arrays
+    if type(regressor).__module__.split(".")[0] == "sklearn":
+        from fogml.models.sklearn_saving import dump_sklearn
+
+        return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
+    raise InputError(
+        f"{type(regressor).__name__}: cannot be saved; only fogml's and scikit-learn's own regressors can"
+    )
+
+
+def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Any:
+    """The regressor that `regressor_to_saved` gave.
+
+    Raises
+    ------
+    InputError
+        If the form is not known or holds types that are not scikit-learn's.
+    """
+    values = dict(values)
+    form = values.pop("form")
+    if form == SKOPS:
+        from fogml.models.sklearn_saving import load_sklearn
+
+        return load_sklearn(arrays["skops"])
+    if form not in FORMS:
+        raise InputError(f"regressor form '{form}' is not known; known are {', '.join([*FORMS, SKOPS])}")
+    module, name = FORMS[form].split(":")
+    return getattr(import_module(module), name).from_saved(values, arrays)
+
+
+def _count_numbers(value: Any) -> int:
+    if isinstance(value, np.ndarray):
+        return int(value.size) if value.dtype.kind == "f" else 0
+    if isinstance(value, list | tuple):
+        return sum(_count_numbers(item) for item in value)
+    if isinstance(value, float):
+        return 1
+    if type(value).__module__.startswith("sklearn."):
+        fitted = {name: item for name, item in vars(value).items() if name.endswith("_")}
+        return sum(_count_numbers(item) for name, item in fitted.items() if not name.startswith("__"))
+    return 0

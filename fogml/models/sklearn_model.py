@@ -1,0 +1,138 @@
+"""Drift models from scikit-learn's regressors by their dotted names."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from importlib import import_module
+from typing import Any, ClassVar
+
+from numpy.typing import NDArray
+from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.compose import TransformedTargetRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
+
+from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.models.card import TrainingCard
+from fogml.models.feature_model import FeatureModel
+
+MAX_ROWS = 1500
+"""Averages that training runs are brought down to: kernel methods take time in its cube."""
+
+
+class SklearnModel(FeatureModel):
+    """Drift as a scikit-learn regressor's value of features of the temperatures.
+
+    Features and drift are standardised with the training rows' means and standard deviations
+    before the regressor sees them, so settings such as an SVR's ``epsilon`` are in standard
+    deviations. A Gaussian process without a stated kernel gets a signal of own width for each
+    feature, a linear part and white noise, as its default kernel is not fitted at all.
+
+    Parameters
+    ----------
+    name
+        Dotted name, e.g. ``sklearn.svm.SVR``.
+    features
+        Features, or their text.
+    options
+        Arguments of the regressor.
+    max_rows
+        Training rows are averaged over blocks of time down to this number.
+    seed
+        Random state, where the regressor takes one.
+    """
+
+    form: ClassVar[str] = "sklearn"
+
+    def __init__(
+        self,
+        name: str = "sklearn.svm.SVR",
+        features: str | Features = "T, dT, T*dT",
+        options: Mapping[str, Any] | None = None,
+        max_rows: int | None = MAX_ROWS,
+        seed: int = 0,
+    ) -> None:
+        self.name = name
+        self.features = features
+        self.options = options
+        self.max_rows = max_rows
+        self.seed = seed
+
+    @property
+    def kind(self) -> str:  # type: ignore[override]
+        """The dotted name."""
+        return self.name
+
+    def _make_regressor(self, width: int) -> Any:
+        kind = sklearn_regressor_class(self.name)
+        options = dict(self.options or {})
+        known = inspect.signature(kind).parameters
+        unknown = [option for option in options if option not in known]
+        if unknown:
+            raise InputError(f"{self.name}: no option '{unknown[0]}'; options are {', '.join(known)}")
+        if "random_state" in known:
+            options.setdefault("random_state", self.seed)
+        if kind.__name__ == "GaussianProcessRegressor" and options.get("kernel") is None:
+            options["kernel"] = _drift_kernel(width)
+        scaled = make_pipeline(StandardScaler(), kind(**options))
+        return TransformedTargetRegressor(scaled, transformer=StandardScaler())
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted model as JSON-ready values and arrays."""
+        values, arrays = super().to_saved()
+        return {**values, "name": self.name, "options": dict(self.options or {}), "seed": self.seed}, arrays
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> SklearnModel:
+        """The model that `to_saved` gave."""
+        model = cls(
+            name=str(values["name"]),
+            features=str(values["asked_features"]),
+            options=dict(values["options"]) or None,
+            max_rows=values["max_rows"],
+            seed=int(values["seed"]),
+        )
+        model._restore(values, arrays, card)
+        return model
+
+
+def sklearn_regressor_class(name: str) -> type:
+    """The scikit-learn regressor of a dotted name.
+
+    Raises
+    ------
+    InputError
+        If the name is not one of scikit-learn's regressors.
+    """
+    package, _, attribute = name.rpartition(".")
+    example = "give e.g. sklearn.svm.SVR"
+    if package.split(".")[0] != "sklearn":
+        raise InputError(f"model '{name}': a dotted name must be one of scikit-learn's regressors; {example}")
+    try:
+        kind = getattr(import_module(package), attribute)
+    except (ImportError, AttributeError):
+        raise InputError(f"model '{name}': scikit-learn has no such regressor; {example}") from None
+    if not (inspect.isclass(kind) and issubclass(kind, RegressorMixin) and issubclass(kind, BaseEstimator)):
+        raise InputError(f"model '{name}': is not a regressor; {example}")
+    needed = [
+        parameter.name
+        for parameter in inspect.signature(kind).parameters.values()
+        if parameter.default is inspect.Parameter.empty
+        and parameter.kind not in (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
+    ]
+    if needed or inspect.isabstract(kind):
+        raise InputError(f"model '{name}': does not stand alone (it needs {', '.join(needed)}); {example}")
+    return kind
+
+
+def _drift_kernel(width: int) -> Any:
+    """Own width for each feature, a linear part and white noise, for standardised columns."""
+    from sklearn.gaussian_process.kernels import RBF, ConstantKernel, DotProduct, WhiteKernel
+
+    smooth = ConstantKernel(1.0, (1e-4, 1e4)) * RBF([1.0] * width, (1e-1, 1e3))
+    linear = ConstantKernel(1.0, (1e-4, 1e4)) * DotProduct(1.0, "fixed")
+    return smooth + linear + WhiteKernel(1e-2, (1e-8, 1e1))

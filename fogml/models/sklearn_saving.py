@@ -1,0 +1,64 @@
+"""Scikit-learn regressors as bytes, without pickle: only scikit-learn's own types are read back."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+
+
+def dump_sklearn(regressor: Any) -> NDArray[np.uint8]:
+    """A fitted scikit-learn regressor in skops' form, as bytes of shape (n,).
+
+    Raises
+    ------
+    InputError
+        If it holds objects that are not scikit-learn's and so could not be loaded again.
+    """
+    import skops.io
+
+    data = skops.io.dumps(regressor)
+    _trusted(data)
+    return np.frombuffer(data, dtype=np.uint8)
+
+
+def load_sklearn(stored: NDArray[Any]) -> Any:
+    """The regressor that `dump_sklearn` gave.
+
+    Raises
+    ------
+    InputError
+        If the bytes are damaged, or name a type that is not scikit-learn's.
+    """
+    import skops.io
+
+    data = np.asarray(stored, dtype=np.uint8).tobytes()
+    trusted = _trusted(data)
+    try:
+        return skops.io.loads(data, trusted=trusted)
+    except Exception as error:  # skops raises whatever a damaged archive leads it to
+        raise InputError(
+            f"the saved scikit-learn regressor cannot be read ({error}); train it again"
+        ) from None
+
+
+def _trusted(data: bytes) -> list[str]:
+    """The types that skops itself does not vouch for, all of them scikit-learn's."""
+    import skops.io
+
+    try:
+        named = skops.io.get_untrusted_types(data=data)
+    except Exception as error:  # as above
+        raise InputError(
+            f"the saved scikit-learn regressor cannot be read ({error}); train it again"
+        ) from None
+    foreign = [name for name in named if not name.startswith("sklearn.")]
+    if foreign:
+        raise InputError(
+            f"the saved regressor holds types that are not scikit-learn's ({', '.join(sorted(foreign))}); "
+            "it is not loaded"
+        )
+    return list(named)
