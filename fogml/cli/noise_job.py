@@ -1,0 +1,81 @@
+"""The job of ``fogml noise``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+from fogml.cli.runs import open_run
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+from fogml.validation.noise import noise_json
+
+
+class NoiseSettings(Settings):
+    """Settings of ``fogml noise``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("run",)
+    run: str | None = None
+    overlapping: bool = True
+    repair: bool = False
+    out: str | None = None
+
+    def in_full(self) -> NoiseSettings:
+        """The settings with every path in full."""
+        assert self.run and self.out
+        return self.model_copy(update={"run": absolute(self.run), "out": absolute(self.out)})
+
+
+def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
+    """Tell the noise of a run, write it where an output folder is named, and print it."""
+    if not settings.run:
+        raise InputError("no run is given; name one")
+    if settings.out is None:
+        values = _noise(settings.run, settings, terminal)
+    else:
+        with whole_folder(settings.out) as folder:
+            values = _noise(settings.run, settings, terminal)
+            text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
+            (folder / "noise.json").write_text(text + "\n", encoding="utf-8")
+            with terminal.work("drawing"):
+                from fogml.report import noise_page
+
+                (folder / "noise.html").write_text(noise_page(values), encoding="utf-8")
+            (folder / "config.yaml").write_text(settings.in_full().yaml("noise"), encoding="utf-8")
+    _print(values, terminal)
+    terminal.result(values)
+    if settings.out is not None:
+        terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'noise.html'}")
+
+
+def _noise(path: str, settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
+    with terminal.work(f"reading {path}") as work:
+        run = open_run(path, repair=settings.repair)
+        work.doing("averaging")
+        return noise_json(run, overlapping=settings.overlapping)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    kind = "overlapping" if values["overlapping"] else "not overlapping"
+    rows = [
+        [f"{tau:.6g}", number(adev), number(low), number(high)]
+        for tau, adev, (low, high) in zip(values["taus_s"], values["adev"], values["ci"], strict=True)
+    ]
+    level = f"{values['level']:.0%}"
+    terminal.table(
+        f"{values['run']}: Allan deviation, {kind}",
+        ["tau [s]", "deviation [deg/h]", f"{level} from", "to"],
+        rows,
+    )
+    rows = [
+        [name, number(term["value"]), number(term["ci"][0]), number(term["ci"][1]), term["unit"]]
+        for name, term in values["terms"].items()
+    ]
+    terminal.table("IEEE 952 terms", ["term", "value", f"{level} from", "to", "unit"], rows)
+    minimum = values["minimum"]
+    terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s")
+    for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):
+        terminal.say(text)
