@@ -65,7 +65,7 @@ def fit_variances(
 
     def at(excess: float) -> tuple[FloatArray, FloatArray, float]:
         reduced = own / (1.0 + 0.5 * own * excess)
-        coefficients = _greatest_likelihood(shapes, variances, reduced)
+        coefficients = greatest_likelihood(shapes, variances, reduced)
         relative = variances / (shapes @ coefficients) - 1.0
         # An unexplained point says no more than one that is off by its own size.
         squares = 0.5 * reduced @ np.minimum(relative**2, 1.0)
@@ -100,14 +100,14 @@ def interval(fit: VarianceFit, column: int, level: float) -> tuple[float, float]
     from scipy.optimize import brentq
     from scipy.special import ndtri
 
-    best = _deviance(fit.variances, fit.shapes @ fit.coefficients, fit.edf)
+    best = deviance(fit.variances, fit.shapes @ fit.coefficients, fit.edf)
     allowed = float(ndtri(0.5 + 0.5 * level)) ** 2 / _information_ratio(fit, column)
     others = np.delete(fit.shapes, column, axis=1)
 
     def loss(coefficient: float) -> float:
         fixed = coefficient * fit.shapes[:, column]
-        rest = _greatest_likelihood(others, fit.variances, fit.edf, fixed)
-        return _deviance(fit.variances, fixed + others @ rest, fit.edf) - best - allowed
+        rest = greatest_likelihood(others, fit.variances, fit.edf, fixed)
+        return deviance(fit.variances, fixed + others @ rest, fit.edf) - best - allowed
 
     value = float(fit.coefficients[column])
     # Scale on which the term alone would make the whole of some point.
@@ -135,7 +135,7 @@ def _information_ratio(fit: VarianceFit, column: int) -> float:
     return float(np.clip(inverse[position, position] / spread[position, position], 1e-3, 1.0))
 
 
-def _greatest_likelihood(
+def greatest_likelihood(
     shapes: FloatArray, variances: FloatArray, edf: FloatArray, fixed: FloatArray | None = None
 ) -> FloatArray:
     """Coefficients of greatest likelihood, by non-negative least squares with new weights each turn."""
@@ -153,22 +153,22 @@ def _greatest_likelihood(
         target = (variances - offset) * rows
         proposed = nnls(scaled / norms, target)[0] / norms
         step = 1.0
-        deviance = _deviance(variances, offset + shapes @ proposed, edf)
-        while turn > 0 and deviance > previous and step > 1e-3:
+        lost = deviance(variances, offset + shapes @ proposed, edf)
+        while turn > 0 and lost > previous and step > 1e-3:
             step *= 0.5
             mixed = coefficients + step * (proposed - coefficients)
-            deviance = _deviance(variances, offset + shapes @ mixed, edf)
-        if turn > 0 and deviance > previous:
+            lost = deviance(variances, offset + shapes @ mixed, edf)
+        if turn > 0 and lost > previous:
             break
         coefficients = coefficients + step * (proposed - coefficients)
         model = offset + shapes @ coefficients
-        if abs(previous - deviance) <= _TOLERANCE * (1.0 + abs(deviance)):
+        if abs(previous - lost) <= _TOLERANCE * (1.0 + abs(lost)):
             break
-        previous = deviance
+        previous = lost
     return coefficients
 
 
-def _deviance(variances: FloatArray, model: FloatArray, edf: FloatArray) -> float:
+def deviance(variances: FloatArray, model: FloatArray, edf: FloatArray) -> float:
     """Twice the log likelihood lost by `model` against the variances themselves."""
     if np.any(model <= 0):
         return float("inf")
