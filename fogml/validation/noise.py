@@ -54,7 +54,8 @@ def noise_json(run: Run, *, overlapping: bool = True) -> dict[str, Any]:
         "sample_s": run.sample_s,
         "span_s": run.span_s,
         "stretches": len(run.stretches),
-        "taus_s": shown.taus_s,
+        # Sample intervals are differences of times; their rounding is no part of the averaging time.
+        "taus_s": [float(f"{tau:.9g}") for tau in shown.taus_s],
         "adev": shown.adev,
         "ci": np.column_stack((shown.lower, shown.upper)),
         "n": shown.n,

@@ -1,0 +1,88 @@
+"""The job of ``fogml demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from fogml.cli.runs import open_runs
+from fogml.cli.settings import SHIPPED, Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.cli.train_job import TrainSettings, fit_and_judge, write_results
+from fogml.outputs import whole_folder
+from fogml.validation.report_json import judgement_json
+from fogml.validation.results import Judgement
+
+AXES = ("x", "y", "z")
+TRAINING_LEG, TEST_LEG = 2, 3
+"""The leg up to 74 degC, and the last leg down."""
+AVERAGED_ROWS = 20
+
+
+class DemoSettings(Settings):
+    """Settings of ``fogml demo``."""
+
+    out: str = "demo-results"
+
+
+def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
+    """Train and judge on three axes of the shipped thermal cycle, and write an index page."""
+    judgements: dict[str, Judgement] = {}
+    with whole_folder(settings.out) as folder:
+        with terminal.work("three axes", total=len(AXES)) as work:
+            for axis in AXES:
+                work.doing(f"axis {axis}")
+                judgements[axis] = _axis(folder / axis, axis, settings, Terminal(quiet=True))
+                work.advance()
+        from fogml.report import index_page
+
+        (folder / "index.html").write_text(index_page(judgements), encoding="utf-8")
+        (folder / "config.yaml").write_text(settings.yaml("demo"), encoding="utf-8")
+    _print(judgements, settings, terminal)
+    terminal.result(
+        {
+            "schema": "fogml.demo/1",
+            "axes": {axis: judgement_json(judgement) for axis, judgement in judgements.items()},
+        }
+    )
+
+
+def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -> Judgement:
+    runs = [f"{SHIPPED}thermal-cycle-{leg}-{axis}" for leg in (TRAINING_LEG, TEST_LEG)]
+    training, test = open_runs(runs[:1], terminal), open_runs(runs[1:], terminal)
+    train_settings = TrainSettings(
+        runs=runs[:1],
+        test=runs[1:],
+        averaging=round(AVERAGED_ROWS * test[0].sample_s, 6),
+        seed=settings.seed,
+        out=str(Path(settings.out) / axis),
+    )
+    model, judgement = fit_and_judge(train_settings, training, test, terminal)
+    folder.mkdir()
+    write_results(folder, train_settings, model, judgement, terminal)
+    return judgement
+
+
+def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: Terminal) -> None:
+    rows = []
+    for axis, judgement in judgements.items():
+        run = judgement.test[0]
+        model = ", ".join(judgement.model["features"]) or "no compensation"
+        figures = (
+            run.before.rms,
+            run.after.rms,
+            run.before.bias_stability,
+            run.after.bias_stability,
+            run.floor,
+        )
+        rows.append([axis, *(number(value) for value in figures), model])
+    averaging = judgements[AXES[0]].test[0].averaging_s
+    terminal.table(
+        f"Chamber cycle of a MEMS unit, trained going up, judged going down ({averaging:.3g} s averages, deg/h)",
+        ["axis", "rms before", "after", "bias stability before", "after", "noise floor", "features chosen"],
+        rows,
+    )
+    for axis, judgement in judgements.items():
+        for note in judgement.test[0].notes:
+            terminal.say(f"{axis}: {note}")
+            break
+    terminal.say(f"Open {Path(settings.out) / 'index.html'} in a browser.")
