@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -129,9 +129,9 @@ class Atom:
         return {"value": "degC", "diff": "degC", "d": "degC/min", "sign": ""}[self.operator]
 
     @property
-    def order(self) -> tuple[int, str]:
+    def order(self) -> tuple[Any, ...]:
         """Sort key among the factors of a term: values, differences, rates, directions."""
-        return OPERATORS.index(self.operator), self.text
+        return OPERATORS.index(self.operator), self.signal.order, self.text
 
 
 def windowed_values(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -68,7 +68,7 @@ class Box:
         noise = 1e-9 * np.maximum(1.0, np.maximum(np.abs(self.low), np.abs(self.high)))
         return np.maximum(self.high - self.low, noise)
 
-    def limit(self, values: ArrayLike, known: ArrayLike) -> tuple[FloatArray, BoolArray]:
+    def limit(self, values: ArrayLike, heeded: Sequence[BoolArray | None]) -> tuple[FloatArray, BoolArray]:
         r"""Limit atom values smoothly to the box, and tell which rows are outside.
 
         Inside the box values stay as they are. A value e beyond a bound becomes
@@ -81,9 +81,9 @@ class Box:
         ----------
         values
             Atom values, shape (n, a).
-        known
-            Where a value is to be heeded, broadcastable to (n, a): values of windows that are not
-            full stay as they are.
+        heeded
+            For each atom the rows (n,) in which its value means something, or None for all of them:
+            values of windows that are not full stay as they are.
 
         Returns
         -------
@@ -93,14 +93,14 @@ class Box:
             Rows with an atom more than 1 % of its span beyond the box.
         """
         values = np.asarray(values, dtype=np.float64)
-        known = np.broadcast_to(np.asarray(known, dtype=np.bool_), values.shape)
         limited = values
         outside = np.zeros(len(values), dtype=np.bool_)
-        for column, (low, high, span) in enumerate(zip(self.low, self.high, self.span)):
+        for column, (low, high, span, rows_heeded) in enumerate(zip(self.low, self.high, self.span, heeded)):
             atom = values[:, column]
             if not len(atom) or (atom.min() >= low and atom.max() <= high):
                 continue
-            rows = np.flatnonzero(((atom < low) | (atom > high)) & known[:, column])
+            beyond_bounds = (atom < low) | (atom > high)
+            rows = np.flatnonzero(beyond_bounds if rows_heeded is None else beyond_bounds & rows_heeded)
             if not len(rows):
                 continue
             if limited is values:

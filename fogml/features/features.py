@@ -232,14 +232,17 @@ class Features:
             message = str(error)
             raise InputError(message if message.startswith(run.name) else f"{run.name}: {message}") from error
 
-    def compose(self, atom_values: ArrayLike) -> FloatArray:
-        """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
+    def _checked(self, atom_values: ArrayLike) -> FloatArray:
         values = np.asarray(atom_values, dtype=np.float64)
         if values.ndim != 2 or values.shape[1] != len(self._atoms):
             raise InputError(
                 f"features: atom values of shape {values.shape}, (n, {len(self._atoms)}) was expected"
             )
-        return compose(self._plan, values)
+        return values
+
+    def compose(self, atom_values: ArrayLike) -> FloatArray:
+        """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
+        return compose(self._plan, self._checked(atom_values))
 
     def limit(self, atom_values: ArrayLike, full: ArrayLike | None = None) -> tuple[FloatArray, BoolArray]:
         """Limit atom values smoothly to the learned box.
@@ -262,11 +265,9 @@ class Features:
         outside : (n,) bool array
             Rows with an atom more than 1 % of its span beyond the box.
         """
-        known: ArrayLike = True
-        if full is not None:
-            static = np.array([atom.window is None for atom in self._atoms])
-            known = np.asarray(full, dtype=np.bool_)[:, None] | static
-        return self._learned_box().limit(atom_values, known)
+        in_full = None if full is None else np.asarray(full, dtype=np.bool_)
+        heeded = [None if atom.window is None else in_full for atom in self._atoms]
+        return self._learned_box().limit(self._checked(atom_values), heeded)
 
     def transform(self, run: Run, *, limited: bool = False) -> FloatArray:
         """Feature columns of a run, shape (n, k).

@@ -63,6 +63,11 @@ class Signal:
         return tuple(name for name, _ in self.parts)
 
     @property
+    def order(self) -> tuple[tuple[bool, int, int, float], ...]:
+        """Sort key among signals: by sensor, coil sensors by number."""
+        return tuple((*_sort_key(part), part[1]) for part in self.parts)
+
+    @property
     def text(self) -> str:
         """Text form, e.g. ``T_in-T_out``."""
         pieces = []

@@ -1,0 +1,172 @@
+"""Feature text: what it stands for, its canonical form, and errors that point at the place."""
+
+from __future__ import annotations
+
+import string
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.features.atoms import METHODS, OPERATORS, Atom, Window
+from fogml.features.features import Features
+from fogml.features.grammar import parse_terms
+from fogml.features.parse import parse_features
+from fogml.features.signal import Signal
+from fogml.features.terms import Term
+
+SENSORS = ["T", "T_in", "T_out", "T_chamber", "T_case", "T_electronics", "T1", "T2", "T12"]
+
+signals = st.dictionaries(
+    st.sampled_from(SENSORS),
+    st.sampled_from([1.0, -1.0, 0.5, -2.0, 1e-7, 3e20]) | st.floats(0.01, 100.0),
+    min_size=1,
+    max_size=3,
+).map(Signal.of)
+windows = st.builds(
+    Window, st.sampled_from(METHODS), st.sampled_from([64.0, 60.0, 0.5]) | st.floats(1e-3, 1e6)
+)
+atoms = st.builds(Atom, st.sampled_from(OPERATORS), signals, windows)
+terms = st.lists(st.tuples(atoms, st.integers(1, 4)), min_size=1, max_size=3).map(lambda f: Term(tuple(f)))
+features = st.lists(terms, min_size=1, max_size=4, unique=True).map(Features.from_terms)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("T, dT, T*dT", ["T", "dT", "T*dT"]),
+        ("T^1..5", ["T", "T^2", "T^3", "T^4", "T^5"]),
+        ("dT[slope, 60 s]", ["dT[slope, 60 s]"]),
+        ("dT[exp,2min]^1..2", ["dT[exp, 120 s]", "dT[exp, 120 s]^2"]),
+        ("dT^2[slope, 60 s]", ["dT[slope, 60 s]^2"]),
+        ("dT[block, 64 s], dT_in[block], d(T_out)[64 s]", ["dT", "dT_in", "dT_out"]),
+        ("dT[slope]", ["dT[slope, 64 s]"]),
+        ("d(T)[500 ms]", ["dT[block, 0.5 s]"]),
+        ("T_in-T_out", ["T_in-T_out"]),
+        ("-T_out + T_in", ["T_in-T_out"]),
+        ("T_in-T_out^1..2", ["T_in-T_out", "(T_in-T_out)^2"]),
+        ("(T_in-T_out)^1..2", ["T_in-T_out", "(T_in-T_out)^2"]),
+        ("dT*T_in-T_out", ["(T_in-T_out)*dT"]),
+        ("d(T_in-T_out)[exp, 120 s]", ["d(T_in-T_out)[exp, 120 s]"]),
+        ("diff(T), diff(T)[first]", ["diff(T)", "diff(T)[first]"]),
+        ("sign(dT)", ["sign(dT)"]),
+        ("sign(d(T1))", ["sign(dT1)"]),
+        ("sign(dT[slope, 60 s])*T", ["T*sign(dT[slope, 60 s])"]),
+        ("sign(dT)[slope, 60 s]", ["sign(dT[slope, 60 s])"]),
+        ("dT*T*T", ["T^2*dT"]),
+        ("T^1..2*dT^1..2", ["T*dT", "T*dT^2", "T^2*dT", "T^2*dT^2"]),
+        ("T1, T2^2, dT12", ["T1", "T2^2", "dT12"]),
+        ("0.5*T1+0.5*T3", ["0.5*T1+0.5*T3"]),
+        ("T*0.5*T1+0.5*T3", ["T*(0.5*T1+0.5*T3)"]),
+        ("2*T", ["2*T"]),
+        (" T ,\n\td ( T_in - T_out ) [ slope ,60s ] ^ 1 .. 2", None),
+    ],
+)
+def test_text_stands_for(text: str, names: list[str] | None) -> None:
+    wanted = names or ["T", "d(T_in-T_out)[slope, 60 s]", "d(T_in-T_out)[slope, 60 s]^2"]
+    assert parse_features(text).names() == wanted
+
+
+@settings(max_examples=200, deadline=None)
+@given(features)
+def test_the_text_of_features_parses_to_the_same_features(made: Features) -> None:
+    again = parse_features(made.text)
+    assert again == made
+    assert again.text == made.text
+    assert hash(again) == hash(made)
+    assert parse_features(", ".join(made.names())).names() == made.names()
+    assert parse_features(made.text.replace(" ", "")) == made
+
+
+@settings(max_examples=300, deadline=None)
+@given(
+    st.lists(
+        st.sampled_from(
+            [*"TdT1259^*,()[]+-. \n", "..", "T_in", "dT", "diff", "sign", "slope", "first", " s", "e"]
+        ),
+        max_size=14,
+    ).map("".join)
+    | st.text(string.printable, max_size=12)
+)
+def test_any_text_parses_or_is_refused_with_a_caret_within_it(text: str) -> None:
+    try:
+        terms = parse_terms(text)
+    except InputError as error:
+        _, shown, caret, *_ = str(error).split("\n")
+        assert caret.strip() == "^"
+        assert len(caret) <= len(shown) + 1 or not text.strip()
+    else:
+        assert parse_terms(", ".join(term.text for term in terms)) == terms
+
+
+@pytest.mark.parametrize(
+    ("text", "at", "message"),
+    [
+        ("T, q", 3, "unknown name 'q'"),
+        ("T, dT, T*dQ", 9, "unknown name 'dQ'"),
+        ("dTT", 1, "'TT' is not a temperature"),
+        ("T,, dT", 2, "found ','"),
+        ("T,", 2, "found the end"),
+        ("", 0, "found the end"),
+        ("dT[median, 64 s]", 3, "known methods: block, slope, exp, first"),
+        ("dT[slope, 60]", 12, "known units: s, ms, min, h"),
+        ("dT[slope, 60 day]", 13, "unit expected, found 'day'"),
+        ("dT[slope 60 s]", 9, "']' expected"),
+        ("dT[0 s]", 3, "more than 0"),
+        ("dT[first, 5 s]", 8, "takes no window"),
+        ("dT[slope, 60 s", 14, "']' expected to close the options, found the end"),
+        ("T[slope, 60 s]", 1, "takes no options"),
+        ("T^0", 2, "whole power from 1 to 20"),
+        ("T^2.5", 2, "whole power"),
+        ("T^21", 2, "whole power"),
+        ("T^5..2", 5, "backwards"),
+        ("dT-dT_in", 2, "d(T_in-T_out)"),
+        ("T-dT", 2, "d(T_in-T_out)"),
+        ("sign(T)", 5, "write sign(dT)"),
+        ("sign(diff(T))", 5, "write sign(dT)"),
+        ("diff T", 5, "'(' expected after diff"),
+        ("(T_in-T_out", 11, "')' expected"),
+        ("T dT", 2, "separated by commas"),
+        ("T, T_in, T", 9, "T is there twice"),
+        ("T^1..3, T*T", 8, "T^2 is there twice"),
+        ("T-T", 0, "they cancel"),
+        ("2T", 1, "'*' expected"),
+        ("T; dT", 1, "unexpected ';'"),
+    ],
+)
+def test_errors_point_at_the_place(text: str, at: int, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        parse_features(text)
+    lines = str(caught.value).split("\n")
+    assert message in str(caught.value)
+    assert lines[1] == f"  {text}"
+    assert lines[2] == "  " + " " * at + "^"
+
+
+def test_unknown_names_list_what_is_known() -> None:
+    with pytest.raises(
+        InputError, match=r"T_in, T_out.*T1, T2.*d\(x\).*sign\(dT\).*block, slope, exp, first"
+    ):
+        parse_features("temperature")
+
+
+def test_objects_refuse_what_text_cannot_say() -> None:
+    with pytest.raises(InputError, match="'humidity' is not a temperature"):
+        Signal.of("humidity")
+    with pytest.raises(InputError, match="cancel"):
+        Signal((("T", 1.0), ("T", -1.0)))
+    with pytest.raises(InputError, match="coefficient"):
+        Signal.of({"T": float("nan")})
+    with pytest.raises(InputError, match="no method 'median'"):
+        Window("median")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="positive number"):
+        Window("slope", -1.0)
+    with pytest.raises(InputError, match="no operator"):
+        Atom("dd", Signal.of("T"))  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="whole number from 1"):
+        Term(((Atom("value", Signal.of("T")), 0),))
+    with pytest.raises(InputError, match="no factor"):
+        Term(())
+    with pytest.raises(InputError, match="a text such as"):
+        Features(["T"])  # type: ignore[arg-type]
