@@ -1,0 +1,26 @@
+"""Where the table turns, and how noisy its recorded rate is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+LEAST_RATE_DEG_S = 1e-3
+"""Table rates below this count as zero [deg/s]."""
+
+
+def white_noise(values: FloatArray) -> float:
+    """Standard deviation of white noise on a series of plateaus, by the median of second differences."""
+    if len(values) < 4:
+        return 0.0
+    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / float(np.sqrt(6.0))
+
+
+def turning(run: Run) -> BoolArray:
+    """True where the table rate is not zero, shape (n,).
+
+    A measured rate counts as zero within six times its own noise.
+    """
+    least = max(LEAST_RATE_DEG_S, 6.0 * white_noise(run.rate))
+    return np.asarray(np.abs(run.rate) > least)
