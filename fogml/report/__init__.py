@@ -1,5 +1,19 @@
 """Figures, self-contained HTML pages, certificates and spreadsheets."""
 
+from fogml.report.certificate import certificate
+from fogml.report.compare_page import compare_page
+from fogml.report.index_page import index_page
+from fogml.report.inspect_page import inspect_page
+from fogml.report.noise_page import noise_page
+from fogml.report.spreadsheet import spreadsheet
 from fogml.report.train_page import train_page
 
-__all__ = ["train_page"]
+__all__ = [
+    "certificate",
+    "compare_page",
+    "index_page",
+    "inspect_page",
+    "noise_page",
+    "spreadsheet",
+    "train_page",
+]

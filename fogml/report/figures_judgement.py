@@ -69,26 +69,28 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
         figure,
         alt=(
             f"{judged.run} against time, {averages_of(judged)}: temperature from "
-            f"{number(float(np.nanmin(series.temperature)))} to {number(float(np.nanmax(series.temperature)))} °C; "
+            f"{number(float(np.min(series.temperature)))} to {number(float(np.max(series.temperature)))} °C; "
             f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
             f"what is left, over a range of {number(judged.after.range)} deg/h. Bands behind: {words}."
         ),
         caption=(
-            f"{averages_of(judged).capitalize()}. Top: temperature. Middle: drift before compensation, and the "
-            "model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and dashed the "
-            f"noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
+            f"{averages_of(judged).capitalize()}. Top: temperature. Middle: drift before compensation, and "
+            "the model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and "
+            f"dashed the noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
         ),
     )
 
 
 def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.intp]) -> go.Scatter:
     """The prediction interval as one closed outline per stretch, so that no gap is filled."""
-    sides_x, sides_y = [], []
+    sides_x: list[NDArray[np.float64]] = []
+    sides_y: list[NDArray[np.float64]] = []
+    pen_up = np.array([np.nan])
     for rows in np.split(np.arange(len(time)), gaps):
         points = max(DRAWN_POINTS * len(rows) // len(time), 4)
         lower, upper = (rows[min_max_indices(v[rows], points)] for v in (series.lower, series.upper))
-        sides_x += [time[lower], time[upper][::-1], [np.nan]]
-        sides_y += [series.lower[lower], series.upper[upper][::-1], [np.nan]]
+        sides_x += [time[lower], time[upper][::-1], pen_up]
+        sides_y += [series.lower[lower], series.upper[upper][::-1], pen_up]
     return go.Scatter(
         x=np.concatenate(sides_x),
         y=np.concatenate(sides_y),
@@ -161,11 +163,8 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
                 row=1,
                 col=column,
             )
-    model = series.before - series.after
-    kept = np.sort(min_max_indices(model))
-    x, y = drawn(series.time[kept], model[kept])
+    x, y = drawn(series.time, series.before - series.after)
     temperature = np.interp(x, series.time, series.temperature)
-    temperature[np.isnan(y)] = np.nan
     figure.add_trace(
         go.Scatter(x=temperature, y=y, mode="lines", name="model", line={"color": style.BLACK, "width": 1.8}),
         row=1,
@@ -184,9 +183,9 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
             f"range over {number(judged.before.range)} deg/h; after, over {number(judged.after.range)} deg/h."
         ),
         caption=(
-            f"{averages_of(judged).capitalize()}. Where warming and cooling part, the drift depends on more than "
-            "the temperature, and no curve in T alone can follow it. Dashed on the right: the noise floor of "
-            f"± {number(judged.floor)} deg/h."
+            f"{averages_of(judged).capitalize()}. Where warming and cooling part, drift depends on more "
+            "than the temperature, and no curve in T alone can follow it. Dashed on the right: the noise "
+            f"floor of ± {number(judged.floor)} deg/h."
         ),
     )
 
@@ -202,7 +201,7 @@ def direction_of(series: AveragedSeries) -> NDArray[np.int8]:
 def rms_by_regime(judged: RunJudgement) -> Drawing:
     """Rms of the averages in each regime, before and after, with the floor."""
     series = judged.series
-    names = [name for name in in_order(series.regime.tolist())]
+    names = in_order(series.regime.tolist())
     groups = [("whole run", np.ones(len(series.time), dtype=np.bool_))]
     groups += [(regime_word(name), series.regime == name) for name in names]
     rows = []
@@ -239,8 +238,9 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
             + f". Noise floor {number(floor)} deg/h."
         ),
         caption=(
-            f"Rms of the {averages_of(judged)} about the reference, by regime (share of the run in brackets), "
-            f"and the noise floor of {number(floor)} deg/h. Most is left in: {worst[0]}, {number(worst[2])} deg/h."
+            f"Rms of the {averages_of(judged)} about the reference, by regime (with its share of the run), "
+            f"and the noise floor of {number(floor)} deg/h. "
+            f"Most is left in: {worst[0]}, {number(worst[2])} deg/h."
         ),
         half=True,
     )

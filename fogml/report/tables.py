@@ -40,6 +40,11 @@ class Noticed:
     place: str
 
 
+def reference_of(judged: RunJudgement) -> str:
+    """What biases are relative to, in words."""
+    return "known Earth rate" if judged.bias_reference == "earth rate" else "the training runs' mean"
+
+
 def metrics_table(judged: RunJudgement) -> Table:
     """Every figure that the run tells, before and after, with the floor beside."""
     rows = []
@@ -50,7 +55,6 @@ def metrics_table(judged: RunJudgement) -> Table:
         floor = number(judged.floor) if field.name in ("bias_stability", "rms") else ""
         cells = (label(field.name), number(before), number(after), floor, unit_of(field.name))
         rows.append(Row(cells))
-    about = "known Earth rate" if judged.bias_reference == "earth rate" else "the training runs' mean"
     return Table(
         columns=(
             ("Figure", "", "text"),
@@ -60,7 +64,10 @@ def metrics_table(judged: RunJudgement) -> Table:
             ("Unit", "", "text"),
         ),
         rows=tuple(rows),
-        caption=f"{judged.averaging_s:g} s averages where not said otherwise; bias relative to {about}.",
+        caption=(
+            f"{judged.averaging_s:g} s averages where not said otherwise; "
+            f"bias relative to {reference_of(judged)}."
+        ),
     )
 
 

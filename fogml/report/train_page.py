@@ -109,8 +109,8 @@ def _left_out(judged: RunJudgement) -> str:
         return ""
     share = judged.rows_left_out / (judged.rows_used + judged.rows_left_out)
     return (
-        f"{plural(judged.rows_left_out, 'sample')} ({percent(share)}) left out: the features' windows were not "
-        "full there, or the turntable was changing its rate."
+        f"{plural(judged.rows_left_out, 'sample')} ({percent(share)}) left out: the features' windows were "
+        "not full there, or the turntable was changing its rate."
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from fogml.report.tables import reference_of
 from fogml.report.words import label, listed, number, percent, plural, stated, unit_of
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
@@ -79,9 +80,8 @@ def _bias(worst: RunJudgement) -> list[str]:
     """The bias is worth a sentence where it makes up most of what is left."""
     if abs(worst.after.bias) <= worst.after.bias_stability or worst.after.rms <= worst.floor:
         return []
-    about = "known Earth rate" if worst.bias_reference == "earth rate" else "the training runs' mean"
     return [
-        f"Its mean is off by {number(worst.after.bias)} deg/h from {about}; with that, "
+        f"Its mean is off by {number(worst.after.bias)} deg/h from {reference_of(worst)}; with that, "
         f"the rms is {number(worst.after.rms)} deg/h."
     ]
 

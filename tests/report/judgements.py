@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -25,7 +26,7 @@ def programme(n: int, start_deg_c: float, stop_deg_c: float) -> tuple[np.ndarray
     temperature, regime = np.empty(n), np.empty(n, dtype="<U10")
     ends = (start_deg_c, start_deg_c, stop_deg_c, stop_deg_c, start_deg_c, start_deg_c)
     names = ("start_up", "ramp_up", "soak", "ramp_down", "soak")
-    for part, name, (a, b) in zip(parts, names, zip(ends, ends[1:])):
+    for part, name, (a, b) in zip(parts, names, pairwise(ends), strict=True):
         temperature[part] = np.linspace(a, b, len(part))
         regime[part] = name
     rate = np.gradient(temperature) / (AVERAGING_S / 60.0)

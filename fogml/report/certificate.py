@@ -1,0 +1,144 @@
+"""The certificate: one A4 page per unit with its limits, met or not, to be signed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import date as Date
+
+import numpy as np
+from markupsafe import Markup
+
+from fogml.report import style
+from fogml.report.page import render
+from fogml.report.reduce import drawn, time_in_words
+from fogml.report.static_svg import Curve, line_figure
+from fogml.report.tables import Table, reference_of, runs_table
+from fogml.report.verdict import model_card, stated_limits, worst_run
+from fogml.report.words import listed, number, unit_of
+from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
+
+_POINTS = 700
+_NOT_STATED = "not stated"
+_MOST_RUNS = 8
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What one certificate shows."""
+
+    unit: str
+    axis: str
+    met: bool
+    limits: list[LimitOutcome]
+    about: list[tuple[str, str]]
+    runs: Table
+    more_runs: int
+    figure: Markup
+    figure_words: str
+    notes: list[str]
+
+
+def certificate(judgements: Judgement | Sequence[Judgement], date: Date | str | None = None) -> str:
+    """The certificates of one or several judgements as one HTML page, one A4 sheet per unit.
+
+    Parameters
+    ----------
+    judgements
+        Judgements with a design index or limits.
+    date
+        Date of issue; where not given, a line to write it on.
+    """
+    judgements = [judgements] if isinstance(judgements, Judgement) else list(judgements)
+    sheets = [_sheet(part) for judgement in judgements for part in by_unit(judgement)]
+    return render(
+        "certificate.html",
+        title=f"Certificate – {listed([sheet.unit for sheet in sheets])}",
+        sheets=sheets,
+        date=date.isoformat() if isinstance(date, Date) else date or "",
+        unit_of=unit_of,
+    )
+
+
+def by_unit(judgement: Judgement) -> list[Judgement]:
+    """The judgement cut by the unit and axis of its test runs, limits looked at for each apart."""
+    groups: dict[tuple[str | None, str | None], list[RunJudgement]] = {}
+    for run in judgement.test:
+        groups.setdefault((run.unit, run.axis), []).append(run)
+    if len(groups) == 1:
+        return [judgement]
+    parts = []
+    for runs in groups.values():
+        index = judgement.design_index
+        parts.append(
+            replace(
+                judgement,
+                test=tuple(runs),
+                design_index=_again("rms", index, runs) if index else None,
+                limits=tuple(
+                    outcome
+                    for outcome in (_again(limit.quantity, limit, runs) for limit in judgement.limits)
+                    if outcome is not None
+                ),
+            )
+        )
+    return parts
+
+
+def _again(quantity: str, stated: LimitOutcome, runs: Sequence[RunJudgement]) -> LimitOutcome | None:
+    """A limit looked at for some runs only; None where none of them tells the quantity."""
+    told = [getattr(run.after, quantity) for run in runs]
+    values = [abs(value) for value in told if value is not None]
+    if not values:
+        return None
+    return replace(stated, value=max(values), met=max(values) <= stated.limit)
+
+
+def _sheet(judgement: Judgement) -> Sheet:
+    worst = worst_run(judgement.test)
+    shown = sorted(judgement.test, key=lambda run: -run.after.rms)[:_MOST_RUNS]
+    figure, words = _figure(worst)
+    card = dict(model_card(judgement.model))
+    about = [
+        ("Unit", worst.unit or _NOT_STATED),
+        ("Axis", worst.axis or _NOT_STATED),
+        ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
+        ("Size", ", ".join(card_line(card))),
+        ("Trained on", listed([run.run for run in judgement.train], 6)),
+        ("Averages", f"{worst.averaging_s:g} s"),
+        ("Bias relative to", reference_of(worst)),
+    ]
+    return Sheet(
+        unit=worst.unit or _NOT_STATED,
+        axis=worst.axis or _NOT_STATED,
+        met=judgement.met,
+        limits=stated_limits(judgement),
+        about=about,
+        runs=runs_table(shown),
+        more_runs=len(judgement.test) - len(shown),
+        figure=figure,
+        figure_words=words,
+        notes=[str(note) for note in judgement.notes][:3],
+    )
+
+
+def card_line(card: dict[str, str]) -> list[str]:
+    """Parameters and weights in words, as far as the model tells them."""
+    line = [f"{card['parameters']} parameters"] if "parameters" in card else []
+    return line + ([f"{card['weights']} of weights"] if "weights" in card else [])
+
+
+def _figure(worst: RunJudgement) -> tuple[Markup, str]:
+    series = worst.series
+    per_unit, unit = time_in_words(float(np.ptp(series.time)))
+    time = series.time / per_unit
+    curves = []
+    for values, colour, dash in ((series.before, style.BEFORE, "4 2.5"), (series.after, style.AFTER, "")):
+        x, y = drawn(time, values, points=_POINTS)
+        curves.append(Curve(x, y, colour, dash))
+    words = (
+        f"{worst.run}, {worst.averaging_s:g} s averages: "
+        f"before (dashed), rms {number(worst.before.rms)} deg/h, "
+        f"and after (solid), rms {number(worst.after.rms)} deg/h. Noise floor {number(worst.floor)} deg/h."
+    )
+    return line_figure(curves, f"time [{unit}]", "drift [deg/h]", words), words

@@ -1,0 +1,154 @@
+"""The page of ``fogml compare``: every model on the same split, the best first."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+from fogml.report.figures_compare import BASELINES, residuals_in_time, rms_bars
+from fogml.report.page import render
+from fogml.report.tables import Row, Table
+from fogml.report.verdict import stated_limits, worst_run
+from fogml.report.words import MISSING, listed, number, percent
+from fogml.validation.results import Judgement
+
+CHOOSER = "auto"
+"""The model that chooses among the others on the training runs alone."""
+_WITHIN = 1.02
+"""Models whose rms differs by less than this are as good as each other on one test run."""
+
+
+def compare_page(judgements: Mapping[str, Judgement], failed: Mapping[str, str] | None = None) -> str:
+    """The self-contained HTML page of a comparison.
+
+    Parameters
+    ----------
+    judgements
+        By model name, all on the same runs; at least one.
+    failed
+        Model name to the reason why it could not be fitted or judged.
+    """
+    order = ranked(judgements)
+    first = judgements[order[0]]
+    best = [name for name in order if name not in BASELINES] or order
+    shown = list(dict.fromkeys([*best[:3], *(n for n in (CHOOSER, "mean") if n in judgements)]))[:4]
+    runs = ", ".join(run.run for run in first.test)
+    return render(
+        "compare.html",
+        title=f"{runs} – models compared",
+        name=runs,
+        verdict=_verdict(judgements, order),
+        chosen=_chosen(judgements),
+        test_runs=[run.run for run in first.test],
+        train_runs=[run.run for run in first.train],
+        averaging_s=first.test[0].averaging_s,
+        table=_table(judgements, order),
+        runs_table=_runs_table(judgements, order) if len(first.test) > 1 else None,
+        bars=rms_bars(judgements, order),
+        residuals=residuals_in_time(judgements, shown, worst_run(first.test).run),
+        failed=dict(failed or {}),
+        notes=list(dict.fromkeys(first.notes)),
+    )
+
+
+def ranked(judgements: Mapping[str, Judgement]) -> list[str]:
+    """Model names by the rms after on their worst test run, the smallest first."""
+
+    def rms(name: str) -> float:
+        value = worst_run(judgements[name].test).after.rms
+        return value if math.isfinite(value) else math.inf
+
+    return sorted(judgements, key=rms)
+
+
+def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]:
+    best = worst_run(judgements[order[0]].test)
+    sentences = [
+        f"{order[0]} leaves least: rms {number(best.after.rms)} deg/h of {number(best.before.rms)} deg/h on "
+        f"{best.run} ({best.averaging_s:g} s averages); the noise floor is {number(best.floor)} deg/h."
+    ]
+    close = [
+        name for name in order[1:] if worst_run(judgements[name].test).after.rms <= _WITHIN * best.after.rms
+    ]
+    if close:
+        sentences.append(f"Within 2 % of it: {listed(close, 6)}.")
+    if "mean" in judgements:
+        least = worst_run(judgements["mean"].test).after.rms
+        harm = [n for n in order if n not in BASELINES and worst_run(judgements[n].test).after.rms > least]
+        if harm:
+            sentences.append(f"Worse than no drift model (mean): {listed(harm, 6)}.")
+    return sentences
+
+
+def _chosen(judgements: Mapping[str, Judgement]) -> str:
+    if CHOOSER not in judgements:
+        return ""
+    auto = judgements[CHOOSER]
+    model = auto.model
+    chosen = str(model.get("chosen") or model.get("kind"))
+    features = ", ".join(str(name) for name in model.get("features") or ()) or "no features"
+    place = ranked(judgements).index(CHOOSER) + 1
+    return (
+        f"auto chose {chosen} ({features}) by folds of the training runs alone; on the test runs it comes "
+        f"in place {place} of {len(judgements)}."
+    )
+
+
+def _table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
+    with_limits = any(stated_limits(judgement) for judgement in judgements.values())
+    rows = []
+    for name in order:
+        judgement = judgements[name]
+        worst = worst_run(judgement.test)
+        model = judgement.model
+        cells = [
+            name,
+            number(worst.after.rms),
+            number(worst.after.rms / worst.floor if worst.floor > 0 else math.inf),
+            number(worst.after.bias),
+            number(worst.after.bias_stability),
+            number(worst.after.range),
+            percent(worst.outside_training),
+            MISSING if model.get("parameters") is None else str(model["parameters"]),
+            MISSING if model.get("bytes") is None else str(model["bytes"]),
+        ]
+        if with_limits:
+            cells.append("✓ met" if judgement.met else "✗ not met")
+        mark = "chosen" if name == CHOOSER else "baseline" if name in BASELINES else ""
+        rows.append(Row(tuple(cells), mark))
+    worst = worst_run(judgements[order[0]].test)
+    columns = [
+        ("Model", "", "text"),
+        ("Rms", "deg/h", "figure"),
+        ("Rms over floor", "", "figure"),
+        ("Bias", "deg/h", "figure"),
+        ("Bias stability", "deg/h", "figure"),
+        ("Range", "deg/h", "figure"),
+        ("Outside training", "", "figure"),
+        ("Parameters", "", "figure"),
+        ("Weights", "byte", "figure"),
+    ]
+    if with_limits:
+        columns.append(("Limits", "", "text"))
+    several = (
+        ", the worst test run of each model" if len(judgements[order[0]].test) > 1 else f" on {worst.run}"
+    )
+    return Table(
+        tuple(columns),
+        tuple(rows),
+        f"What is left{several}, {worst.averaging_s:g} s averages. Noise floor {number(worst.floor)} deg/h.",
+    )
+
+
+def _runs_table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
+    runs = judgements[order[0]].test
+    rows = [Row(("noise floor", *(number(run.floor) for run in runs)), "baseline")]
+    for name in order:
+        by_run = {run.run: run.after.rms for run in judgements[name].test}
+        cells = (name, *(number(by_run.get(run.run)) for run in runs))
+        rows.append(Row(cells, "chosen" if name == CHOOSER else ""))
+    return Table(
+        (("Model", "", "text"), *((run.run, "deg/h", "figure") for run in runs)),
+        tuple(rows),
+        f"Rms after on each test run, {runs[0].averaging_s:g} s averages.",
+    )

@@ -1,0 +1,152 @@
+"""Allan deviation with its intervals, the terms as slopes, and the minimum."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+
+from fogml.report import style
+from fogml.report.page import Drawing
+from fogml.report.words import number
+
+FloatArray = NDArray[np.float64]
+TERM_WORDS = {
+    "Q": "quantisation",
+    "N": "angle random walk",
+    "B": "bias instability",
+    "K": "rate random walk",
+    "R": "rate ramp",
+}
+_FLICKER_FLOOR = float(np.sqrt(2 * np.log(2) / np.pi))
+_URAD_IN_DEG_H_S = 180.0 / np.pi * 1e-6 * 3600.0
+
+
+def term_deviation(name: str, coefficient: float, taus_s: FloatArray) -> FloatArray:
+    """Allan deviation [deg/h] of one IEEE 952 term alone at averaging times [s].
+
+    Parameters
+    ----------
+    name
+        Q, N, B, K or R.
+    coefficient
+        In urad, deg/sqrt(h), deg/h, deg/h/sqrt(h) and deg/h/h.
+    taus_s
+        Shape (m,).
+    """
+    hours = taus_s / 3600.0
+    if name == "Q":
+        return np.sqrt(3.0) * coefficient * _URAD_IN_DEG_H_S / taus_s
+    if name == "N":
+        return coefficient / np.sqrt(hours)
+    if name == "B":
+        return np.full_like(taus_s, _FLICKER_FLOOR * coefficient)
+    if name == "K":
+        return coefficient * np.sqrt(hours / 3.0)
+    return coefficient * hours / np.sqrt(2.0)
+
+
+def allan_plot(noise: Mapping[str, Any]) -> Drawing:
+    """Log-log Allan deviation of a ``noise.json``, with terms that the data support."""
+    taus = np.asarray(noise["taus_s"], dtype=np.float64)
+    adev = np.asarray(noise["adev"], dtype=np.float64)
+    figure = go.Figure()
+    intervals = np.asarray(noise["ci"], dtype=np.float64) if len(noise.get("ci", ())) == len(taus) else None
+    if intervals is not None and len(taus):
+        figure.add_trace(
+            go.Scatter(
+                x=np.concatenate([taus, taus[::-1]]),
+                y=np.concatenate([intervals[:, 1], intervals[::-1, 0]]),
+                fill="toself",
+                mode="lines",
+                line={"width": 0, "color": style.BLUE},
+                fillcolor="rgba(0, 114, 178, 0.20)",
+                name=f"{100 * float(noise.get('level', 0.9)):.0f} % interval",
+                hoverinfo="skip",
+            )
+        )
+    shown = _term_lines(figure, noise, taus, adev)
+    figure.add_trace(
+        go.Scatter(
+            x=taus,
+            y=adev,
+            mode="lines+markers",
+            name="Allan deviation",
+            line={"color": style.BLUE, "width": 2},
+            marker={"size": 5},
+        )
+    )
+    minimum = noise.get("minimum") or {}
+    if minimum.get("adev"):
+        figure.add_trace(
+            go.Scatter(
+                x=[minimum["tau_s"]],
+                y=[minimum["adev"]],
+                mode="markers",
+                name="minimum",
+                marker={
+                    "symbol": "star",
+                    "size": 14,
+                    "color": style.YELLOW,
+                    "line": {"width": 1, "color": style.BLACK},
+                },
+            )
+        )
+    figure.update_xaxes(title_text="averaging time τ [s]", type="log", exponentformat="power")
+    figure.update_yaxes(title_text="Allan deviation [deg/h]", type="log", exponentformat="power")
+    _whole_span(figure, adev, intervals)
+    style.styled(figure, 560)
+    first, last = (f"{number(adev[i])} deg/h at {number(taus[i])} s" for i in (0, -1))
+    lowest = (
+        f", with its minimum of {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s"
+        if minimum.get("adev")
+        else ""
+    )
+    return Drawing(
+        figure,
+        alt=f"Allan deviation against averaging time, both logarithmic: from {first} to {last}{lowest}.",
+        caption="Lines without markers: each term alone, at the value in the table. " + shown,
+    )
+
+
+def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, adev: FloatArray) -> str:
+    """Draw the terms; say which are drawn."""
+    drawn = []
+    for index, (name, words) in enumerate(TERM_WORDS.items()):
+        term = noise.get("terms", {}).get(name) or {}
+        value = term.get("value")
+        if not value or (term.get("ci") or [1.0])[0] == 0:
+            continue
+        alone = term_deviation(name, float(value), taus)
+        # Only where it matters: a line far below the curve would squeeze the axis.
+        near = alone > 0.2 * adev
+        if not near.any():
+            continue
+        drawn.append(name)
+        line = {
+            "color": style.SERIES[(index + 1) % 7],
+            "dash": ("dot", "dash", "longdash", "dashdot", "longdashdot")[index],
+            "width": 1.6,
+        }
+        figure.add_trace(
+            go.Scatter(x=taus[near], y=alone[near], mode="lines", name=f"{name} {words}", line=line)
+        )
+    if not drawn:
+        return "The data support none."
+    return "Terms that the data do not support are not drawn." if len(drawn) < len(TERM_WORDS) else ""
+
+
+def _whole_span(figure: go.Figure, adev: FloatArray, intervals: FloatArray | None) -> None:
+    """Limit the axis to the curve and its intervals, where a decade apart at most."""
+    positive = adev[adev > 0]
+    if positive.size == 0:
+        return
+    low, high = positive.min(), positive.max()
+    if intervals is not None:
+        lower = intervals[:, 0][intervals[:, 0] > 0]
+        low = max(min(low, lower.min(initial=low)), low / 10.0)
+        high = min(max(high, float(np.nanmax(intervals[:, 1]))), high * 10.0)
+    figure.update_yaxes(range=[float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.1])

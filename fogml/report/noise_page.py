@@ -1,0 +1,145 @@
+"""The page of ``fogml noise``: Allan deviation and noise terms of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from fogml.report.figures_noise import TERM_WORDS, allan_plot
+from fogml.report.page import Tile, render
+from fogml.report.tables import Row, Table, noticed
+from fogml.report.words import MISSING, duration, number
+
+_UNITS = {
+    "urad": "µrad",
+    "deg/sqrt(h)": "deg/√h",
+    "deg/h": "deg/h",
+    "deg/h/sqrt(h)": "deg/h/√h",
+    "deg/h/h": "deg/h/h",
+}
+
+
+def noise_page(noise: Mapping[str, Any]) -> str:
+    """The self-contained HTML page of a ``noise.json``.
+
+    Parameters
+    ----------
+    noise
+        Schema ``fogml.noise/1``. Beside its keys these are shown where they are there: ``run``,
+        ``span_s``, ``sample_s``, ``overlapping``, ``level``, ``findings``, ``notes``,
+        ``serial_number`` and ``axis``, and per term ``fitted``.
+    """
+    name = str(noise.get("run", "run"))
+    return render(
+        "noise.html",
+        title=f"{name} – noise",
+        name=name,
+        noise=noise,
+        verdict=_verdict(noise),
+        tiles=_tiles(noise),
+        allan=allan_plot(noise),
+        terms=_terms(noise),
+        table=_deviations(noise),
+        findings=noticed(noise.get("findings", ())),
+        notes=list(noise.get("notes", ())),
+        about=_about(noise),
+    )
+
+
+def _verdict(noise: Mapping[str, Any]) -> str:
+    parts = []
+    white = noise["terms"].get("N", {})
+    if white.get("value"):
+        parts.append(f"an angle random walk of {number(white['value'])} {_unit(white)}")
+    minimum = noise.get("minimum") or {}
+    if minimum.get("adev"):
+        parts.append(
+            f"a lowest Allan deviation of {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s"
+        )
+    if not parts:
+        return "The data support no noise term."
+    return f"{noise.get('run', 'The run')} shows {' and '.join(parts)}."
+
+
+def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
+    tiles = []
+    for key in ("N", "B", "K"):
+        term = noise["terms"].get(key) or {}
+        if term.get("value"):
+            tiles.append(
+                Tile(TERM_WORDS[key].capitalize(), number(term["value"]), _unit(term), _interval(term))
+            )
+    minimum = noise.get("minimum") or {}
+    if minimum.get("adev"):
+        tiles.append(
+            Tile(
+                "Minimum",
+                number(minimum["adev"]),
+                "deg/h",
+                f"at {duration(minimum['tau_s'])}; B = minimum / 0.664",
+            )
+        )
+    return tiles
+
+
+def _terms(noise: Mapping[str, Any]) -> Table:
+    rows = []
+    for key, words in TERM_WORDS.items():
+        term = noise["terms"].get(key) or {}
+        value, interval = term.get("value"), term.get("ci") or [None, None]
+        if value is None:
+            told = "not seen" if interval[1] is None else f"no more than {number(interval[1])}"
+        else:
+            told = "seen" if interval[0] else "not told from zero"
+        rows.append(Row((f"{key}, {words}", number(value), _interval(term), _unit(term), told)))
+    level = 100 * float(noise.get("level", 0.9))
+    return Table(
+        columns=(
+            ("Term", "", "text"),
+            ("Value", "", "figure"),
+            (f"{level:.0f} % interval", "", "figure"),
+            ("Unit", "", "text"),
+            ("In the data", "", "text"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def _deviations(noise: Mapping[str, Any]) -> Table:
+    intervals = noise.get("ci") or [[None, None]] * len(noise["taus_s"])
+    return Table(
+        columns=(
+            ("τ", "s", "figure"),
+            ("Allan deviation", "deg/h", "figure"),
+            ("Interval", "deg/h", "figure"),
+        ),
+        rows=tuple(
+            Row((number(tau, 4), number(value), f"{number(low)} … {number(high)}"))
+            for tau, value, (low, high) in zip(noise["taus_s"], noise["adev"], intervals, strict=True)
+        ),
+    )
+
+
+def _about(noise: Mapping[str, Any]) -> list[tuple[str, str]]:
+    rows = [
+        ("estimator", "overlapping" if noise.get("overlapping", True) else "not overlapping"),
+    ]
+    for key, words in (("serial_number", "unit"), ("axis", "axis")):
+        if noise.get(key):
+            rows.append((words, str(noise[key])))
+    for key, words in (("span_s", "span"), ("sample_s", "sample interval")):
+        if noise.get(key):
+            rows.append((words, duration(float(noise[key]))))
+    return rows
+
+
+def _unit(term: Mapping[str, Any]) -> str:
+    unit = str(term.get("unit", ""))
+    return _UNITS.get(unit, unit)
+
+
+def _interval(term: Mapping[str, Any]) -> str:
+    interval = term.get("ci")
+    if not interval or interval[0] is None:
+        return MISSING
+    return f"{number(interval[0])} … {number(interval[1])}"

@@ -1,0 +1,233 @@
+"""``report.xlsx``: a judgement as sheets that anyone can go on calculating with."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fogml.outputs import whole_file
+from fogml.report.tables import coefficients_of, noticed
+from fogml.report.verdict import model_card, stated_limits, subject, verdict
+from fogml.report.words import label, unit_of
+from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudgement
+
+if TYPE_CHECKING:
+    from xlsxwriter.worksheet import Worksheet
+
+_LONGEST_NAME = 31
+_MOST_ROWS = 1_048_575
+_FORBIDDEN = str.maketrans(dict.fromkeys("[]:*?/\\'", "_"))
+_SERIES = (
+    ("time", "time [s]"),
+    ("temperature", "T [degC]"),
+    ("rate", "dT [degC/min]"),
+    ("before", "before [deg/h]"),
+    ("drift", "drift [deg/h]"),
+    ("after", "after [deg/h]"),
+    ("lower", "lower 90 % [deg/h]"),
+    ("upper", "upper 90 % [deg/h]"),
+    ("regime", "regime"),
+    ("flag", "flag"),
+)
+
+
+def spreadsheet(judgement: Judgement, path: str | Path) -> None:
+    """Write a judgement as an Excel workbook that appears whole or not at all.
+
+    Sheets: the summary, figures per run, averaged series per run, coefficients where the model
+    tells them, findings and notes.
+
+    Parameters
+    ----------
+    judgement
+        As :func:`fogml.validation.judge.judge` gives it.
+    path
+        The file, ending in ``.xlsx``.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or can't be written.
+    """
+    import xlsxwriter
+
+    with whole_file(path) as partial:
+        # Names of runs come from files: no text may turn into a formula or a link.
+        options = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
+        with xlsxwriter.Workbook(str(partial), options) as workbook:
+            writer = _Writer(workbook)
+            _summary(writer, judgement)
+            _figures(writer, judgement)
+            if coefficients_of(judgement.model):
+                _coefficients(writer, judgement)
+            _findings(writer, judgement)
+            for kind, runs in (("test", judgement.test), ("train", judgement.train)):
+                for index, run in enumerate(runs, start=1):
+                    _averages(writer, f"{kind} {index} {run.run}", run)
+
+
+class _Writer:
+    """Sheets with a bold header, frozen, and cells by type."""
+
+    def __init__(self, workbook: Any) -> None:
+        self.workbook = workbook
+        self.bold = workbook.add_format({"bold": True, "text_wrap": True, "valign": "top"})
+        self.title = workbook.add_format({"bold": True, "font_size": 14})
+        self.wrapped = workbook.add_format({"text_wrap": True, "valign": "top"})
+        self._names: set[str] = set()
+
+    def sheet(self, name: str) -> Worksheet:
+        """A new sheet, its name made fit for Excel and unlike the others."""
+        fit = name.translate(_FORBIDDEN)[:_LONGEST_NAME].strip() or "sheet"
+        number = 1
+        while fit.lower() in self._names:
+            number += 1
+            fit = f"{fit[: _LONGEST_NAME - 4].rstrip()} ({number})"
+        self._names.add(fit.lower())
+        return self.workbook.add_worksheet(fit)
+
+    def table(
+        self, sheet: Worksheet, heads: Sequence[str], rows: Sequence[Sequence[Any]], top: int = 0
+    ) -> int:
+        """Write a table from row ``top`` on; the row after it."""
+        for column, head in enumerate(heads):
+            sheet.write_string(top, column, head, self.bold)
+        for offset, row in enumerate(rows, start=1):
+            for column, value in enumerate(row):
+                self.cell(sheet, top + offset, column, value)
+        return top + len(rows) + 1
+
+    def cell(self, sheet: Worksheet, row: int, column: int, value: Any) -> None:
+        """A number, a text, or nothing where the value is missing or not finite."""
+        if value is None:
+            return
+        if isinstance(value, bool | str):
+            sheet.write_string(row, column, "yes" if value is True else "no" if value is False else value)
+        elif math.isfinite(value):
+            sheet.write_number(row, column, float(value))
+
+
+def _summary(writer: _Writer, judgement: Judgement) -> None:
+    sheet = writer.sheet("Summary")
+    sheet.set_column(0, 0, 30)
+    sheet.set_column(1, 6, 16)
+    sheet.write_string(0, 0, subject(judgement), writer.title)
+    row = 1
+    for sentence in verdict(judgement):
+        sheet.merge_range(row, 0, row, 6, "", writer.wrapped)
+        sheet.write_string(row, 0, sentence, writer.wrapped)
+        sheet.set_row(row, 32)
+        row += 1
+    heads = ["test run", "averaging [s]", "rms before [deg/h]", "rms after [deg/h]"]
+    heads += ["bias stability after [deg/h]", "noise floor [deg/h]", "outside training"]
+    rows = [
+        (
+            run.run,
+            run.averaging_s,
+            run.before.rms,
+            run.after.rms,
+            run.after.bias_stability,
+            run.floor,
+            run.outside_training,
+        )
+        for run in judgement.test
+    ]
+    row = writer.table(sheet, heads, rows, row + 1) + 1
+    outcomes = stated_limits(judgement)
+    if outcomes:
+        limits = [(label(o.quantity), o.limit, o.value, unit_of(o.quantity), o.met) for o in outcomes]
+        row = writer.table(sheet, ("limit on", "limit", "reached", "unit", "met"), limits, row) + 1
+    writer.table(sheet, ("model", ""), model_card(judgement.model), row)
+
+
+def _figures(writer: _Writer, judgement: Judgement) -> None:
+    sheet = writer.sheet("Figures")
+    rows: list[tuple[Any, ...]] = []
+    for part, runs in (("test", judgement.test), ("train", judgement.train)):
+        for run in runs:
+            for when, metrics in (("before", run.before), ("after", run.after)):
+                values = (getattr(metrics, field.name) for field in fields(Metrics))
+                about = (
+                    run.floor,
+                    run.outside_training,
+                    run.rows_used,
+                    run.rows_left_out,
+                    run.bias_reference,
+                )
+                rows.append((run.run, part, when, run.unit, run.axis, run.averaging_s, *values, *about))
+    heads = ["run", "part", "when", "unit", "axis", "averaging [s]"]
+    heads += [f"{label(field.name).lower()} [{unit_of(field.name)}]" for field in fields(Metrics)]
+    heads += [
+        "noise floor [deg/h]",
+        "outside training",
+        "samples used",
+        "samples left out",
+        "bias relative to",
+    ]
+    writer.table(sheet, heads, rows)
+    sheet.set_column(0, 0, 26)
+    sheet.set_column(1, len(heads), 13)
+    sheet.freeze_panes(1, 1)
+
+
+def _coefficients(writer: _Writer, judgement: Judgement) -> None:
+    sheet = writer.sheet("Coefficients")
+    heads = ("term", "coefficient [deg/h per unit of the term]", "standard error")
+    writer.table(sheet, heads, coefficients_of(judgement.model))
+    sheet.set_column(0, 2, 22)
+    sheet.freeze_panes(1, 0)
+
+
+def _findings(writer: _Writer, judgement: Judgement) -> None:
+    sheet = writer.sheet("Findings and notes")
+    rows = []
+    for run in (*judgement.train, *judgement.test):
+        rows += [(run.run, told.code, told.message, told.place) for told in noticed(run.findings)]
+        rows += [(run.run, "note", note, "") for note in run.notes]
+    rows += [("", "note", str(note), "") for note in (*judgement.notes, *judgement.model.get("notes", ()))]
+    writer.table(sheet, ("run", "code", "message", "place"), rows)
+    sheet.set_column(0, 1, 22)
+    sheet.set_column(2, 2, 100)
+    sheet.set_column(3, 3, 28)
+    sheet.freeze_panes(1, 0)
+
+
+def _averages(writer: _Writer, name: str, run: RunJudgement) -> None:
+    sheet = writer.sheet(name)
+    count = min(len(run.series.time), _MOST_ROWS)
+    for column, (key, head) in enumerate(_SERIES):
+        sheet.write_string(0, column, head, writer.bold)
+        values = getattr(run.series, key)[:count].tolist()
+        if all(
+            isinstance(value, int) or (isinstance(value, float) and math.isfinite(value)) for value in values
+        ):
+            sheet.write_column(1, column, values)
+        else:
+            for row, value in enumerate(values, start=1):
+                writer.cell(sheet, row, column, value)
+    sheet.set_column(0, len(_SERIES) - 1, 13)
+    sheet.freeze_panes(1, 1)
+    _chart(writer, sheet, run.series, count)
+
+
+def _chart(writer: _Writer, sheet: Worksheet, series: AveragedSeries, count: int) -> None:
+    """Before and after against time, beside the columns that they are drawn from."""
+    chart = writer.workbook.add_chart({"type": "scatter", "subtype": "straight"})
+    keys = [key for key, _ in _SERIES]
+    for key, colour, dash in (("before", "#3B4048", "dash"), ("after", "#009E73", "solid")):
+        chart.add_series(
+            {
+                "name": [sheet.get_name(), 0, keys.index(key)],
+                "categories": [sheet.get_name(), 1, 0, count, 0],
+                "values": [sheet.get_name(), 1, keys.index(key), count, keys.index(key)],
+                "line": {"color": colour, "width": 1.25, "dash_type": dash},
+            }
+        )
+    chart.set_x_axis({"name": "time [s]", "min": float(series.time[0]), "label_position": "low"})
+    chart.set_y_axis({"name": "drift [deg/h]"})
+    chart.set_legend({"position": "bottom"})
+    chart.set_size({"width": 720, "height": 360})
+    sheet.insert_chart(1, len(_SERIES) + 1, chart)
