@@ -1,0 +1,135 @@
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts, ScaleFactor
+from fogml.runs.noise_of_run import noise_report
+from fogml.runs.run import Run
+from fogml.runs.shipped import shipped_run
+
+
+def still_run(seed: int = 1, n: int = 20_000, **columns: np.ndarray) -> Run:
+    """White noise of N = 0.01 deg/sqrt(h) at 10 Hz, on Earth rate."""
+    rng = np.random.default_rng(seed)
+    gyro = 9.0 + 0.6 / np.sqrt(0.1) * rng.normal(size=n)
+    return Run.from_columns("still", time=0.1 * np.arange(n), **{"gyro": gyro, **columns})
+
+
+def at(report: dict, tau_s: float) -> float:
+    return report["adev"][report["taus_s"].index(tau_s)]
+
+
+def test_ring_laser_figures():
+    run = shipped_run("ring-laser-z")
+    overlapping = noise_report(run)
+    found = [at(overlapping, tau) for tau in (1.0, 10.0, 60.0)]
+    assert found == pytest.approx([8.71, 1.49, 0.40], abs=0.005)
+    stepped = noise_report(run, overlapping=False)
+    found = [at(stepped, tau) for tau in (1.0, 10.0, 60.0)]
+    assert found == pytest.approx([7.25, 1.53, 0.28], abs=0.006)
+    # The terms come from the same windows either way.
+    assert stepped["terms"] == overlapping["terms"]
+
+
+def test_ring_laser_sees_the_earth_turn():
+    seen = [noise_report(shipped_run(f"ring-laser-{axis}"))["mean"] for axis in "xyz"]
+    assert np.linalg.norm(seen) == pytest.approx(14.85, abs=0.01)
+
+
+def test_report_is_json_with_the_documented_keys():
+    report = noise_report(still_run())
+    again = json.loads(json.dumps(report, allow_nan=False))
+    assert again["schema"] == "fogml.noise/1"
+    assert again["unit"] == "deg/h"
+    assert {"taus_s", "adev", "ci", "terms", "minimum"} <= set(again)
+    assert len(again["taus_s"]) == len(again["adev"]) == len(again["ci"])
+    assert all(low <= adev <= high for adev, (low, high) in zip(again["adev"], again["ci"]))
+    assert list(again["terms"]) == ["Q", "N", "B", "K", "R"]
+    assert [again["terms"][name]["unit"] for name in "NBKQR"] == [
+        "deg/sqrt(h)",
+        "deg/h",
+        "deg/h/sqrt(h)",
+        "urad",
+        "deg/h/h",
+    ]
+    assert set(again["minimum"]) == {"adev", "tau_s"}
+    low, high = again["terms"]["N"]["ci"]
+    assert 0.0095 < low < again["terms"]["N"]["value"] < high < 0.0105
+
+
+def test_gaps_are_not_joined_and_lost_samples_do_not_stretch_time():
+    run = still_run(n=30_000)
+    # Offsets that a difference across a gap would see.
+    part = np.repeat([0.0, 300.0, -200.0], 10_000)
+    gapped = run.with_columns(gyro=run.gyro + part, time=run.time + np.repeat([0.0, 50.0, 400.0], 10_000))
+    report = noise_report(gapped)
+    assert report["stretches"] == 3
+    assert report["terms"]["N"]["value"] == pytest.approx(0.01, rel=0.05)
+    assert at(report, 10.0) == pytest.approx(at(noise_report(run), 10.0), rel=0.2)
+
+
+@pytest.mark.parametrize("column", ["T", "T_in", "T4", "T_case"])
+def test_moving_temperature_takes_k_and_r_away(column: str):
+    moving = still_run(**{column: np.linspace(20.0, 21.0, 20_000)})
+    report = noise_report(moving)
+    for name in ("K", "R"):
+        assert report["terms"][name]["value"] is None
+        assert report["terms"][name]["ci"] == [None, None]
+        assert "temperature" in report["terms"][name]["reason"]
+    assert [warning["code"] for warning in report["warnings"]] == ["moving_temperature"]
+    assert column in report["warnings"][0]["message"]
+    assert report["terms"]["N"]["value"] is not None
+
+
+def test_steady_temperature_leaves_them():
+    rng = np.random.default_rng(2)
+    steady = 20.0 + np.round(rng.normal(size=20_000)) / 2
+    chamber = 20.0 + np.sin(0.01 * np.arange(20_000))
+    report = noise_report(still_run(T=steady, T_chamber=chamber))
+    assert report["warnings"] == []
+    assert report["terms"]["K"]["ci"][0] == 0.0
+    assert report["terms"]["K"]["ci"][1] > 0.0
+
+
+def test_only_rows_at_rest_count_where_the_table_turns():
+    rate = np.zeros(20_000)
+    rate[8000:12_000] = 10.0
+    turning = still_run(rate=rate)
+    turning = turning.with_columns(gyro=turning.gyro + 36_000.0 * 1.01 * rate / 10.0)
+    report = noise_report(turning)
+    assert [warning["code"] for warning in report["warnings"]] == ["turning"]
+    assert report["stretches"] == 2
+    assert report["terms"]["N"]["value"] == pytest.approx(0.01, rel=0.05)
+    assert "all through" in noise_report(still_run(rate=np.full(20_000, 10.0)))["warnings"][0]["message"]
+
+
+def test_uneven_samples_are_told():
+    rng = np.random.default_rng(3)
+    run = still_run()
+    uneven = run.with_columns(time=run.time + 0.04 * rng.uniform(size=len(run)))
+    assert [warning["code"] for warning in noise_report(uneven)["warnings"]] == ["irregular_sampling"]
+
+
+def test_asked_times_and_counts():
+    run = still_run()
+    asked = noise_report(run, taus=[1.0, 7.0])
+    assert asked["taus_s"] == [1.0, 7.0]
+    assert asked["terms"] == noise_report(run)["terms"]
+    counts = Run(
+        "counts",
+        {"time": run.time, "gyro": 50.0 * run.gyro},
+        Facts(scale_factor=ScaleFactor(value=50.0)),
+        gyro_unit="count",
+    )
+    assert at(noise_report(counts), 1.0) == pytest.approx(at(noise_report(run), 1.0), rel=1e-12)
+
+
+def test_too_short():
+    with pytest.raises(InputError, match="short: too short"):
+        noise_report(Run.from_columns("short", time=[0.0, 1.0], gyro=[1.0, 2.0]))
+    with pytest.raises(InputError, match="still: Allan deviation: no averaging time"):
+        noise_report(still_run(n=500), taus=[1e6])
