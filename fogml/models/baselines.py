@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.models.base import DriftModel, Evaluation
-from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.out_of_fold import interval_averaging_s, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count, usable_rows
 from fogml.runs.run import BoolArray, FloatArray, Run
@@ -23,6 +23,7 @@ class _ConstantModel(DriftModel):
     def fit(self, runs: Run | Sequence[Run]) -> Self:
         """Fit to training runs."""
         group = checked_runs(runs)
+        hashes = hash_ahead(group)
         rows = []
         for run in group:
             used, notes = usable_rows(run, np.ones(len(run), dtype=bool))
@@ -30,7 +31,9 @@ class _ConstantModel(DriftModel):
             rows.append(RunRows(np.empty((len(y), 0)), y, run.time[used], notes))
         count = row_count(rows)
         self.bias_ = self._bias(np.concatenate([part.y for part in rows]))
-        self.card_ = training_card(group, rows=count, notes=[note for part in rows for note in part.notes])
+        self.card_ = training_card(
+            group, hashes=hashes, rows=count, notes=[note for part in rows for note in part.notes]
+        )
         averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
         table = averaged_table(rows, lambda atoms: atoms, averaging_s)
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -90,21 +91,31 @@ class TrainingCard:
 def training_card(
     runs: Sequence[Run],
     *,
+    hashes: Callable[[], list[str]],
     rows: int,
     box: Mapping[str, tuple[float, float]] | None = None,
     notes: Sequence[str] = (),
 ) -> TrainingCard:
-    """The card of a model fitted to `runs`, which `checked_runs` has passed."""
-    from concurrent.futures import ThreadPoolExecutor
+    """The card of a model fitted to `runs`, which `checked_runs` has passed.
 
-    # SHA-256 leaves the interpreter free, so runs are hashed side by side.
-    with ThreadPoolExecutor(max_workers=min(8, len(runs))) as pool:
-        hashes = list(pool.map(lambda run: run.hash, runs))
+    Parameters
+    ----------
+    runs
+        The training runs.
+    hashes
+        What `hash_ahead` gave for them.
+    rows
+        Training rows used.
+    box
+        Atoms' names to [low, high] in the training rows.
+    notes
+        What a user of the model should know.
+    """
     return TrainingCard(
         unit=_common(run.facts.unit for run in runs),
         axis=_common(run.facts.axis for run in runs),
         gyro_unit=runs[0].gyro_unit,
-        runs=tuple(TrainingRun(run.name, digest) for run, digest in zip(runs, hashes, strict=True)),
+        runs=tuple(TrainingRun(run.name, digest) for run, digest in zip(runs, hashes(), strict=True)),
         fogml_version=fogml.__version__,
         sample_s=runs[0].sample_s,
         earth_known=runs[0].earth_known,
@@ -112,6 +123,17 @@ def training_card(
         box=dict(box or {}),
         notes=tuple(notes),
     )
+
+
+def hash_ahead(runs: Sequence[Run]) -> Callable[[], list[str]]:
+    """Begin to hash runs beside other work; what is returned waits for the hashes.
+
+    SHA-256 leaves the interpreter free, so it costs a fit next to nothing.
+    """
+    pool = ThreadPoolExecutor(max_workers=min(4, len(runs)))
+    pending = [pool.submit(lambda run=run: run.hash) for run in runs]
+    pool.shutdown(wait=False)
+    return lambda: [hash_of.result() for hash_of in pending]
 
 
 def checked_runs(runs: Run | Sequence[Run]) -> tuple[Run, ...]:

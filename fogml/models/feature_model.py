@@ -15,7 +15,7 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
-from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
@@ -23,10 +23,19 @@ from fogml.models.regressors import (
     fit_regressor,
     parameter_count,
     predict_rows,
+    refit,
     regressor_from_saved,
     regressor_to_saved,
 )
-from fogml.models.table import RunRows, averaged_table, recorded_s, row_count, run_rows, table_of_rows
+from fogml.models.table import (
+    RunRows,
+    TrainingTable,
+    averaged_table,
+    recorded_s,
+    row_count,
+    run_rows,
+    table_of_rows,
+)
 from fogml.models.tall_least_squares import Part
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import BoolArray, FloatArray, Run
@@ -83,6 +92,7 @@ class FeatureModel(DriftModel):
             If the runs don't belong together, lack a temperature, or are too short.
         """
         group = checked_runs(runs)
+        hashes = hash_ahead(group)
         features = resolve_features(self.features, group)
         rows = [run_rows(run, features) for run in group]
         count = row_count(rows)
@@ -94,17 +104,28 @@ class FeatureModel(DriftModel):
         else:
             table = table_of_rows(rows, features.compose, self.max_rows)
             count = len(table)
-            self.regressor_ = fit_regressor(regressor, table)
-        notes = [note for part in rows for note in part.notes]
-        self.card_ = training_card(group, rows=count, box=features.box, notes=notes)
+            self.regressor_ = self._fit_regressor(regressor, table)
+        notes = [*(note for part in rows for note in part.notes), *self._fit_notes()]
+        self.card_ = training_card(group, hashes=hashes, rows=count, box=features.box, notes=notes)
         averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
         table = averaged_table(rows, features.compose, averaging_s)
-        self.intervals_ = regressor_intervals(self.regressor_, table, guard_s=features.window_s)
+        self.intervals_ = regressor_intervals(self._refitted, table, guard_s=features.window_s)
         return self
 
     def _make_regressor(self, width: int) -> Any:
         """An unfitted regressor for `width` columns."""
         return LinearRegressor() if self.regressor is None else clone(self.regressor)
+
+    def _fit_regressor(self, regressor: Any, table: TrainingTable) -> Any:
+        return fit_regressor(regressor, table)
+
+    def _refitted(self, table: TrainingTable) -> Any:
+        """The regressor fitted to other rows, what was tuned being kept."""
+        return refit(self.regressor_, table)
+
+    def _fit_notes(self) -> list[str]:
+        """What the regressor tells of its fit, for the card."""
+        return list(getattr(self.regressor_, "notes_", ()))
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""

@@ -28,11 +28,11 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
-from fogml.models.card import TrainingCard, checked_runs, training_card
+from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
-from fogml.models.table import RunRows, averaged_table, recorded_s, row_count
+from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.tall_least_squares import Part
 from fogml.runs.run import BoolArray, FloatArray, Run
 
@@ -90,6 +90,7 @@ class JointModel(DriftModel):
                 "joint: the training runs' outputs are partly in counts and partly in deg/h, "
                 "and the model works on the output as recorded; give runs of one kind"
             )
+        hashes = hash_ahead(group)
         self.gradient_ = all(_has_gradient(run) for run in group)
         notes = (
             [] if self.gradient_ else ["no T_out in every training run: the column T_in-T_out is left out"]
@@ -103,10 +104,12 @@ class JointModel(DriftModel):
         parts = [self._part(part) for part in rows]
         self.regressor_ = LinearRegressor(fit_intercept=not self.patent).fit_parts(parts)
         notes += [note for part in rows for note in part.notes]
-        self.card_ = training_card(group, rows=row_count(rows), box=self.features_.box, notes=notes)
+        self.card_ = training_card(
+            group, hashes=hashes, rows=row_count(rows), box=self.features_.box, notes=notes
+        )
         averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
         table = averaged_table(rows, self._columns, averaging_s)
-        self.intervals_ = regressor_intervals(self.regressor_, table, guard_s=self.features_.window_s)
+        self.intervals_ = regressor_intervals(self._refitted, table, guard_s=self.features_.window_s)
         return self
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
@@ -200,6 +203,9 @@ class JointModel(DriftModel):
             notes = [f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out"]
         y = 3600.0 * run.rate if self.patent else run.reference_deg_h
         return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], tuple(notes))
+
+    def _refitted(self, table: TrainingTable) -> LinearRegressor:
+        return self.regressor_.refitted(table.X, table.y)
 
     def _part(self, rows: RunRows) -> Part:
         return Part(rows.y, lambda piece: self._columns(rows.atoms[piece]), dealt_folds(len(rows.y)))

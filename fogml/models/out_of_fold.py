@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.intervals import Intervals, intervals_from_residuals
-from fogml.models.regressors import predict_rows, refit
+from fogml.models.regressors import predict_rows
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 
@@ -56,10 +56,12 @@ def out_of_fold_intervals(
     return intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)
 
 
-def regressor_intervals(regressor: Any, table: TrainingTable, guard_s: float) -> Intervals:
-    """Intervals of a fitted regressor, refitted to the folds of an averaged table."""
+def regressor_intervals(
+    refitted: Callable[[TrainingTable], Any], table: TrainingTable, guard_s: float
+) -> Intervals:
+    """Intervals of a regressor that `refitted` fits to the folds of an averaged table."""
 
     def predicted(fitted: TrainingTable, held: TrainingTable) -> FloatArray:
-        return predict_rows(refit(regressor, fitted), held.X)
+        return predict_rows(refitted(fitted), held.X)
 
     return out_of_fold_intervals(table, predicted, guard_s)

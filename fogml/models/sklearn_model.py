@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import inspect
+import warnings
 from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, ClassVar
 
 from numpy.typing import NDArray
-from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
@@ -17,8 +18,9 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard
 from fogml.models.feature_model import FeatureModel
+from fogml.models.table import TrainingTable
 
-MAX_ROWS = 1500
+MAX_ROWS = 800
 """Averages that training runs are brought down to: kernel methods take time in its cube."""
 
 
@@ -78,6 +80,29 @@ class SklearnModel(FeatureModel):
             options["kernel"] = _drift_kernel(width)
         scaled = make_pipeline(StandardScaler(), kind(**options))
         return TransformedTargetRegressor(scaled, transformer=StandardScaler())
+
+    def _fit_regressor(self, regressor: Any, table: TrainingTable) -> Any:
+        from sklearn.exceptions import ConvergenceWarning
+
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always", ConvergenceWarning)
+            fitted = regressor.fit(table.X, table.y)
+        told = {str(warning.message).strip().split("\n")[0] for warning in caught}
+        self._convergence = [f"{self.name}: {message}" for message in sorted(told)]
+        return fitted
+
+    def _fit_notes(self) -> list[str]:
+        return self._convergence
+
+    def _refitted(self, table: TrainingTable) -> Any:
+        held = clone(self.regressor_)
+        fitted, unfitted = self.regressor_.regressor_[-1], held.regressor[-1]
+        if hasattr(fitted, "kernel_") and "optimizer" in unfitted.get_params():
+            # A Gaussian process keeps the kernel that it was tuned to.
+            unfitted.set_params(kernel=fitted.kernel_, optimizer=None)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return held.fit(table.X, table.y)
 
     def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """The fitted model as JSON-ready values and arrays."""

@@ -103,9 +103,20 @@ def run_rows(run: Run, features: Features) -> RunRows:
     """
     atoms, full = features.atom_values(run)
     used, notes = usable_rows(run, full)
-    if used.all():
-        return RunRows(atoms, run.error_deg_h, run.time, notes)
-    return RunRows(atoms[used], run.error_deg_h[used], run.time[used], notes)
+    first, stop = _ends(used)
+    if used[first:stop].all():
+        # All rows but some at the ends: views will do.
+        rows: slice | BoolArray = slice(first, stop)
+    else:
+        rows = used
+    return RunRows(atoms[rows], run.error_deg_h[rows], run.time[rows], notes)
+
+
+def _ends(used: BoolArray) -> tuple[int, int]:
+    """First used row, and one past the last; (0, 0) if there is none."""
+    if not used.any():
+        return 0, 0
+    return int(np.argmax(used)), len(used) - int(np.argmax(used[::-1]))
 
 
 def usable_rows(run: Run, full: BoolArray) -> tuple[BoolArray, tuple[str, ...]]:

@@ -87,6 +87,12 @@ class Condensed:
 
 def condense(parts: Sequence[Part], n_folds: int) -> Condensed:
     """Bring the rows of all parts down to one small factor for each fold."""
+    # Threads within BLAS only slow matrices this narrow; rows are shared among threads instead.
+    with one_blas_thread():
+        return _condense(parts, n_folds)
+
+
+def _condense(parts: Sequence[Part], n_folds: int) -> Condensed:
     n_rows = sum(len(part.target) for part in parts)
     counts = np.sum([np.bincount(part.folds, minlength=n_folds) for part in parts], axis=0)
     sample_x, sample_y = _sample(parts, n_rows)
@@ -147,14 +153,15 @@ def _by_products(
 ) -> list[FloatArray] | None:
     """Factors from products in the sample's basis, or None where that would lose digits."""
     sample = frame.rows(sample_x, sample_y)
-    triangle = _triangle(sample)[:-1, :-1]
+    whole = _triangle(sample)
+    triangle, image = whole[:-1, :-1], whole[:-1, -1]
     if triangle.shape[0] < triangle.shape[1] or np.linalg.cond(triangle) > _LARGEST_SAMPLE_CONDITION:
         return None
     root = np.sqrt(len(sample))
     triangle = triangle / root
     # y enters as what the sample's solution leaves of it, so that a close fit cancels nothing.
-    guess = np.linalg.lstsq(sample[:, :-1], sample[:, -1], rcond=None)[0]
     inverse = np.linalg.inv(triangle)
+    guess = inverse @ image / root
     n_x = len(frame.shift)
     # One product takes raw columns to the basis and to the residual: x @ to_basis + offset.
     to_basis = np.column_stack((inverse[1:], -guess[1:])) / frame.scale[:, None]
@@ -201,7 +208,7 @@ def _run_streams(parts: Sequence[Part], stream: Callable[[list[tuple[Part, slice
         return [stream(pieces)]
     edges = np.linspace(0, len(pieces), _STREAMS + 1).astype(int).tolist()
     shares = [pieces[start:stop] for start, stop in pairwise(edges)]
-    with one_blas_thread(), ThreadPoolExecutor(max_workers=min(_STREAMS, available_cores())) as pool:
+    with ThreadPoolExecutor(max_workers=min(_STREAMS, available_cores())) as pool:
         return list(pool.map(stream, shares))
 
 

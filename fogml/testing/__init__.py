@@ -8,7 +8,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-_HOMES = {"check_feature": "fogml.testing.features"}
+_HOMES = {"check_feature": "fogml.testing.features", "check_model": "fogml.testing.models"}
 
 __all__ = list(_HOMES)
 
