@@ -1,0 +1,184 @@
+"""Changes of the table's rate: where they are, how long they take, which samples they spoil."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.turning import LEAST_RATE_DEG_S, white_noise
+
+IndexArray = NDArray[np.intp]
+
+MARGIN_BEYOND_S = 2.5
+"""The margin is this much longer than the time to rate, which the source bounds by 5 s."""
+LEAST_GYRO_STEP_DEG_S = 0.1
+"""Steps of the gyro smaller than this are not taken for turns of a table [deg/s]."""
+LONGEST_TRANSITION_S = 60.0
+"""A rate that changes for longer is a profile of its own, not a transition [s]."""
+_LAG_S = 1.0
+_PLATEAU_S = 3.0
+_RATE_NOISES, _GYRO_NOISES = 8.0, 20.0
+_SETTLED_SHARE = 0.02
+
+
+@dataclass(frozen=True)
+class _Changes:
+    """Changes of a series of plateaus, k of them: rows [start, stop] over which it changes."""
+
+    start: IndexArray
+    stop: IndexArray
+
+
+def find_transitions(run: Run) -> IndexArray:
+    """Rows at which a change of the table's rate begins, shape (k,), ascending.
+
+    Found from the column ``rate``, a measured one too, else from steps of the gyro itself of at
+    least 0.1 deg/s and twenty times its noise. A rate that changes for over a minute without a
+    pause is no transition.
+    """
+    return _changes(run).start
+
+
+def time_to_rate_s(run: Run) -> float:
+    """The longest time the table takes to reach its rate [s]; 0 if it never changes.
+
+    Where the recorded rate steps at once it is a command, and the gyro tells the time: until it
+    stays within 2 % of the step, or its own noise, about the new plateau.
+    """
+    changes = _changes(run)
+    if len(changes.start) == 0:
+        return 0.0
+    longest = float((run.time[changes.stop] - run.time[changes.start]).max())
+    return max(longest, _gyro_settling_s(run, changes))
+
+
+def transition_mask(run: Run, margin_s: float | None = None) -> BoolArray:
+    """True for the samples to be cut about each change of the table's rate, shape (n,).
+
+    Parameters
+    ----------
+    run
+        The run.
+    margin_s
+        Samples within this time of a change are cut [s]; by default m = t_z + 2.5 s with t_z the
+        table's time to rate, within the source's bounds t_z < m < t_z + 5 s.
+
+    Raises
+    ------
+    InputError
+        If the margin is negative.
+
+    Notes
+    -----
+    Patent CN105333888A: +-m seconds about each change are deleted. The two samples between which
+    the change begins are always cut, so that slow sampling cuts too.
+    """
+    if margin_s is not None and not margin_s >= 0.0:
+        raise InputError(
+            f"the margin about a change of the table's rate must not be negative, got {margin_s:g} s"
+        )
+    starts = _changes(run).start
+    if margin_s is None:
+        margin_s = time_to_rate_s(run) + MARGIN_BEYOND_S
+    time = run.time
+    first = np.searchsorted(time, time[starts] - margin_s)
+    last = np.searchsorted(time, time[starts] + margin_s, side="right")
+    edges = np.zeros(len(run) + 1, dtype=np.int64)
+    np.add.at(edges, np.minimum(first, np.maximum(starts - 1, 0)), 1)
+    np.add.at(edges, last, -1)
+    return np.asarray(np.cumsum(edges[:-1]) > 0)
+
+
+def _changes(run: Run) -> _Changes:
+    """The changes of the table's rate, found once for a run."""
+    known: _Changes | None = run.__dict__.get("_transitions")
+    if known is None:
+        known = _find(run)
+        run.__dict__["_transitions"] = known
+    return known
+
+
+def _find(run: Run) -> _Changes:
+    if len(run) < 3:
+        return _Changes(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))
+    if "rate" in run.columns:
+        least = max(LEAST_RATE_DEG_S, _RATE_NOISES * white_noise(run.rate))
+        return _level_changes(run, run.rate, least)
+    gyro = _gyro_deg_s(run)
+    if gyro is None:
+        return _Changes(np.empty(0, dtype=np.intp), np.empty(0, dtype=np.intp))
+    least = max(LEAST_GYRO_STEP_DEG_S, _GYRO_NOISES * _spread(gyro))
+    return _lasting(run, gyro, _level_changes(run, gyro, least), least)
+
+
+def _gyro_deg_s(run: Run) -> FloatArray | None:
+    """The gyro as a rate [deg/s]; None for counts without a scale factor."""
+    if run.gyro_unit == "count" and run.facts.scale_factor is None:
+        return None
+    return run.gyro_deg_h / 3600.0
+
+
+def _spread(values: FloatArray) -> float:
+    """Noise of one sample, that of a coarsely quantised output too, whatever its few great steps."""
+    # 80 % of the differences of white noise are smaller than 1.28 sqrt(2) standard deviations.
+    return float(np.quantile(np.abs(np.diff(values)), 0.8)) / 1.8124
+
+
+def _level_changes(run: Run, values: FloatArray, least: float) -> _Changes:
+    """Where a series moves by more than `least` within a second, single outliers left out."""
+    lag = max(1, round(_LAG_S / run.sample_s))
+    lag = min(lag, len(values) - 1)
+    clean = _median_of_three(values)
+    moved = np.abs(clean[lag:] - clean[:-lag]) > least
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], moved, [False]]).astype(np.int8)))
+    # Row i + lag differs from row i: the first such row begins the change, and a lag after the
+    # last one has ended it.
+    start, stop = edges[::2] + lag, edges[1::2]
+    stop = np.maximum(np.minimum(stop, len(values) - 1), start)
+    brief = run.time[stop] - run.time[start] <= max(LONGEST_TRANSITION_S, 3.0 * run.sample_s)
+    return _Changes(start[brief], stop[brief])
+
+
+def _lasting(run: Run, values: FloatArray, changes: _Changes, least: float) -> _Changes:
+    """The changes that leave the series at another level, as no knock and no burst of noise does."""
+    reach = max(3, round(_PLATEAU_S / run.sample_s))
+    sums = np.concatenate([[0.0], np.cumsum(values - values[0])])
+
+    def mean(first: IndexArray, end: IndexArray) -> FloatArray:
+        return np.asarray((sums[end] - sums[first]) / np.maximum(end - first, 1))
+
+    before = mean(np.maximum(changes.start - reach, 0), changes.start)
+    after = mean(changes.stop, np.minimum(changes.stop + reach, len(values)))
+    lasting = np.abs(after - before) > least
+    return _Changes(changes.start[lasting], changes.stop[lasting])
+
+
+def _median_of_three(values: FloatArray) -> FloatArray:
+    left, middle, right = values[:-2], values[1:-1], values[2:]
+    inner = np.maximum(np.minimum(left, middle), np.minimum(np.maximum(left, middle), right))
+    return np.concatenate([values[:1], inner, values[-1:]])
+
+
+def _gyro_settling_s(run: Run, changes: _Changes) -> float:
+    """The longest time the gyro takes to settle on its new plateau after a change [s]."""
+    clean = _median_of_three(run.gyro)
+    noise = white_noise(clean)
+    edges = np.concatenate([[0], changes.start, [len(run)]])
+    longest = 0.0
+    for before, start, stop in zip(edges[:-2], edges[1:-1], edges[2:]):
+        limit = np.searchsorted(run.time, run.time[start] + LONGEST_TRANSITION_S)
+        plateau = clean[start : min(int(stop), int(limit))]
+        if len(plateau) < 4:
+            continue
+        old = float(np.median(clean[before:start][-len(plateau) :]))
+        new = float(np.median(plateau[len(plateau) // 2 :]))
+        away = np.abs(plateau - new) > max(_SETTLED_SHARE * abs(new - old), 6.0 * noise)
+        # A plateau that does not hold still in its second half tells no settling time.
+        if abs(new - old) > 12.0 * noise and away.any() and not away[len(plateau) // 2 :].any():
+            last = start + int(np.flatnonzero(away)[-1])
+            longest = max(longest, float(run.time[last] - run.time[start]))
+    return longest
