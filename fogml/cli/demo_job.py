@@ -77,7 +77,7 @@ def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: T
         rows.append([axis, *(number(value) for value in figures), model])
     averaging = judgements[AXES[0]].test[0].averaging_s
     terminal.table(
-        f"Chamber cycle of a MEMS unit, trained going up, judged going down ({averaging:.3g} s averages, deg/h)",
+        f"A MEMS unit, trained going up, judged going down ({averaging:.3g} s averages, deg/h)",
         ["axis", "rms before", "after", "bias stability before", "after", "noise floor", "features chosen"],
         rows,
     )

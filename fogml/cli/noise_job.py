@@ -11,7 +11,8 @@ from fogml.cli.settings import Settings, absolute
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
-from fogml.validation.noise import noise_json
+from fogml.runs.noise_of_run import noise_report
+from fogml.validation.report_json import finite_json
 
 
 class NoiseSettings(Settings):
@@ -55,7 +56,7 @@ def _noise(path: str, settings: NoiseSettings, terminal: Terminal) -> dict[str, 
     with terminal.work(f"reading {path}") as work:
         run = open_run(path, repair=settings.repair)
         work.doing("averaging")
-        return noise_json(run, overlapping=settings.overlapping)
+        return finite_json(noise_report(run, overlapping=settings.overlapping))
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
 
 from fogml import __version__
 from fogml.errors import InputError
+from fogml.runs.facts import read_yaml
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
@@ -86,17 +87,11 @@ def read_config(path: Path) -> dict[str, Any]:
         If the file is missing or holds no mapping.
     """
     try:
-        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+        values = read_yaml(path)
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; --config takes a YAML file") from None
     except IsADirectoryError:
         raise InputError(f"{path}: is a folder; --config takes a YAML file") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path.name}: not readable as text; --config takes a YAML file") from None
-    except yaml.YAMLError as error:
-        mark = getattr(error, "problem_mark", None)
-        where = f", line {mark.line + 1}" if mark is not None else ""
-        raise InputError(f"{path.name}{where}: not readable as YAML; correct it") from None
     if values is None:
         return {}
     if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from fogml.errors import InputError
 from fogml.models.base import NOT_FULL, OUTSIDE
 from fogml.models.table import usable_rows
 from fogml.runs.findings import Finding
+from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.validation.floors import floor_of_run
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 DEFAULT_AVERAGING_S = 100.0
+_NOISE = "_validation_noise"
 
 
 def judge(
@@ -178,9 +180,22 @@ def _judge_run(
         rows_left_out=int((~used).sum()),
         bias_reference="earth rate" if earth_known else "training mean",
         series=_series(errors, metrics, before, after),
+        noise=_noise(run),
         findings=findings,
         notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes),
     )
+
+
+def _noise(run: Run) -> dict[str, Any] | None:
+    """Allan terms and raw minimum of a run, found once for it."""
+    if _NOISE not in run.__dict__:
+        try:
+            report = noise_report(run)
+        except InputError:
+            report = None
+        run.__dict__[_NOISE] = report and {name: report[name] for name in ("terms", "minimum")}
+    found: dict[str, Any] | None = run.__dict__[_NOISE]
+    return found
 
 
 def _series(errors: _Errors, metrics: RunMetrics, before: FloatArray, after: FloatArray) -> AveragedSeries:

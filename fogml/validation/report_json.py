@@ -64,6 +64,7 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "bias_reference": judged.bias_reference,
         "serial_number": judged.unit,
         "axis": judged.axis,
+        "noise": judged.noise,
         "findings": [finding.as_dict() for finding in judged.findings],
         "notes": list(judged.notes),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,7 +57,11 @@ class AveragedSeries:
 
 @dataclass(frozen=True)
 class RunJudgement:
-    """One model on one run. ``floor`` is the noise at ``averaging_s`` [deg/h]."""
+    """One model on one run.
+
+    ``floor`` is the noise at ``averaging_s`` [deg/h]; ``noise`` the run's own Allan terms with their
+    intervals and the raw minimum, as in ``noise.json``, None where the run is too short for them.
+    """
 
     run: str
     unit: str | None
@@ -70,6 +75,7 @@ class RunJudgement:
     rows_left_out: int
     bias_reference: str  # "earth rate" or "training mean"
     series: AveragedSeries
+    noise: Mapping[str, Any] | None = None
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
 

@@ -49,7 +49,7 @@ def test_a_file_without_keys_is_an_error(tmp_path, text):
 
 def test_a_file_that_is_no_yaml_names_its_line(tmp_path):
     with pytest.raises(InputError, match=r"settings.yaml, line 2"):
-        TrainSettings.gather(config(tmp_path, "model: M1\nfeatures: [T\n"), {})
+        TrainSettings.gather(config(tmp_path, "model: M1\nfeatures: T: dT\n"), {})
 
 
 def test_a_binary_file_as_configuration_is_an_error(tmp_path):

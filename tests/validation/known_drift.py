@@ -22,7 +22,8 @@ class KnownDrift(DriftModel):
         self.kind = "known"
 
     def fit(self, runs):
-        self.card_ = training_card(checked_runs(runs), rows=1)
+        group = checked_runs(runs)
+        self.card_ = training_card(group, hashes=lambda: [run.hash for run in group], rows=1)
         self.intervals_ = intervals_from_residuals(np.full(100, self.half_width), 100.0, "none")
         return self
 

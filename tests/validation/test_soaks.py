@@ -28,9 +28,9 @@ def stepped_run(levels, ramp_deg_min: float = 1.0, soak_s: int = 7200) -> Run:
 
 
 def test_sensitivity_by_hand():
-    # m is 20 degC; 23 degC is closer than 5 degC to it and left out.
-    found = soaks((-40, "down"), (20, "up"), (23, "up"), (60, "up"))
-    assert temperature_sensitivity(found, [1.0, 4.0, 100.0, 5.0]) == pytest.approx(3.0 / 60.0)
+    # m is 24 degC; 27 degC is closer than 5 degC to it and left out.
+    found = soaks((-40, "down"), (24, "up"), (27, "up"), (60, "up"))
+    assert temperature_sensitivity(found, [1.0, 4.0, 100.0, 5.0]) == pytest.approx(3.0 / 64.0)
 
 
 def test_sensitivity_needs_two_soaks_far_enough_apart():

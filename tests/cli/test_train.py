@@ -1,0 +1,177 @@
+"""``fogml train``: what it writes, what it prints, how it ends."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+QUICK = ("--model", "polynomial", "--features", "T, dT")
+
+
+def test_writes_everything_and_prints_a_table(invoke, run_files, tmp_path):
+    train, test = run_files
+    out = tmp_path / "out"
+    result = invoke("train", train, "--test", test, *QUICK, "-o", out)
+    written = {path.name for path in out.iterdir()}
+    assert written == {"model", "report.json", "report.html", "report.xlsx", "config.yaml"}
+    assert "b.csv after" in result.stdout
+    assert "report.html" in result.stdout
+    report = json.loads((out / "report.json").read_text())
+    (judged,) = report["test"]
+    # The drift is linear in T and dT; what is left is the noise: 0.05 / sqrt(50).
+    assert judged["after"]["bias_stability"] < 0.02 < 0.3 < judged["before"]["bias_stability"]
+    assert judged["floor"] == pytest.approx(0.05 / 50**0.5, rel=0.5)
+    assert [run["run"] for run in report["train"]] == ["a.csv"]
+
+
+def test_json_is_the_result_alone(invoke, run_files, tmp_path):
+    train, test = run_files
+    result = invoke("train", train, "--test", test, *QUICK, "-o", tmp_path / "out", "--json")
+    assert json.loads(result.stdout) == json.loads((tmp_path / "out" / "report.json").read_text())
+
+
+def test_quiet_prints_nothing(invoke, run_files, tmp_path):
+    train, test = run_files
+    result = invoke("train", train, "--test", test, *QUICK, "-o", tmp_path / "out", "--quiet")
+    assert (result.stdout, result.stderr) == ("", "")
+
+
+def test_an_unmet_design_index_is_status_1_and_everything_is_written(invoke, run_files, tmp_path):
+    train, test = run_files
+    out = tmp_path / "out"
+    arguments = ("train", train, "--test", test, *QUICK, "-o", out)
+    result = invoke(*arguments, "--design-index", "0.0001", status=1)
+    assert "NOT met" in result.stdout
+    assert (out / "certificate.html").exists()
+    report = json.loads((out / "report.json").read_text())
+    assert report["design_index"]["met"] is False
+    invoke(*arguments, "--design-index", "1")
+
+
+def test_limits(invoke_json, run_files, tmp_path):
+    train, test = run_files
+    arguments = ("train", train, "--test", test, *QUICK, "-o", tmp_path / "out")
+    report = invoke_json(*arguments, "--limit", "bias_stability=1", "--limit", "range=1e-6", status=1)
+    assert [(limit["quantity"], limit["met"]) for limit in report["limits"]] == [
+        ("bias_stability", True),
+        ("range", False),
+    ]
+
+
+def test_config_is_run_again_with_the_same_numbers(invoke_json, run_files, tmp_path, monkeypatch):
+    train, test = run_files
+    out = tmp_path / "out"
+    first = invoke_json(
+        *("train", train, "--test", test, *QUICK, "-o", out, "--averaging", "50", "--seed", "3"),
+        *("--limit", "bias_stability=1"),
+    )
+    config = tmp_path / "again.yaml"
+    config.write_text((out / "config.yaml").read_text())
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    monkeypatch.chdir(elsewhere)
+    assert invoke_json("train", "--config", config) == first
+    assert yaml.safe_load(config.read_text())["seed"] == 3
+    other = invoke_json("train", "--config", config, "--averaging", "100", "-o", "other")
+    assert other["test"][0]["averaging_s"] == 100
+    assert (elsewhere / "other" / "report.json").exists()
+
+
+def test_several_test_runs_after_one_option(invoke_json, run_files, tmp_path):
+    train, test = run_files
+    again = tmp_path / "c.csv"
+    again.write_text(test.read_text())
+    report = invoke_json("train", train, "--test", test, again, *QUICK, "-o", tmp_path / "out")
+    assert [run["run"] for run in report["test"]] == ["b.csv", "c.csv"]
+    report = invoke_json("train", train, "--test", test, "--test", again, *QUICK, "-o", tmp_path / "out")
+    assert [run["run"] for run in report["test"]] == ["b.csv", "c.csv"]
+
+
+def test_a_test_run_outside_training_is_an_error_when_strict(invoke, run_files, tmp_path):
+    from tests.cli.conftest import csv_text
+
+    train, _ = run_files
+    hot = tmp_path / "hot.csv"
+    hot.write_text(csv_text(5, low=30.0))
+    out = tmp_path / "out"
+    arguments = ("train", train, "--test", hot, *QUICK, "-o", out)
+    result = invoke(*arguments, "--strict", status=2)
+    assert "outside" in result.stderr
+    assert not out.exists()
+    assert "outside training" in invoke(*arguments).stdout
+
+
+def test_another_axis_needs_any_unit(invoke, run_files, tmp_path):
+    train, test = run_files
+    test.with_suffix(".yaml").write_text("unit: FOG-1\naxis: y\n")
+    out = tmp_path / "out"
+    result = invoke("train", train, "--test", test, *QUICK, "-o", out, status=2)
+    assert "--any-unit" in result.stderr
+    assert not out.exists()
+    invoke("train", train, "--test", test, *QUICK, "-o", out, "--any-unit")
+    assert "axis" in (out / "report.json").read_text()
+
+
+def test_train_again_searches_on_training_folds(invoke_json, invoke, run_files, tmp_path):
+    train, test = run_files
+    arguments = ("train", train, "--test", test, "--model", "polynomial", "-o", tmp_path / "out")
+    report = invoke_json(*arguments, "--train-again", "--design-index", "0.2")
+    assert any("folds of the training runs" in note for note in report["notes"])
+    assert report["design_index"]["met"] is True
+    result = invoke(*arguments, "--train-again", status=2)
+    assert "--design-index" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--test", "b.csv"), "no training run"),
+        (("a.csv",), "no test run"),
+        (("a.csv", "--test", "b.csv", "--model", "rbff"), "did you mean"),
+        (("a.csv", "--test", "b.csv", "--features", "T, dX"), "dX"),
+        (("a.csv", "--test", "b.csv", "--limit", "speed=3"), "known are"),
+        (("a.csv", "--test", "b.csv", "--limit", "rms"), "NAME=VALUE"),
+        (("a.csv", "--test", "b.csv", "--averaging", "-5"), "positive"),
+        (("a.csv", "--test", "b.csv", "--averaging", "1"), "samples are 2 s apart"),
+        (("a.csv", "--test", "b.csv", "--averaging", "2900"), "at least 2"),
+        (("a.csv", "--test", "b.csv", "--limit", "scale_factor_error=3"), "no test run tells it"),
+        (("a.csv", "a.csv", "--test", "b.csv"), "more than once"),
+        (("a.csv", "--test", "none.csv"), "none.csv"),
+        (("a.csv", "--test", "shipped:nothing"), "no such recording"),
+        (("a.csv", "--test", "b.csv", "-o", "a.csv"), "is a file"),
+        (("a.csv", "--test", "b.csv", "-o", "a.csv/out"), "a.csv"),
+    ],
+)
+def test_bad_usage_is_one_message_and_nothing_is_written(invoke, run_files, monkeypatch, arguments, message):
+    folder = run_files[0].parent
+    monkeypatch.chdir(folder)
+    before = sorted(folder.iterdir())
+    features = () if "--features" in arguments or "rbff" in arguments else ("--features", "T, dT")
+    model = () if "--model" in arguments else ("--model", "polynomial")
+    result = invoke("train", *arguments, *features, *model, status=2)
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert result.stdout == ""
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_closed_folder_is_found_before_training(invoke, run_files, tmp_path, monkeypatch):
+    monkeypatch.setattr("os.access", lambda *_: False)
+    result = invoke("train", run_files[0], "--test", run_files[1], *QUICK, "-o", tmp_path / "out", status=2)
+    assert "no permission to write" in result.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_failure_while_writing_leaves_nothing(invoke, run_files, tmp_path, monkeypatch):
+    import fogml.report
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(fogml.report, "train_page", full)
+    result = invoke("train", run_files[0], "--test", run_files[1], *QUICK, "-o", tmp_path / "out", status=2)
+    assert "No space left" in result.stderr
+    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.glob(".partial-*"))
