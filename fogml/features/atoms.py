@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.features.signal import Signal, number_text
 from fogml.runs.run import Run
 from fogml.signals import windows
+from fogml.signals.clock import EXPONENTIAL_SPAN, Clock
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -64,7 +65,7 @@ class Window:
     @property
     def span_s(self) -> float:
         """Time from the start until it is full [s], to within a sample interval."""
-        spans = {"block": 2.0, "slope": 1.0, "exp": windows.EXPONENTIAL_SPAN, "first": 0.0}
+        spans = {"block": 2.0, "slope": 1.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}
         return spans[self.method] * self.length_s
 
     @property
@@ -135,7 +136,7 @@ class Atom:
 
 
 def windowed_values(
-    signal: FloatArray, clock: windows.Clock, window: Window, unit_s: float | None
+    signal: FloatArray, clock: Clock, window: Window, unit_s: float | None
 ) -> tuple[FloatArray, BoolArray]:
     """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
     if window.method == "first":
@@ -171,7 +172,7 @@ def evaluate(
     full : (n,) bool array
     """
     n = len(run)
-    clock = windows.Clock(run.time, run.sample_s if sample_s is None else sample_s)
+    clock = Clock(run.time, run.sample_s if sample_s is None else sample_s)
     values = np.empty((n, len(atoms)), order="F")
     full = np.ones(n, dtype=np.bool_)
     signals: dict[Signal, FloatArray] = {}

@@ -1,7 +1,9 @@
 """Compiled loops of the window operators, for times off a regular grid.
 
-Each fills `values` and `full`, which come in zeroed. `sample_s` is the nominal interval, `gap_s`
-the longest interval that may be spanned; see `fogml.signals.windows` for the rules.
+Each fills `values` and `full`, which come in zeroed. `edge_s` is the noise forgiven at window edges,
+`needed_s` the time from a restart until the window is full, `gap_s` the longest interval that may be
+spanned, all in seconds; `fogml.signals.windows` tells the rules. They are arguments, not constants,
+because compiled code is kept on disk and would not notice a change of another module.
 """
 
 from __future__ import annotations
@@ -10,13 +12,14 @@ import math
 
 from numba import boolean, float64, njit, types
 
-from fogml.signals.windows import EDGE_TOLERANCE, EXPONENTIAL_SPAN, BoolArray, FloatArray
+from fogml.signals.clock import BoolArray, FloatArray
 
 # Declared read-only, the inputs take both the frozen columns of a run and ordinary arrays.
 _INPUT = types.Array(float64, 1, "C", readonly=True)
 _KERNEL = types.void(
     _INPUT,
     _INPUT,
+    float64,
     float64,
     float64,
     float64,
@@ -32,15 +35,14 @@ def block_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
-    sample_s: float,
+    edge_s: float,
+    needed_s: float,
     gap_s: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
 ) -> None:
     """Newest mean less the mean before; divided by their time distance where unit_s > 0."""
-    edge = EDGE_TOLERANCE * sample_s
-    needed = 2.0 * window_s - sample_s - edge
     start = newest = before = afresh = 0
     time_0 = x_0 = 0.0
     newest_t = newest_x = before_t = before_x = 0.0
@@ -60,17 +62,17 @@ def block_kernel(
             afresh = i + max(i - before, _FEWEST_STEPS)
         newest_t += time[i] - time_0
         newest_x += x[i] - x_0
-        while time[i] - time[newest] >= window_s - edge:
+        while time[i] - time[newest] >= window_s - edge_s:
             newest_t -= time[newest] - time_0
             newest_x -= x[newest] - x_0
             before_t += time[newest] - time_0
             before_x += x[newest] - x_0
             newest += 1
-        while time[i] - time[before] >= 2.0 * window_s - edge:
+        while time[i] - time[before] >= 2.0 * window_s - edge_s:
             before_t -= time[before] - time_0
             before_x -= x[before] - x_0
             before += 1
-        if newest > before and time[i] - time[start] >= needed:
+        if newest > before and time[i] - time[start] >= needed_s:
             in_newest, in_before = i - newest + 1, newest - before
             difference = newest_x / in_newest - before_x / in_before
             if unit_s > 0.0:
@@ -84,15 +86,14 @@ def slope_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
-    sample_s: float,
+    edge_s: float,
+    needed_s: float,
     gap_s: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
 ) -> None:
     """Least-squares slope over the window, times unit_s."""
-    edge = EDGE_TOLERANCE * sample_s
-    needed = window_s - sample_s - edge
     start = oldest = afresh = 0
     time_0 = x_0 = 0.0
     sum_t = sum_tt = sum_x = sum_tx = 0.0
@@ -114,7 +115,7 @@ def slope_kernel(
         sum_tt += t * t
         sum_x += v
         sum_tx += t * v
-        while time[i] - time[oldest] >= window_s - edge:
+        while time[i] - time[oldest] >= window_s - edge_s:
             t, v = time[oldest] - time_0, x[oldest] - x_0
             sum_t -= t
             sum_tt -= t * t
@@ -122,7 +123,7 @@ def slope_kernel(
             sum_tx -= t * v
             oldest += 1
         count = i - oldest + 1
-        if count > 1 and time[i] - time[start] >= needed:
+        if count > 1 and time[i] - time[start] >= needed_s:
             mean_t = sum_t / count
             values[i] = unit_s * (sum_tx - mean_t * sum_x) / (sum_tt - mean_t * sum_t)
             full[i] = True
@@ -133,14 +134,14 @@ def exponential_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
-    sample_s: float,
+    edge_s: float,
+    needed_s: float,
     gap_s: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
 ) -> None:
     """Exponentially remembered rate with time constant window_s, times unit_s."""
-    needed = EXPONENTIAL_SPAN * window_s - sample_s * (1.0 + EDGE_TOLERANCE)
     start = 0
     rate = 0.0
     last_interval = weight = 0.0
@@ -154,7 +155,7 @@ def exponential_kernel(
             last_interval = interval
             weight = -math.expm1(-interval / window_s)
         rate += weight * ((x[i] - x[i - 1]) / interval - rate)
-        if time[i] - time[start] >= needed:
+        if time[i] - time[start] >= needed_s:
             values[i] = unit_s * rate
             full[i] = True
 

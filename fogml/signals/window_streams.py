@@ -10,7 +10,14 @@ import math
 from collections import deque
 from typing import Protocol
 
-from fogml.signals.windows import EDGE_TOLERANCE, EXPONENTIAL_SPAN, GAP_INTERVALS, check_window, longest_gap_s
+from fogml.signals.clock import (
+    EDGE_TOLERANCE,
+    EXPONENTIAL_SPAN,
+    GAP_INTERVALS,
+    check_window,
+    longest_gap_s,
+    needed_s,
+)
 
 _FEWEST_STEPS = 32
 
@@ -30,7 +37,7 @@ class BlockDifferenceStream:
         check_window(window_s, sample_s, 1, "a block window")
         self._window_s, self._unit_s = window_s, unit_s
         self._edge = EDGE_TOLERANCE * sample_s
-        self._needed = 2.0 * window_s - sample_s - self._edge
+        self._needed = needed_s(2.0 * window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._restart(0.0)
@@ -89,7 +96,7 @@ class SlopeStream:
         check_window(window_s, sample_s, 2, "a slope's window")
         self._window_s, self._unit_s = window_s, window_s if unit_s is None else unit_s
         self._edge = EDGE_TOLERANCE * sample_s
-        self._needed = window_s - sample_s - self._edge
+        self._needed = needed_s(window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._restart(0.0)
@@ -139,7 +146,7 @@ class ExponentialStream:
     def __init__(self, window_s: float, sample_s: float, unit_s: float | None = None) -> None:
         check_window(window_s, sample_s, 1, "a time constant")
         self._window_s, self._unit_s = window_s, window_s if unit_s is None else unit_s
-        self._needed = EXPONENTIAL_SPAN * window_s - sample_s * (1.0 + EDGE_TOLERANCE)
+        self._needed = needed_s(EXPONENTIAL_SPAN * window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._x = self._rate = 0.0

@@ -19,98 +19,25 @@ seconds (60: per minute).
 
 from __future__ import annotations
 
-from functools import cached_property
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fogml.errors import InputError
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-
-EDGE_TOLERANCE = 1e-6
-"""Float noise forgiven at window edges, in sample intervals."""
-GAP_INTERVALS = 3.0
-"""A gap is an interval longer than this many sample intervals."""
-GAP_SHARE = 0.25
-"""A gap longer than this share of the window restarts the operator."""
-EXPONENTIAL_SPAN = 3.0
-"""Time constants until an exponential window counts as full."""
+from fogml.signals.clock import (
+    EDGE_TOLERANCE,
+    EXPONENTIAL_SPAN,
+    GAP_INTERVALS,
+    BoolArray,
+    Clock,
+    FloatArray,
+    check_window,
+    longest_gap_s,
+    needed_s,
+)
 
 _CHUNK = 1 << 15
-_GRID_TOLERANCE = 2e-10
-
-
-class Clock:
-    """The sample times of one recording, with what the window operators need to know of them.
-
-    Build it once and hand it to several operators in place of the times; that spares the check
-    for a regular grid each time.
-
-    Parameters
-    ----------
-    time
-        Sample times [s], shape (n,), strictly increasing.
-    sample_s
-        Nominal sample interval [s]; the median interval if None.
-    """
-
-    def __init__(self, time: ArrayLike, sample_s: float | None = None) -> None:
-        self.time: FloatArray = np.ascontiguousarray(time, dtype=np.float64)
-        if self.time.ndim != 1:
-            raise InputError(f"sample times: an array of one dimension was expected, not {self.time.ndim}")
-        if sample_s is None:
-            sample_s = float(np.median(np.diff(self.time))) if len(self.time) > 1 else 0.0
-        self.sample_s = sample_s
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    @cached_property
-    def grid_s(self) -> float | None:
-        """Interval [s] of the regular grid that the times lie on, or None where they don't.
-
-        Regular means: no time is off the grid by more than float noise, so that index arithmetic
-        gives the same rates as true times do to better than 1e-9.
-        """
-        time, n = self.time, len(self.time)
-        if n < 2 or self.sample_s <= 0.0:
-            return None
-        interval = float(time[-1] - time[0]) / (n - 1)
-        noise = float(np.spacing(max(abs(time[0]), abs(time[-1]))))
-        tolerance = _GRID_TOLERANCE * self.sample_s + 2.0 * noise
-        if abs(interval - self.sample_s) > EDGE_TOLERANCE * self.sample_s + 4.0 * noise:
-            return None
-        grid = interval * np.arange(min(_CHUNK, n))
-        for low in range(0, n, _CHUNK):
-            off = time[low : low + _CHUNK] - (time[0] + low * interval)
-            off -= grid[: len(off)]
-            if off.max() > tolerance or off.min() < -tolerance:
-                return None
-        return interval
-
-
-def longest_gap_s(window_s: float, sample_s: float) -> float:
-    """Longest interval [s] that a window of `window_s` may span."""
-    return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s)
-
-
-def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:
-    """Refuse a window that is no positive number, or shorter than so many sample intervals.
-
-    Raises
-    ------
-    InputError
-        Naming `what`, and the length to widen it to.
-    """
-    if not window_s > 0.0 or not np.isfinite(window_s):
-        raise InputError(f"{what} of {window_s:g} s: a positive number of seconds was expected")
-    if window_s < intervals * sample_s * (1.0 - EDGE_TOLERANCE):
-        raise InputError(
-            f"{what} of {window_s:g} s is too short for samples {sample_s:g} s apart; "
-            f"widen it to at least {intervals * sample_s:g} s"
-        )
 
 
 def block_difference(
@@ -164,10 +91,7 @@ def block_difference(
         return _block_on_grid(x, grid, clock.sample_s, window_s, unit_s)
     from fogml.signals.window_kernels import block_kernel
 
-    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
-    gap_s = longest_gap_s(window_s, clock.sample_s)
-    block_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or 0.0, values, full)
-    return values, full
+    return _run_kernel(block_kernel, clock, x, window_s, 2.0 * window_s, unit_s or 0.0)
 
 
 def slope(
@@ -192,10 +116,7 @@ def slope(
     check_window(window_s, clock.sample_s, 2, "a slope's window")
     from fogml.signals.window_kernels import slope_kernel
 
-    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
-    gap_s = longest_gap_s(window_s, clock.sample_s)
-    slope_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or window_s, values, full)
-    return values, full
+    return _run_kernel(slope_kernel, clock, x, window_s, window_s, unit_s or window_s)
 
 
 def exponential(
@@ -227,10 +148,9 @@ def exponential(
     check_window(window_s, clock.sample_s, 1, "a time constant")
     from fogml.signals.window_kernels import exponential_kernel
 
-    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
-    gap_s = longest_gap_s(window_s, clock.sample_s)
-    exponential_kernel(clock.time, x, window_s, clock.sample_s, gap_s, unit_s or window_s, values, full)
-    return values, full
+    return _run_kernel(
+        exponential_kernel, clock, x, window_s, EXPONENTIAL_SPAN * window_s, unit_s or window_s
+    )
 
 
 def first_difference(
@@ -270,6 +190,17 @@ def _prepared(time: ArrayLike | Clock, x: ArrayLike, sample_s: float | None) -> 
     if values.shape != clock.time.shape:
         raise InputError(f"window operator: {values.shape} values for {clock.time.shape} sample times")
     return clock, values
+
+
+def _run_kernel(
+    kernel: Callable[..., None], clock: Clock, x: FloatArray, window_s: float, span_s: float, unit_s: float
+) -> tuple[FloatArray, BoolArray]:
+    """Values and full mask from a compiled operator whose window is full after `span_s`."""
+    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
+    sample_s = clock.sample_s
+    rules = (EDGE_TOLERANCE * sample_s, needed_s(span_s, sample_s), longest_gap_s(window_s, sample_s))
+    kernel(clock.time, x, window_s, *rules, unit_s, values, full)
+    return values, full
 
 
 def _block_on_grid(

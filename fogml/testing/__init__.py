@@ -1,4 +1,4 @@
-"""The contract tests that anyone's addition runs: check_feature, and its like for other parts.
+"""The contract tests that anyone's addition runs, to features or to models.
 
 The names load on first use.
 """

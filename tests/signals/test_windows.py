@@ -14,7 +14,8 @@ from scipy.signal import lfilter
 
 from fogml.errors import InputError
 from fogml.signals import window_streams as streams
-from fogml.signals.windows import Clock, block_difference, exponential, first_difference, slope
+from fogml.signals.clock import Clock
+from fogml.signals.windows import block_difference, exponential, first_difference, slope
 
 FloatArray = NDArray[np.float64]
 WINDOWED = {"block": block_difference, "slope": slope, "exp": exponential}
@@ -270,3 +271,14 @@ def test_a_clock_tells_a_grid_from_jitter() -> None:
         time = 0.1 * np.arange(100_000)
         time[spoiled] += 1e-6
         assert Clock(time).grid_s is None
+
+
+def test_the_nominal_interval_is_the_median_unless_given() -> None:
+    jittered = np.cumsum(np.random.default_rng(10).uniform(0.5, 1.5, 1000))
+    assert Clock(jittered).sample_s == np.median(np.diff(jittered))
+    assert Clock(0.1 * np.arange(1000)).sample_s == pytest.approx(0.1, rel=1e-12)
+    assert Clock([0.0, 1.0, 2.0], 0.7).sample_s == 0.7
+    assert Clock([0.0, 1.0, 2.0], 0.7).grid_s is None
+    assert Clock([4.0]).sample_s == 0.0
+    with pytest.raises(InputError, match="one dimension"):
+        Clock(np.zeros((2, 2)))

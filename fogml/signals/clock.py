@@ -1,0 +1,110 @@
+"""Sample times as the window operators see them: regular grid or not, nominal interval, window rules."""
+
+from __future__ import annotations
+
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+EDGE_TOLERANCE = 1e-6
+"""Float noise forgiven at window edges, in sample intervals."""
+GAP_INTERVALS = 3.0
+"""A gap is an interval longer than this many sample intervals."""
+GAP_SHARE = 0.25
+"""A gap longer than this share of the window restarts the operator."""
+EXPONENTIAL_SPAN = 3.0
+"""Time constants until an exponential window counts as full."""
+
+_CHUNK = 1 << 15
+_GRID_TOLERANCE = 2e-10
+
+
+class Clock:
+    """The sample times of one recording, with what the window operators need to know of them.
+
+    Build it once and hand it to several operators in place of the times; that spares the check
+    for a regular grid each time.
+
+    Parameters
+    ----------
+    time
+        Sample times [s], shape (n,), strictly increasing.
+    sample_s
+        Nominal sample interval [s]; the median interval if None.
+    """
+
+    def __init__(self, time: ArrayLike, sample_s: float | None = None) -> None:
+        self.time: FloatArray = np.ascontiguousarray(time, dtype=np.float64)
+        if self.time.ndim != 1:
+            raise InputError(f"sample times: an array of one dimension was expected, not {self.time.ndim}")
+        self._nominal_s = sample_s
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @cached_property
+    def sample_s(self) -> float:
+        """Nominal sample interval [s]; where none was given, the median (0 for fewer than two samples)."""
+        if self._nominal_s is not None:
+            return self._nominal_s
+        if len(self.time) < 2:
+            return 0.0
+        # On a grid all intervals are the median, and telling that is much quicker than sorting.
+        return self.grid_s or float(np.median(np.diff(self.time)))
+
+    @cached_property
+    def grid_s(self) -> float | None:
+        """Interval [s] of the regular grid that the times lie on, or None where they don't.
+
+        Regular means: no time is off the grid by more than float noise, so that index arithmetic
+        gives the same rates as true times do to better than 1e-9.
+        """
+        time, n = self.time, len(self.time)
+        if n < 2 or time[-1] <= time[0]:
+            return None
+        interval = float(time[-1] - time[0]) / (n - 1)
+        nominal = interval if self._nominal_s is None else self._nominal_s
+        noise = float(np.spacing(max(abs(time[0]), abs(time[-1]))))
+        tolerance = _GRID_TOLERANCE * nominal + 2.0 * noise
+        if abs(interval - nominal) > EDGE_TOLERANCE * nominal + 4.0 * noise:
+            return None
+        grid = interval * np.arange(min(_CHUNK, n))
+        for low in range(0, n, _CHUNK):
+            off = time[low : low + _CHUNK] - (time[0] + low * interval)
+            off -= grid[: len(off)]
+            if off.max() > tolerance or off.min() < -tolerance:
+                return None
+        return interval
+
+
+def longest_gap_s(window_s: float, sample_s: float) -> float:
+    """Longest interval [s] that a window of `window_s` may span."""
+    return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s)
+
+
+def needed_s(span_s: float, sample_s: float) -> float:
+    """Time from a restart until a window of that span is full [s]: one sample interval less."""
+    return span_s - sample_s * (1.0 + EDGE_TOLERANCE)
+
+
+def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:
+    """Refuse a window that is no positive number, or shorter than so many sample intervals.
+
+    Raises
+    ------
+    InputError
+        Naming `what`, and the length to widen it to.
+    """
+    if not window_s > 0.0 or not np.isfinite(window_s):
+        raise InputError(f"{what} of {window_s:g} s: a positive number of seconds was expected")
+    if window_s < intervals * sample_s * (1.0 - EDGE_TOLERANCE):
+        raise InputError(
+            f"{what} of {window_s:g} s is too short for samples {sample_s:g} s apart; "
+            f"widen it to at least {intervals * sample_s:g} s"
+        )
