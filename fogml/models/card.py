@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import fogml
@@ -131,7 +132,7 @@ def hash_ahead(runs: Sequence[Run]) -> Callable[[], list[str]]:
     SHA-256 leaves the interpreter free, so it costs a fit next to nothing.
     """
     pool = ThreadPoolExecutor(max_workers=min(4, len(runs)))
-    pending = [pool.submit(lambda run=run: run.hash) for run in runs]
+    pending = [pool.submit(attrgetter("hash"), run) for run in runs]
     pool.shutdown(wait=False)
     return lambda: [hash_of.result() for hash_of in pending]
 

@@ -35,6 +35,7 @@ from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.tall_least_squares import Part
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.transitions import transition_mask
 
 _LEAST_TURN_DEG_S = 0.1
 # Under this a turn tells the scale factor worse than 100 ppm at 0.1 deg/h of drift: no calibration.
@@ -196,8 +197,6 @@ class JointModel(DriftModel):
         atoms, used = self.features_.atom_values(run)
         notes = []
         if "rate" in run.columns:
-            from fogml.runs.transitions import transition_mask
-
             cut = transition_mask(run)
             used = used & ~cut
             notes = [f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out"]

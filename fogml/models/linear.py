@@ -73,7 +73,10 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
             Fold of each row, from 0, for ``ridge="auto"``; by default 20 blocks of
             neighbouring rows dealt to 5 folds in turn.
         """
-        matrix, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        least = 2 if isinstance(self.ridge, str) else 1
+        matrix, target = validate_data(
+            self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=least
+        )
         labels = dealt_folds(len(target)) if folds is None else np.asarray(folds, dtype=np.intp)
         if labels.shape != target.shape:
             raise InputError(f"folds has shape {labels.shape}, there are {len(target)} rows")

@@ -12,10 +12,10 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.folds import dealt_blocks
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.transitions import transition_mask
+from fogml.runs.turning import turning
 from fogml.signals.averages import block_averages
 
-TURNING_DEG_S = 1e-3
-"""A table rate above this is turning [deg/s]; 3.6 deg/h."""
 Compose = Callable[[FloatArray], FloatArray]
 """Gives the columns of a model, shape (m, k), from rows of atom values, shape (m, a)."""
 _COMPOSED_VALUES = 1 << 19
@@ -121,24 +121,20 @@ def _ends(used: BoolArray) -> tuple[int, int]:
 
 def usable_rows(run: Run, full: BoolArray) -> tuple[BoolArray, tuple[str, ...]]:
     """Mask of the rows that drift models are fitted to, and what was left out and why."""
-    if "rate" not in run.columns:
+    if "rate" not in run.columns or not run.rate.any():
         return full, ()
-    turning = np.abs(run.rate) > TURNING_DEG_S
-    if not turning.any():
-        return full, ()
-    from fogml.runs.transitions import transition_mask
-
+    moving = turning(run)
     cut = transition_mask(run)
     used = full & ~cut
     notes = []
     if cut.any():
         notes.append(f"{run.name}: {int(cut.sum())} rows about changes of the table's rate left out")
-    if (used & ~turning).any() and (used & turning).any():
+    if (used & ~moving).any() and (used & moving).any():
         notes.append(
-            f"{run.name}: {int((used & turning).sum())} rows at which the table turns left out; "
+            f"{run.name}: {int((used & moving).sum())} rows at which the table turns left out; "
             "the joint model uses them"
         )
-        used &= ~turning
+        used &= ~moving
     return used, tuple(notes)
 
 

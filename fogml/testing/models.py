@@ -6,6 +6,7 @@ import json
 import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -109,14 +110,13 @@ def _lagged(x: FloatArray, time_constant_s: float) -> FloatArray:
 
 
 def _check_refit(model: DriftModel, train: Sequence[Run]) -> DriftModel:
-    copy = clone(model)
+    copy: DriftModel = clone(model)
     assert type(copy) is type(model) and copy.kind == model.kind, "clone: another model came back"
-    first = clone(model).fit(train)
+    first = copy.fit(train)
     assert not hasattr(model, "card_"), "clone: fitting a clone fitted the original"
     assert clone(first).get_params().keys() == model.get_params().keys(), "clone: parameters differ"
-    second = first.fit(train) if first is not None else first
-    third = clone(model).fit(train)
-    assert second is first, "fit: must return the model itself"
+    assert first is copy and first.fit(train) is first, "fit: must return the model itself"
+    third: DriftModel = clone(model).fit(train)
     for run in train:
         assert np.array_equal(first.predict(run), third.predict(run)), "refit: another fit, other numbers"
     assert _state(first) == _state(third), "refit: another fit, another state"
@@ -183,7 +183,7 @@ def _check_intervals(model: DriftModel, other: Run) -> None:
     )
     assert widths[1].max() > 0.0, "interval: of no width"
     for level in (0.0, 1.0, -1.0, 2.0):
-        _refused(lambda level=level: model.predict_interval(other, level), f"interval: level {level} taken")
+        _refused(partial(model.predict_interval, other, level), f"interval: level {level} taken")
 
 
 def _check_counts(model: DriftModel, fitted: DriftModel, train: Sequence[Run], other: Run) -> None:
@@ -231,7 +231,7 @@ def _check_saving(model: DriftModel, other: Run) -> None:
                 content = stream.read()
             with open(path, "wb") as stream:
                 stream.write(content[: len(content) // 2])
-            _refused(lambda: load_model(f"{folder}/model"), f"load: {file} cut short was taken")
+            _refused(partial(load_model, f"{folder}/model"), f"load: {file} cut short was taken")
             with open(path, "wb") as stream:
                 stream.write(content)
 
@@ -242,9 +242,7 @@ def _check_unit_and_axis(model: DriftModel, other: Run) -> None:
     model.check_applies(other)
     for fact in ("unit", "axis"):
         foreign = replace(other, facts=other.facts.model_copy(update={fact: "another"}))
-        _refused(
-            lambda foreign=foreign: model.check_applies(foreign), f"unit and axis: another {fact} was taken"
-        )
+        _refused(partial(model.check_applies, foreign), f"unit and axis: another {fact} was taken")
         assert model.check_applies(foreign, any_unit=True), f"unit and axis: no note on another {fact}"
         silent = replace(other, facts=other.facts.model_copy(update={fact: None}))
         assert model.check_applies(silent), f"unit and axis: no note on an unknown {fact}"
