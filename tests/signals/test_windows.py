@@ -282,3 +282,12 @@ def test_the_nominal_interval_is_the_median_unless_given() -> None:
     assert Clock([4.0]).sample_s == 0.0
     with pytest.raises(InputError, match="one dimension"):
         Clock(np.zeros((2, 2)))
+
+
+def test_streams_hold_no_more_than_their_windows() -> None:
+    block, line = streams.BlockDifferenceStream(5.0, 0.1), streams.SlopeStream(5.0, 0.1)
+    for i in range(5000):
+        block.step(0.1 * i, float(i % 7))
+        line.step(0.1 * i, float(i % 7))
+        assert len(block._newest) + len(block._before) <= 100
+        assert len(line._held) <= 50
