@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -214,28 +213,61 @@ class _Reader:
 
     def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
         """The source columns as numbers, shape (columns, rows); NaN where there is none."""
-        import pandas as pd
+        import pyarrow as pa
+        from pyarrow import csv
 
-        blank = self.profile.text_separator is None
-        options: dict[str, Any] = {
-            "header": None,
-            "names": range(fields),
-            "usecols": sorted(set(positions)),
-            "decimal": self.profile.decimal,
-            "sep": r"\s+" if blank else self.profile.text_separator,
-            "skipinitialspace": True,
-            "float_precision": "round_trip",
-            "skip_blank_lines": False,
-        }
+        separator = self.profile.text_separator
+        if separator is None:
+            content, separator = _single_blanks(content), " "
+        names = [str(position) for position in range(fields)]
+        wanted = [names[position] for position in positions]
+
+        def table(kind: pa.DataType, nulls: list[str] | None) -> pa.Table:
+            return csv.read_csv(
+                pa.BufferReader(content),
+                csv.ReadOptions(column_names=names),
+                csv.ParseOptions(delimiter=separator, ignore_empty_lines=False),
+                csv.ConvertOptions(
+                    column_types=dict.fromkeys(wanted, kind),
+                    include_columns=sorted(set(wanted)),
+                    decimal_point=self.profile.decimal,
+                    null_values=nulls,
+                    strings_can_be_null=nulls is not None,
+                ),
+            )
+
         try:
-            frame = pd.read_csv(BytesIO(content), dtype=np.float64, **options)
-        except ValueError:
-            # Some field is no number: read everything as text, and let what is none become NaN.
-            text = pd.read_csv(BytesIO(content), dtype=str, **{**options, "decimal": "."})
-            if self.profile.decimal == ",":
-                text = text.apply(lambda column: column.str.replace(",", ".", regex=False))
-            frame = text.apply(pd.to_numeric, errors="coerce")
-        return np.stack([frame[position].to_numpy(dtype=np.float64) for position in positions])
+            columns = table(pa.float64(), None)
+        except pa.ArrowInvalid:
+            # Some field is no plain number: read text, and let what is none become NaN.
+            text = table(pa.string(), [""])
+            numbers = [_numbers(text[name], self.profile.decimal) for name in text.column_names]
+            columns = pa.table(numbers, names=text.column_names)
+        return np.stack([columns[name].to_numpy() for name in wanted])
+
+
+def _single_blanks(content: bytes) -> bytes:
+    """The lines with every run of blanks and tabs between fields made one blank."""
+    text = np.frombuffer(content, dtype=np.uint8)
+    blank = (text == _BLANK) | (text == _TAB)
+    places = np.flatnonzero(~blank)
+    kept = text[places]
+    # A blank stays where something was left out between two characters of the same line.
+    gap = (np.diff(places) > 1) & (kept[:-1] != _NEWLINE) & (kept[1:] != _NEWLINE)
+    return np.insert(kept, np.flatnonzero(gap) + 1, _BLANK).tobytes()
+
+
+def _numbers(text: Any, decimal: str) -> Any:
+    """Text as float64, null where it is no number."""
+    import pyarrow as pa
+    import pyarrow.compute as compute
+
+    plain = compute.utf8_trim_whitespace(text)
+    if decimal == ",":
+        plain = compute.replace_substring(plain, ",", ".")
+    plain = compute.replace_substring_regex(plain, r"^\+", "")
+    valid = compute.match_substring_regex(plain, r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
+    return compute.cast(compute.if_else(valid, plain, pa.scalar(None, pa.string())), pa.float64())
 
 
 def _rejected(what: str, rows: NDArray[np.bool_]) -> Finding:
