@@ -16,6 +16,8 @@ AXES = ("x", "y", "z")
 TRAINING_LEG, TEST_LEG = 2, 3
 """The leg up to 74 degC, and the last leg down."""
 AVERAGED_ROWS = 20
+CUBIC = "cubic in T"
+"""What autopilots fit (ArduPilot and PX4), shown beside the default."""
 
 
 class DemoSettings(Settings):
@@ -27,15 +29,17 @@ class DemoSettings(Settings):
 def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
     """Train and judge on three axes of the shipped thermal cycle, and write an index page."""
     judgements: dict[str, Judgement] = {}
+    cubics: dict[str, Judgement] = {}
     with whole_folder(settings.out) as folder:
         with terminal.work("three axes", total=len(AXES)) as work:
             for axis in AXES:
                 work.doing(f"axis {axis}")
-                judgements[axis] = _axis(folder / axis, axis, settings, Terminal(quiet=True))
+                judgements[axis], cubics[axis] = _axis(folder / axis, axis, settings, Terminal(quiet=True))
                 work.advance()
         from fogml.report import index_page
 
-        (folder / "index.html").write_text(index_page(judgements), encoding="utf-8")
+        page = index_page(judgements, title="A chamber cycle, three axes", beside={CUBIC: cubics})
+        (folder / "index.html").write_text(page, encoding="utf-8")
         (folder / "config.yaml").write_text(settings.yaml("demo"), encoding="utf-8")
     _print(judgements, settings, terminal)
     terminal.result(
@@ -46,7 +50,8 @@ def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
     )
 
 
-def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -> Judgement:
+def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -> tuple[Judgement, Judgement]:
+    """The judgement of the default on one axis, its results written, and of the cubic in T."""
     runs = [f"{SHIPPED}thermal-cycle-{leg}-{axis}" for leg in (TRAINING_LEG, TEST_LEG)]
     training, test = open_runs(runs[:1], terminal), open_runs(runs[1:], terminal)
     train_settings = TrainSettings(
@@ -59,7 +64,8 @@ def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -
     model, judgement = fit_and_judge(train_settings, training, test, terminal)
     folder.mkdir()
     write_results(folder, train_settings, model, judgement, terminal)
-    return judgement
+    cubic = train_settings.model_copy(update={"model": "polynomial", "features": "T^1..3"})
+    return judgement, fit_and_judge(cubic, training, test, terminal)[1]
 
 
 def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: Terminal) -> None:

@@ -24,6 +24,9 @@ class Work(Protocol):
     def doing(self, what: str) -> None:
         """Say what is being done."""
 
+    def reached(self, done: float, total: float, doing: str) -> None:
+        """Say how much of how much is done, where that is known only on the way."""
+
 
 class Terminal:
     """Where a command prints to.
@@ -90,6 +93,9 @@ class _Silent:
     def doing(self, what: str) -> None:
         """Nothing is shown."""
 
+    def reached(self, done: float, total: float, doing: str) -> None:
+        """Nothing is shown."""
+
 
 class _Lines:
     """A line now and then, for logs."""
@@ -103,6 +109,10 @@ class _Lines:
     def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
         self._done += amount
         self.doing(doing or self._what)
+
+    def reached(self, done: float, total: float, doing: str) -> None:
+        self._done, self._total = done, total
+        self.doing(doing)
 
     def doing(self, what: str) -> None:
         self._what = what
@@ -121,11 +131,23 @@ class _Lines:
 @contextmanager
 def _bar(what: str, total: float | None) -> Iterator[Work]:
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import TimeRemainingColumn as TimeLeftColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        SpinnerColumn,
+        TextColumn,
+        TimeElapsedColumn,
+        TimeRemainingColumn,
+    )
 
-    columns = [SpinnerColumn(), TextColumn("{task.description}", markup=False)]
-    columns += [BarColumn(), TimeLeftColumn()] if total else [TimeElapsedColumn()]
+    columns = [
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TextColumn("left:"),
+        TimeRemainingColumn(),
+    ]
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
         task = progress.add_task(what, total=total)
 
@@ -137,6 +159,9 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
 
             def doing(self, what: str) -> None:
                 progress.update(task, description=what)
+
+            def reached(self, done: float, total: float, doing: str) -> None:
+                progress.update(task, completed=done, total=total, description=doing)
 
         yield Bar()
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import LimitSettings, absolute
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
@@ -99,6 +99,7 @@ def fit_and_judge(
     """The fitted model and its judgement."""
     from fogml.models.names import make_model
 
+    notes: list[str] = []
     with terminal.work(f"fitting {settings.model}") as work:
         if settings.train_again:
             from fogml.validation.index_search import train_until_index
@@ -114,10 +115,10 @@ def fit_and_judge(
                 seed=settings.seed,
                 step=work.doing,
             )
-            model, notes = found.model, (found.summary(),)
+            model = found.model
+            notes.append(found.summary())
         else:
-            model = make_model(settings.model, settings.features, settings.seed).fit(train_runs)
-            notes = ()
+            model = fit(make_model(settings.model, settings.features, settings.seed), train_runs, work)
         work.doing("judging")
         judgement = judge(
             model,
@@ -132,6 +133,16 @@ def fit_and_judge(
     if settings.strict:
         hold_strict([(run.run, run.findings) for run in judgement.test])
     return model, judgement
+
+
+def fit(model: DriftModel, runs: list[Run], work: Work) -> DriftModel:
+    """Fit a model; one that tries several things says how far it is."""
+    if "progress" not in model.get_params(deep=False):
+        return model.fit(runs)
+    model.set_params(progress=lambda done, total, name: work.reached(done, total, f"tried {name}"))
+    fitted = model.fit(runs)
+    fitted.set_params(progress=None)
+    return fitted
 
 
 def write_results(

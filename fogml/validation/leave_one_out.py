@@ -9,7 +9,7 @@ from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.validation.judge import DEFAULT_AVERAGING_S, judge
 from fogml.validation.limits import check_limits, outcome_of
-from fogml.validation.results import Judgement
+from fogml.validation.results import Judgement, RunJudgement
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -49,7 +49,7 @@ def leave_one_run_out(
     if len(runs) < 2:
         raise InputError(f"leaving one run out needs at least two runs, {len(runs)} given")
     limits = check_limits(limits or {})
-    held_out = []
+    held_out: list[RunJudgement] = []
     for number, run in enumerate(runs):
         others = [*runs[:number], *runs[number + 1 :]]
         judged = judge(make().fit(others), others, run, averaging_s=averaging_s, any_unit=any_unit)

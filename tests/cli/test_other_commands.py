@@ -131,9 +131,9 @@ def test_compare(invoke_json, invoke, run_files, tmp_path):
     assert names(out) == {"compare.json", "compare.html", "config.yaml"}
     assert values["schema"] == "fogml.compare/1"
     assert list(values["models"]) == ["none", "mean", "polynomial"]
-    # M3 wants T_out, joint wants turns: each is told with its reason.
+    # M3 wants T_in and T_out, joint wants turns: each is told with its reason.
     assert set(values["failed"]) == {"M3", "joint"}
-    assert "T_out" in values["failed"]["M3"]
+    assert "T_in" in values["failed"]["M3"]
     rms = {name: model["test"][0]["after"]["rms"] for name, model in values["models"].items()}
     assert rms["polynomial"] < 0.2 * rms["mean"]
     assert invoke_json("compare", "--config", out / "config.yaml") == values

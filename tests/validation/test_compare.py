@@ -1,0 +1,156 @@
+"""Several models on one split, leave one run out, and the search for the design index."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+from fogml.validation.compare import compare
+from fogml.validation.index_search import Candidate, candidates, train_until_index
+from fogml.validation.judge import judge
+from fogml.validation.leave_one_out import leave_one_run_out
+from tests.validation.known_drift import KnownDrift
+
+
+def cubic_run(name: str, seed: int, noise: float = 0.1, bias: float = 0.0) -> Run:
+    """Up and down over 60 degC in 6000 s, drift cubic in T."""
+    time = np.arange(0.0, 6000.0, 2.0)
+    temperature = 30.0 * np.sin(2 * np.pi * time / 6000.0)
+    drift = bias + 0.02 * temperature + 2e-5 * temperature**3
+    error = drift + noise * np.random.default_rng(seed).normal(size=len(time))
+    return Run.from_columns(name, time=time, gyro=error, T=temperature)
+
+
+@pytest.fixture(scope="module")
+def runs():
+    return [cubic_run(f"{name}.csv", seed) for seed, name in enumerate("abc")]
+
+
+def makers(*names):
+    return {name: partial(make_model, name) for name in names}
+
+
+def test_each_model_is_judged_as_if_alone(runs):
+    result = compare(makers("mean", "M1"), runs[:1], runs[1:2])
+    alone = judge(make_model("M1").fit(runs[:1]), runs[:1], runs[1:2])
+    assert result.judgements["M1"].test[0].after == alone.test[0].after
+    assert list(result.judgements) == ["mean", "M1"]
+
+
+def test_one_that_cannot_be_fitted_does_not_stop_the_rest(runs):
+    steps = []
+    result = compare(makers("joint", "M3", "mean"), runs[:1], runs[1:2], step=steps.append)
+    assert list(result.judgements) == ["mean"]
+    assert list(result.failed) == ["joint", "M3"]
+    assert "T_in" in result.failed["M3"]
+    assert steps == ["joint", "M3", "mean"]
+
+
+def test_a_regressor_s_own_error_is_a_reason(runs):
+    class Refusing(KnownDrift):
+        def fit(self, runs):
+            raise ValueError("n_neighbors is too large")
+
+    result = compare({"bad": Refusing, "mean": makers("mean")["mean"]}, runs[:1], runs[1:2])
+    assert result.failed["bad"] == "ValueError: n_neighbors is too large"
+
+
+def test_a_defect_is_not_a_reason(runs):
+    class Broken(KnownDrift):
+        def fit(self, runs):
+            raise AssertionError
+
+    with pytest.raises(AssertionError):
+        compare({"bad": Broken}, runs[:1], runs[1:2])
+
+
+def test_nothing_fitted_is_an_error(runs):
+    with pytest.raises(InputError, match="joint"):
+        compare(makers("joint"), runs[:1], runs[1:2])
+
+
+def test_leave_one_out_never_trains_on_the_run_it_judges(runs):
+    seen = []
+
+    class Recording(KnownDrift):
+        def fit(self, runs):
+            seen.append([run.name for run in runs])
+            return super().fit(runs)
+
+    result = leave_one_run_out(Recording, runs)
+    assert seen[:3] == [["b.csv", "c.csv"], ["a.csv", "c.csv"], ["a.csv", "b.csv"]]
+    assert seen[3] == ["a.csv", "b.csv", "c.csv"]
+    assert [run.run for run in result.test] == ["a.csv", "b.csv", "c.csv"]
+    assert not any(finding.code == "seen_in_training" for run in result.test for finding in run.findings)
+
+
+def test_leave_one_out_judges_by_hand(runs):
+    result = leave_one_run_out(partial(make_model, "M1"), runs, design_index=1.0, limits={"range": 1e-9})
+    by_hand = judge(make_model("M1").fit(runs[:2]), runs[:2], runs[2])
+    assert result.test[2].after == by_hand.test[0].after
+    assert result.design_index is not None
+    assert result.design_index.value == max(run.after.rms for run in result.test)
+    assert not result.limits[0].met
+
+
+def test_leave_one_out_needs_two(runs):
+    with pytest.raises(InputError, match="at least two"):
+        leave_one_run_out(partial(make_model, "M1"), runs[:1])
+
+
+def test_candidates_go_from_small_to_large():
+    names = candidates("auto", None)
+    assert [candidate.model for candidate in names] == sorted(
+        (candidate.model for candidate in names), key=["polynomial", "rbf"].index
+    )
+    sizes = [candidate.centres for candidate in candidates("rbf", "T")]
+    assert sizes == sorted(sizes)
+    assert candidates("M2", None) == [Candidate("M2", None)]
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_search_stops_at_the_first_that_meets_the_index(runs, count):
+    # Noise of 0.1 in 50 samples: 0.014. T alone misses the cubic by far; T^1..3 holds it.
+    found = train_until_index(runs[:count], 0.03, model="polynomial")
+    assert [trial.candidate.features for trial in found.trials] == ["T", "T^1..3"]
+    assert found.met
+    assert found.chosen is found.trials[-1]
+    assert "2 tries" in found.summary()
+    after = judge(found.model, runs[:count], runs[2]).test[0].after
+    assert after.rms < 0.03
+
+
+def test_an_index_out_of_reach_takes_the_nearest(runs):
+    found = train_until_index(runs[:2], 1e-6, model="polynomial")
+    assert not found.met
+    assert len(found.trials) == len(candidates("polynomial", None))
+    assert found.chosen.rms == min(trial.rms for trial in found.trials)
+    assert "none meets" in found.summary()
+
+
+def test_each_part_of_a_single_run_is_held_out_once(runs, monkeypatch):
+    fitted_times = []
+
+    class Recording(KnownDrift):
+        def fit(self, runs):
+            fitted_times.append(np.concatenate([run.time for run in runs]))
+            return super().fit(runs)
+
+    monkeypatch.setattr(Candidate, "make", lambda self, seed: Recording())
+    train_until_index(runs[0], 1e-6, model="any")
+    *folds, whole = fitted_times
+    assert len(folds) == 5
+    times, counts = np.unique(np.concatenate(folds), return_counts=True)
+    np.testing.assert_array_equal(times, runs[0].time)
+    assert set(counts) == {4}
+    np.testing.assert_array_equal(whole, runs[0].time)
+
+
+def test_the_search_where_nothing_can_be_fitted(runs):
+    with pytest.raises(InputError, match="T_in"):
+        train_until_index(runs[:2], 0.03, model="M3")
