@@ -10,12 +10,13 @@ import numpy as np
 from markupsafe import Markup
 
 from fogml.report import style
+from fogml.report.axes import time_unit
 from fogml.report.page import render
-from fogml.report.reduce import drawn, time_in_words
+from fogml.report.reduce import drawn
 from fogml.report.static_svg import Curve, line_figure
-from fogml.report.tables import Table, reference_of, runs_table
-from fogml.report.verdict import model_card, stated_limits, worst_run
-from fogml.report.words import listed, number, unit_of
+from fogml.report.tables import Row, Table, reference_of
+from fogml.report.verdict import model_card, stated_limits, unseen, worst_run
+from fogml.report.words import averages, listed, number, percent, unit_of
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 _POINTS = 700
@@ -30,6 +31,7 @@ class Sheet:
     unit: str
     axis: str
     met: bool
+    unseen: bool
     limits: list[LimitOutcome]
     about: list[tuple[str, str]]
     runs: Table
@@ -104,22 +106,41 @@ def _sheet(judgement: Judgement) -> Sheet:
         ("Axis", worst.axis or _NOT_STATED),
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
         ("Size", ", ".join(card_line(card))),
+        *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
-        ("Averages", f"{worst.averaging_s:g} s"),
+        ("Averages", f"{worst.averaging_s:.4g} s"),
         ("Bias relative to", reference_of(worst)),
     ]
     return Sheet(
         unit=worst.unit or _NOT_STATED,
         axis=worst.axis or _NOT_STATED,
         met=judgement.met,
+        unseen=unseen(judgement),
         limits=stated_limits(judgement),
         about=about,
-        runs=runs_table(shown),
+        runs=_runs(shown),
         more_runs=len(judgement.test) - len(shown),
         figure=figure,
         figure_words=words,
         notes=[str(note) for note in judgement.notes][:3],
     )
+
+
+def _runs(runs: Sequence[RunJudgement]) -> Table:
+    """The figures after per run, narrow enough for a page."""
+    columns = [("Run", "", "text"), ("Rms before", "deg/h", "figure"), ("Rms after", "deg/h", "figure")]
+    columns += [
+        ("Bias", "deg/h", "figure"),
+        ("Bias stability", "deg/h", "figure"),
+        ("Range", "deg/h", "figure"),
+    ]
+    columns += [("Noise floor", "deg/h", "figure"), ("Outside training", "", "figure")]
+    rows = []
+    for run in runs:
+        values = (run.before.rms, run.after.rms, run.after.bias, run.after.bias_stability, run.after.range)
+        cells = (run.run, *(number(value) for value in (*values, run.floor)), percent(run.outside_training))
+        rows.append(Row(cells))
+    return Table(tuple(columns), tuple(rows))
 
 
 def card_line(card: dict[str, str]) -> list[str]:
@@ -130,14 +151,14 @@ def card_line(card: dict[str, str]) -> list[str]:
 
 def _figure(worst: RunJudgement) -> tuple[Markup, str]:
     series = worst.series
-    per_unit, unit = time_in_words(float(np.ptp(series.time)))
+    per_unit, unit = time_unit(float(np.ptp(series.time)))
     time = series.time / per_unit
     curves = []
     for values, colour, dash in ((series.before, style.BEFORE, "4 2.5"), (series.after, style.AFTER, "")):
         x, y = drawn(time, values, points=_POINTS)
         curves.append(Curve(x, y, colour, dash))
     words = (
-        f"{worst.run}, {worst.averaging_s:g} s averages: "
+        f"{worst.run}, {averages(worst.averaging_s)}: "
         f"before (dashed), rms {number(worst.before.rms)} deg/h, "
         f"and after (solid), rms {number(worst.after.rms)} deg/h. Noise floor {number(worst.floor)} deg/h."
     )

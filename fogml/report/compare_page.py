@@ -8,8 +8,8 @@ from collections.abc import Mapping
 from fogml.report.figures_compare import BASELINES, residuals_in_time, rms_bars
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
-from fogml.report.verdict import stated_limits, worst_run
-from fogml.report.words import MISSING, listed, number, percent
+from fogml.report.verdict import stated_limits, unseen, worst_run
+from fogml.report.words import MISSING, averages, listed, number, percent
 from fogml.validation.results import Judgement
 
 CHOOSER = "auto"
@@ -31,7 +31,7 @@ def compare_page(judgements: Mapping[str, Judgement], failed: Mapping[str, str] 
     order = ranked(judgements)
     first = judgements[order[0]]
     best = [name for name in order if name not in BASELINES] or order
-    shown = list(dict.fromkeys([*best[:3], *(n for n in (CHOOSER, "mean") if n in judgements)]))[:4]
+    shown = list(dict.fromkeys([*best[:3], *(name for name in (CHOOSER,) if name in judgements)]))
     runs = ", ".join(run.run for run in first.test)
     return render(
         "compare.html",
@@ -40,6 +40,7 @@ def compare_page(judgements: Mapping[str, Judgement], failed: Mapping[str, str] 
         verdict=_verdict(judgements, order),
         chosen=_chosen(judgements),
         test_runs=[run.run for run in first.test],
+        unseen=unseen(first),
         train_runs=[run.run for run in first.train],
         averaging_s=first.test[0].averaging_s,
         table=_table(judgements, order),
@@ -65,7 +66,7 @@ def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]
     best = worst_run(judgements[order[0]].test)
     sentences = [
         f"{order[0]} leaves least: rms {number(best.after.rms)} deg/h of {number(best.before.rms)} deg/h on "
-        f"{best.run} ({best.averaging_s:g} s averages); the noise floor is {number(best.floor)} deg/h."
+        f"{best.run} ({averages(best.averaging_s)}); the noise floor is {number(best.floor)} deg/h."
     ]
     close = [
         name for name in order[1:] if worst_run(judgements[name].test).after.rms <= _WITHIN * best.after.rms
@@ -85,12 +86,11 @@ def _chosen(judgements: Mapping[str, Judgement]) -> str:
         return ""
     auto = judgements[CHOOSER]
     model = auto.model
-    chosen = str(model.get("chosen") or model.get("kind"))
     features = ", ".join(str(name) for name in model.get("features") or ()) or "no features"
     place = ranked(judgements).index(CHOOSER) + 1
     return (
-        f"auto chose {chosen} ({features}) by folds of the training runs alone; on the test runs it comes "
-        f"in place {place} of {len(judgements)}."
+        f"auto chose {model.get('kind')} ({features}) by folds of the training runs alone; on the test runs "
+        f"it comes in place {place} of {len(judgements)}."
     )
 
 
@@ -136,7 +136,7 @@ def _table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
     return Table(
         tuple(columns),
         tuple(rows),
-        f"What is left{several}, {worst.averaging_s:g} s averages. Noise floor {number(worst.floor)} deg/h.",
+        f"What is left{several}, {averages(worst.averaging_s)}. Noise floor {number(worst.floor)} deg/h.",
     )
 
 
@@ -150,5 +150,5 @@ def _runs_table(judgements: Mapping[str, Judgement], order: list[str]) -> Table:
     return Table(
         (("Model", "", "text"), *((run.run, "deg/h", "figure") for run in runs)),
         tuple(rows),
-        f"Rms after on each test run, {runs[0].averaging_s:g} s averages.",
+        f"Rms after on each test run, {averages(runs[0].averaging_s)}.",
     )

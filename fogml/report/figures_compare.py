@@ -9,10 +9,11 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.report import style
+from fogml.report.axes import log_axis, time_unit
 from fogml.report.page import Drawing
-from fogml.report.reduce import drawn, gap_starts, time_in_words
+from fogml.report.reduce import drawn, gap_starts
 from fogml.report.shading import segments_of, shade
-from fogml.report.words import listed, number
+from fogml.report.words import averages, listed, number
 from fogml.validation.results import Judgement, RunJudgement
 
 BASELINES = ("none", "mean")
@@ -39,7 +40,7 @@ def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawi
             y=list(order),
             orientation="h",
             name="rms",
-            text=[number(value) for value in worst],
+            text=[f"\u2002\u2002{number(value)}" for value in worst],
             textposition="outside",
             cliponaxis=False,
             marker={
@@ -57,30 +58,26 @@ def rms_bars(judgements: Mapping[str, Judgement], order: Sequence[str]) -> Drawi
             marker={"symbol": "diamond", "size": 9, "color": style.BLACK},
         )
     )
-    figure.add_vline(x=floor, line={"color": style.FLOOR, "width": 1.5, "dash": "dash"})
-    line = {"color": style.FLOOR, "dash": "dash"}
-    figure.add_trace(go.Scatter(x=[None], y=[None], mode="lines", name="noise floor", line=line))
+    figure.add_vline(x=floor, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend())
     # Bars have no zero on a logarithmic axis: they begin at a round number below everything.
     least = min(floor, min(v for v in (*worst, *stability) if v > 0))
-    start = np.floor(np.log10(0.8 * least) * 2.0) / 2.0
     figure.update_xaxes(
         title_text="left on the worst test run [deg/h], logarithmic",
-        type="log",
-        range=[start, float(np.log10(max(worst))) + 0.25],
-        dtick="D1",
+        **log_axis(0.5 * least, 1.3 * max(worst)),
     )
     figure.update_yaxes(autorange="reversed", showgrid=False)
     style.styled(figure, 130 + 30 * len(order), bargap=0.35)
-    averages = f"{runs[0].averaging_s:g} s averages"
+    over = averages(runs[0].averaging_s)
     return Drawing(
         figure,
         alt=(
-            f"What each model leaves, rms of {averages}, the best first: "
+            f"What each model leaves, rms of {over}, the best first: "
             + "; ".join(f"{name} {number(value)} deg/h" for name, value in zip(order, worst, strict=True))
             + f". Noise floor {number(floor)} deg/h."
         ),
         caption=(
-            f"{averages.capitalize()}"
+            over.capitalize()
             + (", each model's worst test run" if len(runs) > 1 else "")
             + f". Dashed: the noise floor, {number(floor)} deg/h. "
             "Hatched: the baselines without a drift model."
@@ -98,14 +95,14 @@ def residuals_in_time(judgements: Mapping[str, Judgement], names: Sequence[str],
     )
     for row, (name, judged) in enumerate(shown, start=1):
         series = judged.series
-        per_unit, unit = time_in_words(float(np.ptp(series.time)))
+        per_unit, unit = time_unit(float(np.ptp(series.time)))
         x, y = drawn(series.time / per_unit, series.after, gaps=gap_starts(series.time))
         line = {"color": style.SERIES[row - 1], "width": 1.4}
         figure.add_trace(
             go.Scatter(x=x, y=y, mode="lines", name=name, line=line, showlegend=False), row=row, col=1
         )
         for value in (judged.floor, -judged.floor):
-            figure.add_hline(y=value, row=row, col=1, line={"color": style.FLOOR, "width": 1, "dash": "dash"})
+            figure.add_hline(y=value, row=row, col=1, line=style.FLOOR_LINE)
         figure.update_yaxes(title_text=f"{name}<br>[deg/h]", title_font_size=12, row=row, col=1)
     series = shown[0][1].series
     shade(figure, segments_of(series.time / per_unit, series.regime))
@@ -117,7 +114,7 @@ def residuals_in_time(judgements: Mapping[str, Judgement], names: Sequence[str],
         figure,
         alt=f"What is left of {run} in time, on one scale. Rms: {listed(left)}.",
         caption=(
-            f"{run}: what is left, {first.averaging_s:g} s averages, all on the same scale. "
+            f"{run}: what is left, {averages(first.averaging_s)}, all on the same scale. "
             f"Dashed: the noise floor of ± {number(first.floor)} deg/h. Rms: {listed(left)}."
         ),
     )

@@ -92,12 +92,12 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
             col=column,
         )
         for value in (test.floor, -test.floor):
-            line = {"color": style.FLOOR, "width": 1, "dash": "dash"}
-            figure.add_hline(y=value, row=2, col=column, line=line)
+            figure.add_hline(y=value, row=2, col=column, line=style.FLOOR_LINE)
         figure.update_xaxes(title_text="T [°C]", row=2, col=column)
         loop = loop_between(train.series, test.series)
         if loop is not None:
             told.append(f"axis {axis} up to {number(loop.widest)} deg/h, at {number(loop.at_deg_c)} °C")
+    figure.add_trace(style.floor_in_legend(), row=2, col=1)
     figure.update_yaxes(title_text="drift [deg/h]", row=1, col=1)
     figure.update_yaxes(title_text="left [deg/h]", row=2, col=1)
     style.styled(figure, 620, legend={"y": 1.06}, margin={"t": 78})

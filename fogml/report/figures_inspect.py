@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.report import style
+from fogml.report.axes import rounded_up, time_unit
 from fogml.report.page import Drawing
-from fogml.report.reduce import drawn, time_in_words
+from fogml.report.reduce import drawn
 from fogml.report.shading import Segment, regime_word, shade
 from fogml.report.words import duration, listed, number, plural
 from fogml.runs.regimes import regimes
@@ -36,7 +37,7 @@ def recording(run: Run) -> Drawing:
         vertical_spacing=0.035,
         row_heights=[1.6, *[1.2] * (len(rows) - 1)],
     )
-    per_unit, unit = time_in_words(run.span_s)
+    per_unit, unit = time_unit(run.span_s)
     time = run.time / per_unit
     _output(figure, run, time, per_unit)
     for index, name in enumerate(run.temperature_columns):
@@ -89,7 +90,7 @@ def _output(figure: go.Figure, run: Run, time: FloatArray, per_unit: float) -> N
     x, y = drawn(time, run.gyro, gaps=run.gap_starts)
     line = {"color": style.TRAINING, "width": 0.8}
     figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name="output, all samples", line=line), row=1, col=1)
-    window_s = max(run.span_s / _AVERAGES, 20.0 * run.sample_s)
+    window_s = rounded_up(max(run.span_s / _AVERAGES, 20.0 * run.sample_s, 1e-6))
     means = block_averages(run.time, run.gyro, window_s=window_s) if run.span_s > 4.0 * window_s else None
     if means is not None and len(means) > 2:
         x, y = drawn(means.time_s / per_unit, means.values[0])
@@ -107,7 +108,7 @@ def _line(
 
 
 def _rate_window(run: Run) -> float:
-    return max(RATE_WINDOW_S, 2.0 * run.sample_s, run.span_s / _AVERAGES)
+    return max(RATE_WINDOW_S, rounded_up(max(2.0 * run.sample_s, run.span_s / _AVERAGES, 1e-6)))
 
 
 def temperature_rates(run: Run) -> dict[str, tuple[FloatArray, FloatArray, NDArray[np.intp]]]:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.report import style
+from fogml.report.axes import log_axis, time_unit
 from fogml.report.page import Drawing
-from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices, time_in_words
+from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.report.shading import in_order, regime_word, segments_of, shade
-from fogml.report.words import number, percent
+from fogml.report.words import averages, number, percent
 from fogml.validation.results import AveragedSeries, RunJudgement
 
 STEADY_DEG_C_PER_MIN = 0.05
@@ -27,15 +28,10 @@ _DIRECTIONS = (
 )
 
 
-def averages_of(judged: RunJudgement) -> str:
-    """The averaging time in words: ``100 s averages``."""
-    return f"{judged.averaging_s:g} s averages"
-
-
 def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = None) -> Drawing:
     """Temperature, drift with the model over it, and what is left with its 90 % band, in time."""
     series = judged.series
-    per_unit, unit = time_in_words(float(np.ptp(series.time)))
+    per_unit, unit = time_unit(float(np.ptp(series.time)))
     time = series.time / per_unit
     gaps = gap_starts(series.time)
     figure = make_subplots(
@@ -68,14 +64,14 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
     return Drawing(
         figure,
         alt=(
-            f"{judged.run} against time, {averages_of(judged)}: temperature from "
+            f"{judged.run} against time, {averages(judged.averaging_s)}: temperature from "
             f"{number(float(np.min(series.temperature)))} to {number(float(np.max(series.temperature)))} °C; "
             f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
             f"what is left, over a range of {number(judged.after.range)} deg/h. Bands behind: {words}."
         ),
         caption=(
-            f"{averages_of(judged).capitalize()}. Top: temperature. Middle: drift before compensation, and "
-            "the model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and "
+            f"{averages(judged.averaging_s).capitalize()}. Top: temperature. Middle: drift before compensation, "
+            "and the model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and "
             f"dashed the noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
         ),
     )
@@ -115,7 +111,8 @@ def _mark_flagged(figure: go.Figure, time: NDArray[np.float64], series: Averaged
 
 def _floor_lines(figure: go.Figure, floor: float) -> None:
     for value in (floor, -floor):
-        figure.add_hline(y=value, row=3, col=1, line={"color": style.FLOOR, "width": 1, "dash": "dash"})
+        figure.add_hline(y=value, row=3, col=1, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend(), row=3, col=1)
 
 
 def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement] = ()) -> Drawing:
@@ -171,7 +168,8 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
         col=1,
     )
     for value in (judged.floor, -judged.floor):
-        figure.add_hline(y=value, row=1, col=2, line={"color": style.FLOOR, "width": 1, "dash": "dash"})
+        figure.add_hline(y=value, row=1, col=2, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend(), row=1, col=2)
     figure.update_xaxes(title_text="T [°C]")
     figure.update_yaxes(title_text="drift [deg/h]", row=1, col=1)
     figure.update_yaxes(title_text="left [deg/h]", row=1, col=2)
@@ -183,8 +181,8 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
             f"range over {number(judged.before.range)} deg/h; after, over {number(judged.after.range)} deg/h."
         ),
         caption=(
-            f"{averages_of(judged).capitalize()}. Where warming and cooling part, drift depends on more "
-            "than the temperature, and no curve in T alone can follow it. Dashed on the right: the noise "
+            f"{averages(judged.averaging_s).capitalize()}. Where warming and cooling part, drift depends on "
+            "more than the temperature, and no curve in T alone can follow it. Dashed on the right: the noise "
             f"floor of ± {number(judged.floor)} deg/h."
         ),
     )
@@ -218,13 +216,10 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
             go.Scatter(x=[row[index] for row in rows], y=labels, mode="markers", name=name, marker=marker)
         )
     floor = judged.floor
-    figure.add_vline(x=floor, line={"color": style.FLOOR, "width": 1.4, "dash": "dash"})
-    figure.add_trace(
-        go.Scatter(
-            x=[None], y=[None], mode="lines", name="noise floor", line={"color": style.FLOOR, "dash": "dash"}
-        )
-    )
-    figure.update_xaxes(title_text="rms [deg/h]", type="log", dtick="D2")
+    figure.add_vline(x=floor, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend())
+    values = [value for row in rows for value in row[1:] if value > 0] + [floor or 1.0]
+    figure.update_xaxes(title_text="rms [deg/h]", **log_axis(min(values), max(values)))
     figure.update_yaxes(autorange="reversed")
     style.styled(figure, 120 + 38 * len(rows))
     worst = max(rows[1:], key=lambda row: row[2])
@@ -238,8 +233,8 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
             + f". Noise floor {number(floor)} deg/h."
         ),
         caption=(
-            f"Rms of the {averages_of(judged)} about the reference, by regime (with its share of the run), "
-            f"and the noise floor of {number(floor)} deg/h. "
+            f"Rms of the {averages(judged.averaging_s)} about the reference, by regime (with its share of the "
+            f"run), and the noise floor of {number(floor)} deg/h. "
             f"Most is left in: {worst[0]}, {number(worst[2])} deg/h."
         ),
         half=True,

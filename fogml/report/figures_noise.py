@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 
 from fogml.report import style
+from fogml.report.axes import log_axis
 from fogml.report.page import Drawing
 from fogml.report.words import number
 
@@ -95,9 +96,8 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
                 },
             )
         )
-    figure.update_xaxes(title_text="averaging time τ [s]", type="log", exponentformat="power")
-    figure.update_yaxes(title_text="Allan deviation [deg/h]", type="log", exponentformat="power")
-    _whole_span(figure, adev, intervals)
+    figure.update_xaxes(title_text="averaging time τ [s]", **log_axis(taus[0], taus[-1], room=0.03))
+    figure.update_yaxes(title_text="Allan deviation [deg/h]", **log_axis(*_span(adev, intervals)))
     style.styled(figure, 560)
     first, last = (f"{number(adev[i])} deg/h at {number(taus[i])} s" for i in (0, -1))
     lowest = (
@@ -136,17 +136,23 @@ def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, a
         )
     if not drawn:
         return "The data support none."
-    return "Terms that the data do not support are not drawn." if len(drawn) < len(TERM_WORDS) else ""
+    return (
+        "Terms that the data do not support, or that stay far below the curve, are not drawn."
+        if len(drawn) < len(TERM_WORDS)
+        else ""
+    )
 
 
-def _whole_span(figure: go.Figure, adev: FloatArray, intervals: FloatArray | None) -> None:
-    """Limit the axis to the curve and its intervals, where a decade apart at most."""
+def _span(adev: FloatArray, intervals: FloatArray | None) -> tuple[float, float]:
+    """From the lowest to the highest value, intervals included up to a decade beyond the curve."""
     positive = adev[adev > 0]
     if positive.size == 0:
-        return
-    low, high = positive.min(), positive.max()
-    if intervals is not None:
-        lower = intervals[:, 0][intervals[:, 0] > 0]
-        low = max(min(low, lower.min(initial=low)), low / 10.0)
-        high = min(max(high, float(np.nanmax(intervals[:, 1]))), high * 10.0)
-    figure.update_yaxes(range=[float(np.log10(low)) - 0.1, float(np.log10(high)) + 0.1])
+        return 0.1, 10.0
+    low, high = float(positive.min()), float(positive.max())
+    if intervals is None:
+        return low, high
+    lower, upper = intervals[intervals[:, 0] > 0, 0], intervals[np.isfinite(intervals[:, 1]), 1]
+    return (
+        max(float(lower.min(initial=low)), low / 10.0),
+        min(float(upper.max(initial=high)), high * 10.0),
+    )

@@ -9,7 +9,7 @@ from fogml.report.figures_index import Loop, loop_between, loops
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
 from fogml.report.verdict import worst_run
-from fogml.report.words import MISSING, listed, number
+from fogml.report.words import MISSING, averages, listed, number
 from fogml.validation.results import Judgement
 
 
@@ -68,28 +68,29 @@ def _loop(judgement: Judgement) -> Loop | None:
     return loop_between(judgement.train[0].series, judgement.test[0].series)
 
 
-def _verdict(judgements: Mapping[str, Judgement], found: Mapping[str, Loop | None]) -> str:
+def _verdict(judgements: Mapping[str, Judgement], found: Mapping[str, Loop | None]) -> list[str]:
     parts = []
     for axis, judgement in judgements.items():
         worst = worst_run(judgement.test)
-        parts.append(f"axis {axis} {number(worst.after.rms)} deg/h of {number(worst.before.rms)} deg/h")
-    averages = f"{next(iter(judgements.values())).test[0].averaging_s:g} s averages"
-    sentence = f"On a run it has not seen, the model leaves {listed(parts)} (rms, {averages})."
+        parts.append(f"{number(worst.after.rms)} of {number(worst.before.rms)} deg/h on axis {axis}")
+    over = averages(next(iter(judgements.values())).test[0].averaging_s)
+    sentence = f"On a run it has not seen, the model leaves {listed(parts)} (rms, {over})."
     widest = max(
         ((axis, loop) for axis, loop in found.items() if loop), key=lambda item: item[1].widest, default=None
     )
-    if widest is None:
-        return sentence
+    if widest is None or widest[1].rms < 2.0 * worst_run(judgements[widest[0]].test).floor:
+        return [sentence]
     axis, loop = widest
-    return (
-        f"{sentence} On axis {axis} warming and cooling lie up to {number(loop.widest)} deg/h apart at equal "
-        "temperature: a loop that no polynomial in T closes."
-    )
+    return [
+        sentence,
+        f"On axis {axis} the two runs lie up to {number(loop.widest)} deg/h apart at equal temperature: "
+        "a loop that no polynomial in T closes.",
+    ]
 
 
 def _words(judgement: Judgement) -> str:
     worst = worst_run(judgement.test)
-    kind = judgement.model.get("chosen") or judgement.model.get("kind")
+    kind = judgement.model.get("kind")
     return (
         f"{kind}, rms {number(worst.after.rms)} of {number(worst.before.rms)} deg/h, "
         f"noise floor {number(worst.floor)} deg/h"
@@ -112,7 +113,7 @@ def _table(
             Row(
                 (
                     f"axis {axis}",
-                    str(judgement.model.get("chosen") or judgement.model.get("kind")),
+                    str(judgement.model.get("kind")),
                     number(worst.before.rms),
                     *others,
                     number(worst.after.rms),
@@ -135,5 +136,5 @@ def _table(
             ("Distance of the runs at equal T, rms", "deg/h", "figure"),
         ),
         tuple(rows),
-        f"On {test.run} and its like, {test.averaging_s:g} s averages.",
+        f"On {test.run} and its like, {averages(test.averaging_s)}.",
     )

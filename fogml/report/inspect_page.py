@@ -10,7 +10,7 @@ from fogml.report.figures_inspect import recording
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.shading import in_order, regime_word
 from fogml.report.tables import Noticed, Row, Table, noticed
-from fogml.report.words import MISSING, duration, listed, number, percent, plural
+from fogml.report.words import MISSING, duration, listed, number, percent, plural, stated
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
 
@@ -112,7 +112,14 @@ def _tiles(told: Mapping[str, Any]) -> list[Tile]:
         tiles.append(Tile("Temperature span", number(widest[1]["span"]), "°C", widest[0]))
     if rates:
         rise, fall = max(r["fastest_rise"] for r in rates), min(r["fastest_fall"] for r in rates)
-        tiles.append(Tile("Fastest change", f"+{number(rise)}, {number(fall)}", "°C/min", "rise, fall"))
+        tiles.append(
+            Tile(
+                "Fastest change",
+                number(max(rise, -fall)),
+                "°C/min",
+                f"rise {number(rise)}, fall {number(fall)}",
+            )
+        )
     return tiles
 
 
@@ -158,8 +165,8 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
     for segment in segments:
         cells = [
             regime_word(segment["regime"]),
-            number(segment["from_s"], 6),
-            number(segment["to_s"], 6),
+            stated(round(segment["from_s"], 3)),
+            stated(round(segment["to_s"], 3)),
             duration(segment["to_s"] - segment["from_s"]),
         ]
         if with_temperature:
@@ -171,7 +178,9 @@ def _regimes(segments: Sequence[Mapping[str, Any]]) -> Table | None:
 def _gaps(gaps: Sequence[Mapping[str, Any]]) -> Table | None:
     if not gaps:
         return None
-    rows = [Row((str(gap["row"]), number(gap["after_s"], 6), duration(gap["length_s"]))) for gap in gaps]
+    rows = [
+        Row((str(gap["row"]), stated(round(gap["after_s"], 3)), duration(gap["length_s"]))) for gap in gaps
+    ]
     return Table(
         (("First row after the gap", "", "figure"), ("Begins after", "s", "figure"), ("Lasts", "", "figure")),
         tuple(rows),

@@ -26,10 +26,11 @@ def noise_page(noise: Mapping[str, Any]) -> str:
     ----------
     noise
         Schema ``fogml.noise/1``. Beside its keys these are shown where they are there: ``run``,
-        ``span_s``, ``sample_s``, ``overlapping``, ``level``, ``findings``, ``notes``,
-        ``serial_number`` and ``axis``, and per term ``fitted``.
+        ``span_s``, ``sample_s``, ``overlapping``, ``level``, ``stretches``, ``warnings``, ``notes``,
+        ``findings``, ``serial_number`` and ``axis``, and per term ``reason``.
     """
     name = str(noise.get("run", "run"))
+    warned = {warning["message"] for warning in noise.get("warnings", ())}
     return render(
         "noise.html",
         title=f"{name} – noise",
@@ -41,7 +42,8 @@ def noise_page(noise: Mapping[str, Any]) -> str:
         terms=_terms(noise),
         table=_deviations(noise),
         findings=noticed(noise.get("findings", ())),
-        notes=list(noise.get("notes", ())),
+        warnings=[warning["message"] for warning in noise.get("warnings", ())],
+        notes=[note for note in noise.get("notes", ()) if note not in warned],
         about=_about(noise),
     )
 
@@ -65,7 +67,7 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
     tiles = []
     for key in ("N", "B", "K"):
         term = noise["terms"].get(key) or {}
-        if term.get("value"):
+        if term.get("value") and (term.get("ci") or [1.0])[0]:
             tiles.append(
                 Tile(TERM_WORDS[key].capitalize(), number(term["value"]), _unit(term), _interval(term))
             )
@@ -76,7 +78,7 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
                 "Minimum",
                 number(minimum["adev"]),
                 "deg/h",
-                f"at {duration(minimum['tau_s'])}; B = minimum / 0.664",
+                f"at {number(minimum['tau_s'])} s; B = minimum / 0.664",
             )
         )
     return tiles
@@ -88,7 +90,8 @@ def _terms(noise: Mapping[str, Any]) -> Table:
         term = noise["terms"].get(key) or {}
         value, interval = term.get("value"), term.get("ci") or [None, None]
         if value is None:
-            told = "not seen" if interval[1] is None else f"no more than {number(interval[1])}"
+            bound = "not seen" if interval[1] is None else f"no more than {number(interval[1])}"
+            told = str(term.get("reason") or bound)
         else:
             told = "seen" if interval[0] else "not told from zero"
         rows.append(Row((f"{key}, {words}", number(value), _interval(term), _unit(term), told)))
@@ -130,6 +133,8 @@ def _about(noise: Mapping[str, Any]) -> list[tuple[str, str]]:
     for key, words in (("span_s", "span"), ("sample_s", "sample interval")):
         if noise.get(key):
             rows.append((words, duration(float(noise[key]))))
+    if int(noise.get("stretches") or 1) > 1:
+        rows.append(("stretches", str(noise["stretches"])))
     return rows
 
 

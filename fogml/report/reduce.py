@@ -96,14 +96,3 @@ def drawn(
     places = places[(places > 0) & (places < len(kept))]
     middle = 0.5 * (time[kept[places - 1]] + time[kept[places]])
     return np.insert(time[kept], places, middle), np.insert(values[kept], places, np.nan)
-
-
-def time_in_words(span_s: float) -> tuple[float, str]:
-    """Seconds per unit, and the unit, in which a time axis of this span reads best."""
-    if span_s > 2.0 * 86400.0 * 3.0:
-        return 86400.0, "d"
-    if span_s > 3.0 * 3600.0:
-        return 3600.0, "h"
-    if span_s > 300.0:
-        return 60.0, "min"
-    return 1.0, "s"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from itertools import pairwise
 
 import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
+from fogml.report.reduce import gap_starts
 from fogml.report.style import REGIME_TINTS, REGIME_WORDS
 
 Segment = tuple[str, float, float]
@@ -22,13 +22,17 @@ _MOST_BANDS = 200
 def segments_of(time: ArrayLike, regime: NDArray[np.str_]) -> list[Segment]:
     """Stretches of one regime from times and names of shape (n,), which must not be empty.
 
-    Bands meet halfway between the samples on either side of a change.
+    Bands meet halfway between the samples on either side of a change, and stop at gaps.
     """
     time = np.asarray(time, dtype=np.float64)
-    changes = np.flatnonzero(regime[1:] != regime[:-1]) + 1
-    edges = [time[0], *(0.5 * (time[changes - 1] + time[changes])), time[-1]]
-    names = [str(regime[start]) for start in (0, *changes)]
-    return [(name, float(a), float(b)) for name, (a, b) in zip(names, pairwise(edges), strict=True)]
+    gaps = gap_starts(time)
+    starts = np.union1d(np.flatnonzero(regime[1:] != regime[:-1]) + 1, gaps).astype(np.intp)
+    broken = np.isin(starts, gaps)
+    halfway = 0.5 * (time[starts - 1] + time[starts])
+    begins = np.concatenate([time[:1], np.where(broken, time[starts], halfway)])
+    ends = np.concatenate([np.where(broken, time[starts - 1], halfway), time[-1:]])
+    names = regime[np.concatenate([[0], starts]).astype(np.intp)]
+    return [(str(name), float(a), float(b)) for name, a, b in zip(names, begins, ends, strict=True)]
 
 
 def shade(figure: go.Figure, segments: Sequence[Segment], xref: str = "x") -> list[str]:

@@ -50,6 +50,8 @@ REGIME_WORDS = {
     "turning": "turning",
 }
 
+FLOOR_LINE = {"color": FLOOR, "width": 1.2, "dash": "dash"}
+
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', Arial, sans-serif"
 _INK = "#1F2328"
 _GRID = "#E4E7EB"
@@ -88,12 +90,17 @@ TEMPLATE = go.layout.Template(
             "y": 1.02,
             "yanchor": "bottom",
             "traceorder": "normal",
-            "itemsizing": "constant",
+            "itemwidth": 40,
         },
         "hoverlabel": {"font": {"family": FONT, "size": 12}},
         "separators": ".\u202f",
     }
 )
+
+
+def floor_in_legend() -> go.Scatter:
+    """A trace without points that gives the floor's line a place in the legend."""
+    return go.Scatter(x=[None], y=[None], mode="lines", name="noise floor", line=FLOOR_LINE)
 
 
 def styled(figure: go.Figure, height: int, **layout: Any) -> go.Figure:

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
-from fogml.report.words import label, number, percent, unit_of
+from fogml.report.words import averages, label, number, percent, unit_of
 from fogml.runs.findings import Finding
 from fogml.validation.results import Metrics, RunJudgement
 
@@ -65,7 +65,7 @@ def metrics_table(judged: RunJudgement) -> Table:
         ),
         rows=tuple(rows),
         caption=(
-            f"{judged.averaging_s:g} s averages where not said otherwise; "
+            f"{averages(judged.averaging_s)} where not said otherwise; "
             f"bias relative to {reference_of(judged)}."
         ),
     )
@@ -77,7 +77,7 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
         Row(
             (
                 run.run,
-                f"{run.averaging_s:g}",
+                f"{run.averaging_s:.4g}",
                 *(
                     f"{number(getattr(run.before, name))} → {number(getattr(run.after, name))}"
                     for name in ("bias", "bias_stability", "range", "rms")
@@ -129,6 +129,25 @@ def coefficients_table(model: Mapping[str, Any]) -> Table | None:
             ("Standard error", "", "figure"),
         ),
         rows=tuple(Row((name, number(value, 5), number(error, 2))) for name, value, error in told),
+    )
+
+
+def candidates_table(model: Mapping[str, Any]) -> Table | None:
+    """What a choosing model weighed, the best first, by its rms on what folds held out."""
+    candidates = sorted(model.get("candidates") or (), key=lambda told: float(told["held_out_rms"]))
+    if not candidates:
+        return None
+    return Table(
+        columns=(
+            ("Candidate", "", "text"),
+            ("Parameters", "", "figure"),
+            ("Rms held out", "deg/h", "figure"),
+        ),
+        rows=tuple(
+            Row((str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"]))))
+            for told in candidates
+        ),
+        caption="On parts left out of training in turn; where candidates tie, the smaller is taken.",
     )
 
 

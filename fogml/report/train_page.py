@@ -7,9 +7,17 @@ from dataclasses import dataclass
 
 from fogml.report import figures_judgement
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.tables import Noticed, Table, coefficients_table, metrics_table, noticed, runs_table
-from fogml.report.verdict import improves, model_card, stated_limits, subject, verdict, worst_run
-from fogml.report.words import number, percent, plural, stated, unit_of
+from fogml.report.tables import (
+    Noticed,
+    Table,
+    candidates_table,
+    coefficients_table,
+    metrics_table,
+    noticed,
+    runs_table,
+)
+from fogml.report.verdict import improves, model_card, stated_limits, subject, unseen, verdict, worst_run
+from fogml.report.words import averages, number, percent, plural, stated, unit_of
 from fogml.validation.results import Judgement, RunJudgement
 
 
@@ -50,13 +58,15 @@ def train_page(judgement: Judgement) -> str:
         limits=stated_limits(judgement),
         tiles=headline_tiles(judgement),
         sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
-        test_table=runs_table(judgement.test, "Before → after, on runs that the model has not seen."),
+        test_table=runs_table(judgement.test, "Before → after."),
+        unseen=unseen(judgement),
         train_table=runs_table(
             judgement.train,
             "Before → after, on the runs that the model was fitted to: how well it was fitted.",
         ),
         card=model_card(judgement.model),
         coefficients=coefficients_table(judgement.model),
+        candidates=candidates_table(judgement.model),
         train_findings=[(run.run, noticed(run.findings)) for run in judgement.train if run.findings],
         notes=_notes(judgement),
         unit_of=unit_of,
@@ -66,15 +76,15 @@ def train_page(judgement: Judgement) -> str:
 def headline_tiles(judgement: Judgement) -> list[Tile]:
     """Before, after, floor and improvement of the worst test run."""
     worst = worst_run(judgement.test)
-    averages = figures_judgement.averages_of(worst)
-    on = f"{worst.run}, {averages}" if len(judgement.test) > 1 else averages
+    over = averages(worst.averaging_s)
+    on = f"{worst.run}, {over}" if len(judgement.test) > 1 else over
     ratio = worst.before.rms / worst.after.rms if worst.after.rms > 0 else float("inf")
     gain = f"{number(ratio, 2)} × smaller" if ratio >= 1 else f"{number(1 / ratio, 2)} × larger"
     tiles = [
         Tile("Rms before", number(worst.before.rms), "deg/h", on),
         Tile("Rms after", number(worst.after.rms), "deg/h", gain, "" if improves(worst) else "missed"),
-        Tile("Bias stability after", number(worst.after.bias_stability), "deg/h", averages),
-        Tile("Noise floor", number(worst.floor), "deg/h", averages),
+        Tile("Bias stability after", number(worst.after.bias_stability), "deg/h", over),
+        Tile("Noise floor", number(worst.floor), "deg/h", over),
         Tile("Outside training", percent(worst.outside_training), "", "of the samples judged"),
     ]
     index = judgement.design_index

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fogml.report.tables import reference_of
-from fogml.report.words import label, listed, number, percent, plural, stated, unit_of
+from fogml.report.words import averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
+SEEN = "seen_in_training"
+"""Code of the finding that a test run holds the samples of a training run."""
 _NOTICED_SHARE = 0.01
 
 
@@ -41,9 +43,15 @@ def verdict(judgement: Judgement) -> list[str]:
     return [
         *_what_is_left(judgement, worst),
         *_bias(worst),
+        *_seen(judgement),
         *_limits(stated_limits(judgement)),
         *_outside(judgement.test),
     ]
+
+
+def unseen(judgement: Judgement) -> bool:
+    """Whether no test run holds the samples of a training run."""
+    return not any(finding.code == SEEN for run in judgement.test for finding in run.findings)
 
 
 def improves(judged: RunJudgement) -> bool:
@@ -58,20 +66,22 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
         f", the worst of {plural(len(judgement.test), 'test run')}," if several else ""
     )
     before, after = number(worst.before.bias_stability), number(worst.after.bias_stability)
-    averages = f"bias stability, {worst.averaging_s:g} s averages"
+    over = averages(worst.averaging_s)
     floor = f"the noise floor is {number(worst.floor)} deg/h"
     if kind in ("none", "mean"):
         left = f"{where} nothing is compensated"
         if kind == "mean":
             left = f"{where} only the training runs' mean is taken off"
-        return [f"{left}: {after} deg/h stays ({averages}); {floor}."]
+        return [f"{left}: {after} deg/h stays (bias stability, {over}); {floor}."]
     if worst.after.rms >= worst.before.rms:
         return [
             f"{where} the {kind} model does harm: rms goes from {number(worst.before.rms)} to "
             f"{number(worst.after.rms)} deg/h, bias stability from {before} to {after} deg/h "
-            f"({worst.averaging_s:g} s averages); {floor}."
+            f"({over}); {floor}."
         ]
-    sentence = f"{where} the {kind} model leaves {after} deg/h of {before} deg/h ({averages}); {floor}."
+    sentence = (
+        f"{where} the {kind} model leaves {after} deg/h of {before} deg/h (bias stability, {over}); {floor}."
+    )
     harmed = [run.run for run in judgement.test if not improves(run)]
     return [sentence, f"It makes {listed(harmed)} worse."] if harmed else [sentence]
 
@@ -83,6 +93,15 @@ def _bias(worst: RunJudgement) -> list[str]:
     return [
         f"Its mean is off by {number(worst.after.bias)} deg/h from {reference_of(worst)}; with that, "
         f"the rms is {number(worst.after.rms)} deg/h."
+    ]
+
+
+def _seen(judgement: Judgement) -> list[str]:
+    if unseen(judgement):
+        return []
+    return [
+        "A test run holds the samples of a training run: the figures say how well the model fits, "
+        "not how well it holds."
     ]
 
 
@@ -124,4 +143,20 @@ def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
     for key in ("unit", "axis"):
         if model.get(key):
             rows.append((key, str(model[key])))
+    if model.get("box"):
+        spans = [f"{name} {number(low)} to {number(high)}" for name, (low, high) in model["box"].items()]
+        rows.append(("trained within", "; ".join(spans)))
+    interval = model.get("interval") or {}
+    if interval.get("half_width_90") is not None:
+        rows.append(("90 % band", interval_words(interval)))
+    if model.get("chosen_by"):
+        rows.append(("chosen by", f"{model['chosen_by']}, among those below"))
     return rows
+
+
+def interval_words(interval: Mapping[str, Any]) -> str:
+    """The 90 % band of a model and what it stands on."""
+    return (
+        f"± {number(float(interval['half_width_90']))} deg/h for {averages(interval['averaging_s'])}, "
+        f"from {plural(int(interval['residuals']), 'residual')} of parts left out of training"
+    )

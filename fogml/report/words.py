@@ -80,6 +80,11 @@ def listed(names: Sequence[str], most: int = 4) -> str:
     return ", ".join(names[:-1]) + " and " + names[-1]
 
 
+def averages(seconds: float) -> str:
+    """The averaging time in words: ``100 s averages``."""
+    return f"{seconds:.4g} s averages"
+
+
 def duration(seconds: float) -> str:
     """A span of time in the unit that reads best: ``36 s``, ``12.5 min``, ``7.58 h``, ``4.2 d``."""
     if seconds < 120:

@@ -1,10 +1,13 @@
 (function () {
   "use strict";
   var PAPER_WIDTH = 672; // px on A4 within the margins of the style sheet
+  // The buttons are named one by one: plotly's own choice holds one that sends the chart away.
   var options = {
     displaylogo: false,
     responsive: true,
-    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
+    plotlyServerURL: "",
+    topojsonURL: "",
+    modeBarButtons: [["zoom2d", "pan2d", "zoomIn2d", "zoomOut2d", "resetScale2d"], ["toImage"]],
     toImageButtonOptions: { format: "svg" }
   };
   var waiting = Array.prototype.slice.call(document.querySelectorAll(".plot"));
