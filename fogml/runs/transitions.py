@@ -131,14 +131,14 @@ def _spread(values: FloatArray) -> float:
 def _level_changes(run: Run, values: FloatArray, least: float) -> _Changes:
     """Where a series moves by more than `least` within a second, single outliers left out."""
     lag = max(1, round(_LAG_S / run.sample_s))
-    lag = min(lag, len(values) - 1)
     clean = _median_of_three(values)
-    moved = np.abs(clean[lag:] - clean[:-lag]) > least
+    earlier = np.concatenate([np.full(lag, clean[0]), clean])[: len(clean)]
+    moved = np.abs(clean - earlier) > least
     edges = np.flatnonzero(np.diff(np.concatenate([[False], moved, [False]]).astype(np.int8)))
-    # Row i + lag differs from row i: the first such row begins the change, and a lag after the
-    # last one has ended it.
-    start, stop = edges[::2] + lag, edges[1::2]
-    stop = np.maximum(np.minimum(stop, len(values) - 1), start)
+    # The first row that differs from the one a lag before begins the change; a lag before the
+    # last such row it has ended.
+    start, stop = edges[::2], edges[1::2]
+    stop = np.where(stop < len(values), np.maximum(stop - lag, start), len(values) - 1)
     brief = run.time[stop] - run.time[start] <= max(LONGEST_TRANSITION_S, 3.0 * run.sample_s)
     return _Changes(start[brief], stop[brief])
 

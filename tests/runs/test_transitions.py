@@ -1,0 +1,157 @@
+"""Changes of the table's rate: found where they were put, timed, and cut by the stated margin."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts, ScaleFactor
+from fogml.runs.run import Run
+from fogml.runs.shipped import shipped_names, shipped_run
+from fogml.runs.transitions import find_transitions, time_to_rate_s, transition_mask
+
+CHANGES = np.array([200.0, 260.0, 320.0, 500.0, 560.0])
+LEVELS = np.array([0.0, -10.0, 10.0, 0.0, 10.0, 0.0])
+
+
+def commanded(time: np.ndarray) -> np.ndarray:
+    return LEVELS[np.searchsorted(CHANGES, time, side="right")]
+
+
+def followed(time: np.ndarray, acceleration: float) -> np.ndarray:
+    """The table's true rate: each change at a constant acceleration [deg/s^2]."""
+    rate = np.full(len(time), LEVELS[0])
+    for at, step in zip(CHANGES, np.diff(LEVELS)):
+        rate += np.sign(step) * np.clip((time - at) * acceleration, 0.0, abs(step))
+    return rate
+
+
+def runs(sample_s: float, acceleration: float = np.inf, rate_noise=0.0, gyro_noise=5.0) -> dict[str, Run]:
+    time = np.arange(0.0, 800.0, sample_s)
+    command = commanded(time)
+    true = command if np.isinf(acceleration) else followed(time, acceleration)
+    rng = np.random.default_rng(5)
+    gyro = 3600.0 * true * 1.001 + 3.0 + gyro_noise * rng.standard_normal(len(time))
+    measured = true + rate_noise * rng.standard_normal(len(time))
+    return {
+        "command": Run.from_columns(time=time, gyro=gyro, rate=command),
+        "measured": Run.from_columns(time=time, gyro=gyro, rate=measured),
+        "gyro": Run.from_columns(time=time, gyro=gyro),
+    }
+
+
+@pytest.mark.parametrize("sample_s", [0.01, 0.1, 1.0, 10.0])
+@pytest.mark.parametrize("source", ["command", "measured", "gyro"])
+@pytest.mark.parametrize("acceleration", [np.inf, 10.0, 4.0])
+def test_changes_are_found_where_they_begin(sample_s, source, acceleration):
+    run = runs(sample_s, acceleration, rate_noise=0.002)[source]
+    found = run.time[find_transitions(run)]
+    assert len(found) == len(CHANGES)
+    assert np.abs(found - CHANGES).max() <= max(0.2, sample_s)
+
+
+@pytest.mark.parametrize("sample_s", [0.01, 0.1])
+@pytest.mark.parametrize("source", ["command", "measured", "gyro"])
+def test_time_to_rate_is_that_of_the_longest_change(sample_s, source):
+    run = runs(sample_s, acceleration=4.0, rate_noise=0.002)[source]
+    # 20 deg/s at 4 deg/s^2; the last 2 % of a step are within the gyro's band.
+    assert time_to_rate_s(run) == pytest.approx(5.0, abs=0.15)
+
+
+def test_a_table_that_steps_at_once_takes_no_time():
+    for run in runs(0.1).values():
+        assert time_to_rate_s(run) == 0.0
+
+
+@pytest.mark.parametrize("margin_s", [0.0, 1.0, 7.3])
+@pytest.mark.parametrize("sample_s", [0.1, 1.0])
+def test_the_mask_cuts_the_margin_and_nothing_else(margin_s, sample_s):
+    run = runs(sample_s)["command"]
+    distance = np.abs(run.time[:, None] - CHANGES).min(axis=1)
+    mask = transition_mask(run, margin_s)
+    assert mask[distance <= margin_s - 1e-9].all()
+    assert not mask[distance > max(margin_s, sample_s) + 1e-9].any()
+    assert mask[np.searchsorted(run.time, CHANGES - 1e-9) - 1].all()
+
+
+def test_the_default_margin_keeps_to_the_bounds_of_the_source():
+    run = runs(0.01, acceleration=4.0)["measured"]
+    distance = np.abs(run.time[:, None] - CHANGES).min(axis=1)
+    margin = distance[transition_mask(run)].max()
+    assert time_to_rate_s(run) < margin < time_to_rate_s(run) + 5.0
+
+
+def test_every_sample_that_is_left_is_on_a_plateau():
+    run = runs(0.1, acceleration=4.0)["command"]
+    left = ~transition_mask(run)
+    assert np.abs(followed(run.time, 4.0) - commanded(run.time))[left].max() < 1e-9
+
+
+def test_slow_samples_on_both_sides_of_a_change_are_cut():
+    run = runs(10.0)["command"]
+    rows = find_transitions(run)
+    mask = transition_mask(run)
+    assert mask[rows].all()
+    assert mask[rows - 1].all()
+    assert mask.sum() == 2 * len(rows)
+
+
+def test_counts_tell_turns_too_where_the_scale_factor_is_known():
+    run = runs(0.1)["gyro"]
+    counts = Run("counts", {"time": run.time, "gyro": run.gyro * 7.0}, gyro_unit="count")
+    assert len(find_transitions(counts)) == 0
+    facts = Facts(scale_factor=ScaleFactor(value=7.0))
+    counts = Run("counts", {"time": run.time, "gyro": run.gyro * 7.0}, facts, gyro_unit="count")
+    assert np.array_equal(find_transitions(counts), find_transitions(run))
+
+
+@pytest.mark.parametrize("name", shipped_names())
+def test_recordings_at_rest_have_none(name):
+    run = shipped_run(name)
+    assert len(find_transitions(run)) == 0
+    assert not transition_mask(run).any()
+
+
+def test_a_drifting_gyro_with_outliers_does_not_turn():
+    rng = np.random.default_rng(3)
+    time = np.arange(0.0, 3600.0)
+    gyro = 50.0 * np.sin(time / 300.0) + 0.5 * rng.standard_normal(len(time))
+    gyro[rng.integers(0, len(time), 20)] += 5e4
+    assert len(find_transitions(Run.from_columns(time=time, gyro=gyro))) == 0
+
+
+def test_a_rate_that_changes_all_the_time_is_no_transition():
+    time = np.arange(0.0, 1000.0, 0.1)
+    rate = 10.0 * np.sin(2 * np.pi * time / 400.0)
+    run = Run.from_columns(time=time, gyro=3600 * rate, rate=rate)
+    assert not transition_mask(run).any()
+
+
+@pytest.mark.parametrize("rows", [0, 1, 2, 3])
+def test_a_few_rows_are_no_trouble(rows):
+    time = np.arange(float(rows))
+    run = Run.from_columns(time=time, gyro=time, rate=time)
+    assert transition_mask(run).shape == (rows,)
+
+
+def test_a_negative_margin_is_refused():
+    with pytest.raises(InputError, match="margin"):
+        transition_mask(runs(1.0)["command"], -1.0)
+    with pytest.raises(InputError, match="margin"):
+        transition_mask(runs(1.0)["command"], float("nan"))
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    gaps=st.lists(st.integers(40, 200), min_size=1, max_size=8),
+    rates=st.lists(st.sampled_from([-100.0, -1.0, -0.01, 0.0, 0.5, 10.0]), min_size=9, max_size=9),
+    sample_s=st.sampled_from([0.05, 0.5, 3.0]),
+)
+def test_any_programme_of_commands_comes_back(gaps, rates, sample_s):
+    rate = np.repeat(rates[: len(gaps) + 1], [*gaps, 40])
+    run = Run.from_columns(time=sample_s * np.arange(len(rate)), gyro=3600 * rate, rate=rate)
+    expected = np.flatnonzero(np.diff(rate)) + 1
+    assert find_transitions(run).tolist() == expected.tolist()
