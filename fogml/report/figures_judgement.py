@@ -28,6 +28,11 @@ _DIRECTIONS = (
 )
 
 
+def over(judged: RunJudgement) -> str:
+    """The averaging time of a run in words: ``100 s averages``."""
+    return averages(judged.averaging_s)
+
+
 def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = None) -> Drawing:
     """Temperature, drift with the model over it, and what is left with its 90 % band, in time."""
     series = judged.series
@@ -64,13 +69,13 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
     return Drawing(
         figure,
         alt=(
-            f"{judged.run} against time, {averages(judged.averaging_s)}: temperature from "
+            f"{judged.run} against time, {over(judged)}: temperature from "
             f"{number(float(np.min(series.temperature)))} to {number(float(np.max(series.temperature)))} °C; "
             f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
             f"what is left, over a range of {number(judged.after.range)} deg/h. Bands behind: {words}."
         ),
         caption=(
-            f"{averages(judged.averaging_s).capitalize()}. Top: temperature. Middle: drift before compensation, "
+            f"{over(judged).capitalize()}. Top: temperature. Middle: drift before compensation, "
             "and the model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and "
             f"dashed the noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
         ),
@@ -181,9 +186,9 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
             f"range over {number(judged.before.range)} deg/h; after, over {number(judged.after.range)} deg/h."
         ),
         caption=(
-            f"{averages(judged.averaging_s).capitalize()}. Where warming and cooling part, drift depends on "
-            "more than the temperature, and no curve in T alone can follow it. Dashed on the right: the noise "
-            f"floor of ± {number(judged.floor)} deg/h."
+            f"{over(judged).capitalize()}. Where warming and cooling part, drift depends on "
+            "more than the temperature, and no curve in T alone can follow it. Dashed on the right: the "
+            f"noise floor of ± {number(judged.floor)} deg/h."
         ),
     )
 
@@ -233,7 +238,7 @@ def rms_by_regime(judged: RunJudgement) -> Drawing:
             + f". Noise floor {number(floor)} deg/h."
         ),
         caption=(
-            f"Rms of the {averages(judged.averaging_s)} about the reference, by regime (with its share of the "
+            f"Rms of the {over(judged)} about the reference, by regime (with its share of the "
             f"run), and the noise floor of {number(floor)} deg/h. "
             f"Most is left in: {worst[0]}, {number(worst[2])} deg/h."
         ),
