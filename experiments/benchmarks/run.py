@@ -1,0 +1,96 @@
+"""Measure speed and memory: ``python -m experiments.benchmarks [--quick] [--only NAME] [--big] [--out DIR]``.
+
+Writes ``results.json`` and ``results.md`` beside this file, or into DIR. Run it on a machine that
+does nothing else. Exit 1: a limit was not met.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.benchmarks import harness
+from experiments.benchmarks.jobs import JOBS
+from experiments.benchmarks.machine import describe_machine
+from experiments.benchmarks.pages import results_page
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the jobs asked for; the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m experiments.benchmarks", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="small sizes: checks the jobs, measures nothing")
+    parser.add_argument("--only", action="append", metavar="NAME", help="this job; may be given again")
+    parser.add_argument("--big", action="store_true", help="with the jobs of 100 million rows")
+    parser.add_argument("--repeats", type=int, default=harness.LEAST_REPEATS, help="pairs (5)")
+    parser.add_argument(
+        "--out",
+        type=Path,
+        help="folder for results.json and results.md (this one, for all jobs at full size)",
+    )
+    parser.add_argument("--list", action="store_true", help="names and titles of the jobs")
+    parser.add_argument("--peak", metavar="NAME", help=argparse.SUPPRESS)
+    asked = parser.parse_args(arguments)
+    jobs = {job.name: job for job in JOBS}
+    unknown = [
+        name for name in [*(asked.only or []), *([asked.peak] if asked.peak else [])] if name not in jobs
+    ]
+    if unknown:
+        parser.error(f"no job {unknown[0]!r}; there are {', '.join(jobs)}")
+    if asked.list:
+        for job in JOBS:
+            print(f"{job.name:22} {job.title}{' (--big)' if job.big else ''}")
+        return 0
+    if asked.peak:
+        return _peak(jobs[asked.peak], asked.quick)
+    if asked.repeats < harness.LEAST_REPEATS and not asked.quick:
+        parser.error(f"a median of fewer than {harness.LEAST_REPEATS} says little; give --repeats 5 or more")
+    chosen = (
+        [jobs[name] for name in asked.only] if asked.only else [j for j in JOBS if asked.big or not j.big]
+    )
+    results = _measure(chosen, asked)
+    # What is kept beside the code is the whole, at full size.
+    out = asked.out or (None if asked.quick or asked.only else Path(__file__).parent)
+    if out:
+        out.mkdir(parents=True, exist_ok=True)
+        text = json.dumps(results, indent=2, allow_nan=False, ensure_ascii=False)
+        (out / "results.json").write_text(text + "\n", encoding="utf-8")
+        (out / "results.md").write_text(results_page(results), encoding="utf-8")
+    print(results_page(results))
+    met = all(held["met"] for job in results["jobs"] for held in job["held"])
+    return 0 if met else 1
+
+
+def _measure(jobs: Sequence[harness.Job], asked: argparse.Namespace) -> dict[str, Any]:
+    measured = []
+    for job in jobs:
+        print(f"{job.name}: {job.title}", file=sys.stderr)
+        with tempfile.TemporaryDirectory(prefix="fogml-benchmark-") as folder:
+            measured.append(harness.measure(job, Path(folder), quick=asked.quick, repeats=asked.repeats))
+    words = ["python -m experiments.benchmarks"]
+    words += [flag for flag, given in (("--quick", asked.quick), ("--big", asked.big)) if given]
+    words += [f"--only {name}" for name in asked.only or []]
+    return {
+        "schema": "fogml.benchmarks/1",
+        "command": " ".join(words),
+        "machine": describe_machine(),
+        "repeats": asked.repeats,
+        "quick": asked.quick,
+        "jobs": measured,
+    }
+
+
+def _peak(job: harness.Job, quick: bool) -> int:
+    with tempfile.TemporaryDirectory(prefix="fogml-benchmark-") as folder:
+        job.prepare(quick, Path(folder)).ours()
+    print(json.dumps({"peak_mb": harness.high_water_mb(os.getpid())}))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
