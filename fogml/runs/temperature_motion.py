@@ -225,7 +225,7 @@ def _refined(
         stays = grid.time[following - 1] - grid.time[stop - 1] >= SHORTEST_STAY_S
         if not stays:
             stop = following
-        bounds = [start, *_resumptions(grid, rate, start, stop), stop]
+        bounds = [start, *_resumptions(grid, values, start, stop), stop]
         for first, last in pairwise(bounds):
             knee = _knee(grid, values, np.abs(rate), first, last, stays or len(bounds) > 2)
             moves.append(Move(first, knee, last, direction, float(values[last - 1] - values[first])))
@@ -244,19 +244,21 @@ def _onset(
     return start + int(np.argmax(left)) if left.any() else start
 
 
-def _resumptions(grid: Grid, rate: FloatArray, start: int, stop: int) -> list[int]:
+def _resumptions(grid: Grid, values: FloatArray, start: int, stop: int) -> list[int]:
     """Bins within a move at which it takes up speed again after less than half of it.
 
-    They tell the steps of a staircase whose stays are too short for the sensor to settle.
+    They tell the steps of a staircase whose stays are too short for the sensor to settle. Speeds
+    are those over the time of the least travel, so the steps of a coarse sensor count for nothing.
     """
-    bins = np.searchsorted(grid.time, np.arange(grid.time[start], grid.time[stop - 1], _COARSE_S))
-    bins = np.unique(bins[bins < stop])
-    if len(bins) < 3:
-        return []
-    speed = np.abs(np.add.reduceat(rate[start:stop], bins - start)) / np.diff(np.append(bins, stop))
+    duration = grid.time[stop - 1] - grid.time[start]
+    travel = abs(values[stop - 1] - values[start])
+    step_s = max(_COARSE_S, duration * LEAST_TRAVEL_DEGC / max(travel, LEAST_TRAVEL_DEGC))
+    edges = grid.time[start] + step_s * np.arange(int(duration / step_s) + 1)
+    speed = np.abs(np.diff(np.interp(edges, grid.time, values)))
+    bins = np.searchsorted(grid.time, edges)
     found: list[int] = []
     peak, low, low_at = 0.0, np.inf, 0
-    # Two steps a minute, over the moves only: short whatever the sampling.
+    # A few steps for each degree of travel: short whatever the sampling.
     for at, value in enumerate(speed.tolist()):
         if low < 0.5 * peak and value > max(2.0 * low, 0.5 * peak):
             found.append(int(bins[low_at]))
