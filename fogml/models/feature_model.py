@@ -14,13 +14,14 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
-from fogml.models.box import distance_outside, learn_box
+from fogml.models.box import distance_outside, learn_box, limit_atoms
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
 from fogml.models.regressors import (
     fit_regressor,
+    goes_on_linearly,
     parameter_count,
     predict_rows,
     refit,
@@ -129,7 +130,8 @@ class FeatureModel(DriftModel):
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""
-        limited, outside = self.features_.limit(atoms, full)
+        linear = goes_on_linearly(self.regressor_)
+        limited, outside = limit_atoms(self.features_, atoms, full, linear=linear)
         drift = np.empty(len(atoms))
         step = max(1, _PREDICTED_VALUES // len(self.features_))
         for start in range(0, len(atoms), step):

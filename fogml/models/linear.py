@@ -56,6 +56,8 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         With ``ridge="auto"``, mean squared error on left-out folds for each ridge.
     """
 
+    linear_beyond = True
+
     def __init__(self, ridge: float | Literal["auto"] = 0.0, fit_intercept: bool = True) -> None:
         self.ridge = ridge
         self.fit_intercept = fit_intercept
@@ -74,9 +76,7 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
             neighbouring rows dealt to 5 folds in turn.
         """
         least = 2 if isinstance(self.ridge, str) else 1
-        matrix, target = validate_data(
-            self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=least
-        )
+        matrix, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=least)
         labels = dealt_folds(len(target)) if folds is None else np.asarray(folds, dtype=np.intp)
         if labels.shape != target.shape:
             raise InputError(f"folds has shape {labels.shape}, there are {len(target)} rows")

@@ -8,6 +8,8 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
     predict for columns known to be finite float64;
 ``refitted(X, y)``
     a new regressor fitted to other rows, what was tuned (shape, size, ridge) being kept;
+``linear_beyond``
+    True where it goes on linearly in its inputs beyond its training rows;
 ``parameter_count``
     number of fitted parameters;
 ``to_saved()`` and ``from_saved(values, arrays)``
@@ -65,6 +67,11 @@ def predict_rows(regressor: Any, columns: FloatArray) -> FloatArray:
     starts = range(0, len(columns), _PREDICTED_ROWS)
     values = [np.asarray(regressor.predict(columns[start : start + _PREDICTED_ROWS])) for start in starts]
     return np.concatenate(values).reshape(-1) if values else np.empty(0)
+
+
+def goes_on_linearly(regressor: Any) -> bool:
+    """Whether a regressor goes on linearly in its inputs beyond its training rows."""
+    return bool(getattr(regressor, "linear_beyond", False))
 
 
 def parameter_count(regressor: Any) -> int:
