@@ -66,7 +66,7 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
         cols=len(axes),
         shared_xaxes=True,
         vertical_spacing=0.07,
-        horizontal_spacing=0.06,
+        horizontal_spacing=0.08,
         column_titles=[f"axis {axis}" for axis in axes],
     )
     told = []

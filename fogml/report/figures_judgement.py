@@ -126,7 +126,7 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
     figure = make_subplots(
         rows=1,
         cols=2,
-        horizontal_spacing=0.09,
+        horizontal_spacing=0.14,
         subplot_titles=("before, with the model", "after, on its own scale"),
     )
     for other in train:

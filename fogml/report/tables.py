@@ -72,12 +72,14 @@ def metrics_table(judged: RunJudgement) -> Table:
 
 
 def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
-    """One row per run: bias, bias stability, range and rms before and after, floor, outside."""
+    """One row per run: bias, bias stability, range and rms before and after, floor, outside.
+
+    ``caption`` follows the averaging time in the table's caption.
+    """
     rows = [
         Row(
             (
                 run.run,
-                f"{run.averaging_s:.4g}",
                 *(
                     f"{number(getattr(run.before, name))} → {number(getattr(run.after, name))}"
                     for name in ("bias", "bias_stability", "range", "rms")
@@ -92,7 +94,6 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
     return Table(
         columns=(
             ("Run", "", "text"),
-            ("Averages", "s", "figure"),
             ("Bias", "deg/h", "figure"),
             ("Bias stability", "deg/h", "figure"),
             ("Range", "deg/h", "figure"),
@@ -102,7 +103,7 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
             ("Samples used", "", "figure"),
         ),
         rows=tuple(rows),
-        caption=caption,
+        caption=f"{averages(runs[0].averaging_s).capitalize()}, before → after{caption}.",
     )
 
 

@@ -58,11 +58,11 @@ def train_page(judgement: Judgement) -> str:
         limits=stated_limits(judgement),
         tiles=headline_tiles(judgement),
         sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
-        test_table=runs_table(judgement.test, "Before → after."),
+        test_table=runs_table(judgement.test),
         unseen=unseen(judgement),
         train_table=runs_table(
             judgement.train,
-            "Before → after, on the runs that the model was fitted to: how well it was fitted.",
+            ", on the runs that the model was fitted to: how well it was fitted",
         ),
         card=model_card(judgement.model),
         coefficients=coefficients_table(judgement.model),
