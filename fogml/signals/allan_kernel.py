@@ -19,8 +19,8 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _SUM_BLOCK = 1024
-_TILE = 32_768
-"""Second differences taken for all averaging factors at a time: 256 KiB of phases, so that the
+_TILE = 65_536
+"""Second differences taken for all averaging factors at a time: 512 KiB of phases, so that the
 small factors find theirs in the second-level cache and the large ones share lines in the third."""
 _LANES = 16
 """Parts that the work is cut into, whatever the number of threads: same sums on any machine."""
