@@ -198,6 +198,9 @@ class FeatureModel(DriftModel):
         self.features_ = parse_features(str(values["features"]))
         self.features_.set_box(card.box)
         self.regressor_ = regressor_from_saved(values["regressor"], arrays)
+        columns = getattr(self.regressor_, "n_features_in_", len(self.features_))
+        if columns != len(self.features_):
+            raise ValueError(f"the regressor takes {columns} features, {len(self.features_)} are stated")
 
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:

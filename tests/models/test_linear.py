@@ -17,7 +17,9 @@ from fogml.models.linear import RIDGE_GRID, LinearRegressor
 from fogml.models.tall_least_squares import Part
 
 
-@parametrize_with_checks([LinearRegressor(), LinearRegressor(ridge=0.1), LinearRegressor(fit_intercept=False)])
+@parametrize_with_checks(
+    [LinearRegressor(), LinearRegressor(ridge=0.1), LinearRegressor(fit_intercept=False)]
+)
 def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
@@ -135,7 +137,9 @@ def test_ridge_is_scikit_learns_on_standardised_columns(ridge):
     columns = powers(temperature, 5)
     scaled = StandardScaler().fit_transform(columns)
     expected = Ridge(alpha=ridge * len(y), solver="svd").fit(scaled, y).predict(scaled)
-    np.testing.assert_allclose(LinearRegressor(ridge=ridge).fit(columns, y).predict(columns), expected, atol=1e-9)
+    np.testing.assert_allclose(
+        LinearRegressor(ridge=ridge).fit(columns, y).predict(columns), expected, atol=1e-9
+    )
 
 
 def test_automatic_ridge_is_the_best_of_plain_refits():
@@ -152,9 +156,7 @@ def test_automatic_ridge_is_the_best_of_plain_refits():
             left += np.sum((y[held] - refit.predict(columns[held])) ** 2)
         errors[ridge] = left / len(y)
     assert model.ridge_ == min(errors, key=errors.get)
-    np.testing.assert_allclose(
-        list(model.cross_validation_.values()), list(errors.values()), rtol=1e-6
-    )
+    np.testing.assert_allclose(list(model.cross_validation_.values()), list(errors.values()), rtol=1e-6)
 
 
 def test_folds_in_any_order_are_the_same_folds():

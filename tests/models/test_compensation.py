@@ -1,0 +1,107 @@
+"""Compensation block by block: as the whole, over gaps, in bounded memory."""
+
+from __future__ import annotations
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.models.compensation import compensate_blocks
+from fogml.models.feature_model import FeatureModel
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+from fogml.testing.models import synthetic_run
+
+
+@pytest.fixture(scope="module")
+def train():
+    return synthetic_run("train", 1.0)
+
+
+@pytest.fixture(scope="module")
+def gapped():
+    """Another run with short and long gaps, and a jitter on its clock."""
+    run = synthetic_run("gapped", 2.0, seed=1)
+    rng = np.random.default_rng(0)
+    keep = np.ones(len(run), dtype=bool)
+    for start, length in ((1500, 10), (3000, 40), (5000, 900), (7777, 3)):
+        keep[start : start + length] = False
+    run = replace(run, columns={name: values[keep] for name, values in run.columns.items()})
+    return run.with_columns(time=run.time + rng.uniform(-0.05, 0.05, size=len(run)))
+
+
+@pytest.mark.parametrize(
+    "features", ["T, dT", "T, dT[slope, 90 s]", "T, dT[exp, 50 s]", "T, diff(T)[first], T*dT"]
+)
+@pytest.mark.parametrize("rows", [97, 1024, 5000])
+def test_blocks_give_what_the_whole_gives(train, gapped, features, rows):
+    model = FeatureModel(features).fit(train)
+    whole = model.compensate(gapped)
+    blocks = [gapped[start : start + rows] for start in range(0, len(gapped), rows)]
+    found = list(compensate_blocks(model, blocks))
+    assert [block for block, _ in found] == blocks
+    # The jitter moves the median interval of a block a little from the run's; windows may differ there.
+    drift = np.concatenate([part.drift for _, part in found])
+    flag = np.concatenate([part.flag for _, part in found])
+    compensated = np.concatenate([part.compensated for _, part in found])
+    np.testing.assert_allclose(drift, whole.drift, atol=1e-9)
+    np.testing.assert_allclose(compensated, whole.compensated, atol=1e-9)
+    assert np.array_equal(flag, whole.flag)
+    assert (flag == 2).sum() > 100
+
+
+def test_joint_model_too(train):
+    turning = synthetic_run("turning", 1.0, turns=True)
+    model = make_model("joint").fit(turning)
+    whole = model.compensate(turning)
+    blocks = [turning[start : start + 1000] for start in range(0, len(turning), 1000)]
+    found = np.concatenate([part.compensated for _, part in compensate_blocks(model, blocks)])
+    np.testing.assert_allclose(found, whole.compensated, atol=1e-6)
+
+
+def test_columns_are_those_of_the_command(train):
+    columns = make_model("mean").fit(train).compensate(train).columns()
+    assert list(columns) == ["drift [deg/h]", "gyro_compensated [deg/h]", "flag"]
+
+
+def test_blocks_out_of_order_are_told(train):
+    model = FeatureModel("T, dT").fit(train)
+    with pytest.raises(InputError, match="time order"):
+        list(compensate_blocks(model, [train[2000:3000], train[:1000]]))
+
+
+def test_another_unit_is_refused_before_anything_is_done(train):
+    model = make_model("mean").fit(train)
+    foreign = replace(train, facts=train.facts.model_copy(update={"unit": "other"}))
+    with pytest.raises(InputError, match="--any-unit"):
+        next(compensate_blocks(model, [foreign]))
+    assert len(list(compensate_blocks(model, [foreign], any_unit=True))) == 1
+
+
+def test_empty_blocks_are_skipped(train):
+    model = FeatureModel("T, dT").fit(train)
+    assert len(list(compensate_blocks(model, [train[:0], train, train[:0]]))) == 1
+
+
+def test_memory_does_not_grow_with_the_recording(train):
+    model = make_model("polynomial").fit(train)
+
+    def blocks(count, rows=20_000):
+        for number in range(count):
+            time = np.arange(number * rows, (number + 1) * rows, dtype=np.float64)
+            temperature = 20.0 + 10.0 * np.sin(time / 3000.0)
+            yield Run.from_columns("long", facts=train.facts, time=time, gyro=temperature, T_in=temperature)
+
+    def peak(count):
+        tracemalloc.start()
+        for _ in compensate_blocks(model, blocks(count)):
+            pass
+        _, highest = tracemalloc.get_traced_memory()
+        tracemalloc.stop()
+        return highest
+
+    peak(2)
+    assert peak(30) < 1.2 * peak(3)

@@ -1,0 +1,86 @@
+"""Prediction intervals: the conformal rank, and how often they hold."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.models.feature_model import FeatureModel
+from fogml.models.intervals import Intervals, intervals_from_residuals
+from fogml.models.names import make_model
+from fogml.testing.models import synthetic_run
+
+
+def test_half_width_is_the_conformal_quantile():
+    residuals = np.random.default_rng(0).permutation(np.arange(1.0, 100.0)) * np.resize([1, -1], 99)
+    intervals = intervals_from_residuals(residuals, 100.0, "time blocks")
+    assert intervals.half_width(0.9) == 90.0
+    assert intervals.half_width(0.5) == 50.0
+    assert intervals.half_width(0.995) == 99.0
+
+
+def test_half_width_grows_outside_the_box():
+    intervals = intervals_from_residuals(np.ones(50), 100.0, "time blocks")
+    np.testing.assert_allclose(intervals.half_width(0.9, [0.0, 0.1, 1.0]), [1.0, 2.0, 11.0])
+
+
+def test_conformal_intervals_hold_as_often_as_they_say():
+    """Exchangeable residuals: coverage over many small samples is at least the level, and not far above."""
+    rng = np.random.default_rng(1)
+    held = [
+        abs(rng.standard_t(3)) <= intervals_from_residuals(rng.standard_t(3, 40), 1.0, "x").half_width(0.9)
+        for _ in range(4000)
+    ]
+    assert 0.89 < np.mean(held) < 0.925
+
+
+@pytest.mark.parametrize("level", [0.5, 0.8, 0.9])
+def test_intervals_hold_on_another_run_of_the_same_kind(level):
+    model = FeatureModel("T^1..2, dT, T_in-T_out").fit([synthetic_run(f"{s}", 1.0, seed=s) for s in (0, 1)])
+    held = []
+    for seed in range(2, 8):
+        other = synthetic_run("other", 1.0, seed=seed)
+        lower, upper = model.predict_interval(other, level)
+        full = model.evaluate(other).full
+        error, low, high = (
+            x[full][: full.sum() // 100 * 100].reshape(-1, 100).mean(axis=1)
+            for x in (other.error_deg_h, lower, upper)
+        )
+        held.append((low <= error) & (error <= high))
+    assert abs(np.mean(held) - level) < 0.06
+
+
+def test_three_runs_are_left_out_whole():
+    runs = [synthetic_run(f"{s}", 2.0, seed=s) for s in range(3)]
+    shifted = [run.with_columns(gyro=run.gyro + step) for run, step in zip(runs, (0.0, 0.3, -0.3))]
+    model = FeatureModel("T^1..2, dT, T_in-T_out").fit(shifted)
+    assert model.intervals_.folds == "whole runs"
+    # Leaving out a run that lies 0.3 off the mean of all shows 0.45 off the mean of the others.
+    assert model.intervals_.half_width(0.95) > 0.4
+    blocks = FeatureModel("T^1..2, dT, T_in-T_out").fit(shifted[:2])
+    assert blocks.intervals_.folds == "time blocks"
+
+
+def test_a_richer_model_does_not_get_a_narrower_interval_for_fitting_noise():
+    run = synthetic_run("short", 2.0)[:2400]
+    plain = make_model("mean").fit(run).intervals_.half_width(0.9)
+    rich = FeatureModel("T^1..9, dT^1..5, T*dT").fit(run).intervals_.half_width(0.9)
+    in_sample = np.std(run.error_deg_h - FeatureModel("T^1..9, dT^1..5, T*dT").fit(run).predict(run))
+    assert rich > 0.3 * in_sample and plain > 0.0
+
+
+@pytest.mark.parametrize("seconds", [200, 260, 600])
+def test_short_runs_get_intervals_too(seconds):
+    model = make_model("polynomial").fit(synthetic_run("short", 1.0)[1200 : 1200 + seconds])
+    summary = model.describe()["interval"]
+    assert summary["half_width_90"] > 0.0 and summary["residuals"] > 0 and summary["averaging_s"] <= 100.0
+
+
+def test_round_trip_and_bad_values():
+    intervals = intervals_from_residuals(np.arange(10.0), 50.0, "whole runs")
+    assert Intervals.from_dict(intervals.as_dict()) == intervals
+    with pytest.raises(InputError, match="level"):
+        intervals.half_width(1.0)
+    with pytest.raises(InputError, match="too short"):
+        intervals_from_residuals([], 50.0, "time blocks")
