@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -33,15 +34,22 @@ class Evaluation:
         Whether every feature window was full; elsewhere the drift is the static part, shape (n,).
     outside
         Whether the sample lies outside the trained box, shape (n,).
-    excess
-        How far outside, as a share of the box's span in the atom that is furthest out;
-        0 inside, shape (n,).
+    measure
+        Computes `excess`; called when that is asked for, which compensation does not.
     """
 
     drift: FloatArray
     full: BoolArray
     outside: BoolArray
-    excess: FloatArray
+    measure: Callable[[], FloatArray]
+
+    @cached_property
+    def excess(self) -> FloatArray:
+        """How far outside, as a share of the box's span in the atom that is furthest out, shape (n,).
+
+        0 inside.
+        """
+        return self.measure()
 
     @property
     def flag(self) -> NDArray[np.int8]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -42,7 +43,8 @@ class _ConstantModel(DriftModel):
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """The constant at every sample; it has no windows and no box."""
         count = len(run)
-        return Evaluation(np.full(count, self.bias_), full, np.zeros(count, dtype=np.bool_), np.zeros(count))
+        inside = np.zeros(count, dtype=np.bool_)
+        return Evaluation(np.full(count, self.bias_), full, inside, partial(np.zeros, count))
 
     def _bias(self, error: FloatArray) -> float:
         raise NotImplementedError

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -137,7 +138,7 @@ class FeatureModel(DriftModel):
         for start in range(0, len(atoms), step):
             piece = slice(start, start + step)
             drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
-        return Evaluation(drift, full, outside, distance_outside(atoms, outside, self.features_))
+        return Evaluation(drift, full, outside, partial(distance_outside, atoms, outside, self.features_))
 
     @property
     def feature_names(self) -> list[str]:

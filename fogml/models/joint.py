@@ -18,6 +18,7 @@ gyro to its own output; such runs are refused.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -117,8 +118,8 @@ class JointModel(DriftModel):
         """Drift: output as rate less the model's rate; with distance from the trained box."""
         limited, outside = limit_atoms(self.features_, atoms, full, linear=True)
         rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
-        distance = distance_outside(atoms, outside, self.features_)
-        return Evaluation(run.gyro_deg_h - rate, full, outside, distance)
+        measure = partial(distance_outside, atoms, outside, self.features_)
+        return Evaluation(run.gyro_deg_h - rate, full, outside, measure)
 
     def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
         """As for every model; besides, the output must be in the unit of training.

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from sklearn.base import RegressorMixin
 
 from fogml.errors import InputError
 
@@ -38,11 +39,14 @@ def load_sklearn(stored: NDArray[Any]) -> Any:
     data = np.asarray(stored, dtype=np.uint8).tobytes()
     trusted = _trusted(data)
     try:
-        return skops.io.loads(data, trusted=trusted)
+        regressor = skops.io.loads(data, trusted=trusted)
     except Exception as error:  # skops raises whatever a damaged archive leads it to
         raise InputError(
             f"the saved scikit-learn regressor cannot be read ({error}); train it again"
         ) from None
+    if not isinstance(regressor, RegressorMixin):
+        raise InputError(f"the saved {type(regressor).__name__} is not a regressor; it is not used")
+    return regressor
 
 
 def _trusted(data: bytes) -> list[str]:
