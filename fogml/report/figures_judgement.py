@@ -34,52 +34,81 @@ def over(judged: RunJudgement) -> str:
 
 
 def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = None) -> Drawing:
-    """Temperature, drift with the model over it, and what is left with its 90 % band, in time."""
+    """Temperature, drift with the model over it, and what is left with its 90 % band, in time.
+
+    ``interval`` is what the model tells of its band; named where it is for another averaging time.
+    """
     series = judged.series
     per_unit, unit = time_unit(float(np.ptp(series.time)))
     time = series.time / per_unit
     gaps = gap_starts(series.time)
+    panels = ["temperature", "drift", "left"] if has_temperature(series) else ["drift", "left"]
+    heights = {"temperature": 1.0, "drift": 1.5, "left": 1.5}
     figure = make_subplots(
-        rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.045, row_heights=[1, 1.5, 1.5]
+        rows=len(panels),
+        cols=1,
+        shared_xaxes=True,
+        vertical_spacing=0.045,
+        row_heights=[heights[panel] for panel in panels],
     )
 
-    def line(row: int, values: NDArray[np.float64], **trace: Any) -> None:
+    def line(panel: str, values: NDArray[np.float64], name: str, **looks: Any) -> None:
         x, y = drawn(time, values, gaps=gaps)
-        figure.add_trace(go.Scatter(x=x, y=y, mode="lines", **trace), row=row, col=1)
+        trace = go.Scatter(x=x, y=y, mode="lines", name=name, line=looks, showlegend=panel != "temperature")
+        figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
 
-    line(
-        1, series.temperature, name="temperature", line={"color": style.BLUE, "width": 1.6}, showlegend=False
-    )
-    line(2, series.before, name="drift before", line={"color": style.BEFORE, "width": 1.4})
-    line(
-        2, series.before - series.after, name="model", line={"color": style.MODEL, "width": 2, "dash": "dash"}
-    )
-    if np.isfinite(series.upper).any():
-        figure.add_trace(_band(time, series, gaps), row=3, col=1)
-    line(3, series.after, name="left after", line={"color": style.AFTER, "width": 1.4})
-    _mark_flagged(figure, time, series)
-    _floor_lines(figure, judged.floor)
-    regimes = shade(figure, segments_of(time, series.regime))
-    figure.update_yaxes(title_text="T [°C]", row=1, col=1)
-    figure.update_yaxes(title_text="drift [deg/h]", row=2, col=1)
-    figure.update_yaxes(title_text="left [deg/h]", row=3, col=1)
-    figure.update_xaxes(title_text=f"time [{unit}]", row=3, col=1)
-    style.styled(figure, 590, legend={"y": 1.05}, hovermode="x")
-    words = ", ".join(regime_word(name) for name in regimes)
+    last = len(panels)
+    if "temperature" in panels:
+        line("temperature", series.temperature, "temperature", color=style.BLUE, width=1.6)
+    line("drift", series.before, "drift before", color=style.BEFORE, width=1.4)
+    line("drift", series.before - series.after, "model", color=style.MODEL, width=2, dash="dash")
+    banded = bool(np.isfinite(series.upper).any())
+    if banded:
+        figure.add_trace(_band(time, series, gaps), row=last, col=1)
+    line("left", series.after, "left after", color=style.AFTER, width=1.4)
+    _mark_flagged(figure, time, series, last)
+    for value in (judged.floor, -judged.floor):
+        figure.add_hline(y=value, row=last, col=1, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend(), row=last, col=1)
+    named = shade(figure, segments_of(time, series.regime))
+    titles = {"temperature": "T [°C]", "drift": "drift [deg/h]", "left": "left [deg/h]"}
+    for row, panel in enumerate(panels, start=1):
+        figure.update_yaxes(title_text=titles[panel], row=row, col=1)
+    figure.update_xaxes(title_text=f"time [{unit}]", row=last, col=1)
+    style.styled(figure, 140 + 150 * last, legend={"y": 1.05}, hovermode="x")
+    words = ", ".join(regime_word(name) for name in named)
     return Drawing(
         figure,
         alt=(
-            f"{judged.run} against time, {over(judged)}: temperature from "
-            f"{number(float(np.min(series.temperature)))} to {number(float(np.max(series.temperature)))} °C; "
-            f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
+            f"{judged.run} against time, {over(judged)}: "
+            + _temperature_words(series)
+            + f"drift before over a range of {number(judged.before.range)} deg/h with the model over it; "
             f"what is left, over a range of {number(judged.after.range)} deg/h. Bands behind: {words}."
         ),
         caption=(
-            f"{over(judged).capitalize()}. Top: temperature. Middle: drift before compensation, "
-            "and the model. Bottom, on its own scale: what is left, the model's 90 % band about zero, and "
-            f"dashed the noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
+            f"{over(judged).capitalize()}. Drift before compensation with the model over it; below, on its "
+            f"own scale, what is left{_band_words(judged, interval) if banded else ''}. Dashed: the noise "
+            f"floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
         ),
     )
+
+
+def has_temperature(series: AveragedSeries) -> bool:
+    """Whether the run recorded a temperature."""
+    return bool(np.isfinite(series.temperature).any())
+
+
+def _temperature_words(series: AveragedSeries) -> str:
+    if not has_temperature(series):
+        return ""
+    low, high = float(np.nanmin(series.temperature)), float(np.nanmax(series.temperature))
+    return f"temperature from {number(low)} to {number(high)} °C; "
+
+
+def _band_words(judged: RunJudgement, interval: Mapping[str, Any] | None) -> str:
+    seconds = float((interval or {}).get("averaging_s", judged.averaging_s))
+    same = abs(seconds - judged.averaging_s) <= 1e-3 * judged.averaging_s
+    return " with the model's 90 % band about zero" + ("" if same else f" (of {averages(seconds)})")
 
 
 def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.intp]) -> go.Scatter:
@@ -104,20 +133,14 @@ def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.in
     )
 
 
-def _mark_flagged(figure: go.Figure, time: NDArray[np.float64], series: AveragedSeries) -> None:
+def _mark_flagged(figure: go.Figure, time: NDArray[np.float64], series: AveragedSeries, row: int) -> None:
     for flag, (words, symbol, colour) in _FLAGS.items():
         rows = np.flatnonzero(series.flag == flag)
         if rows.size:
             rows = rows[min_max_indices(series.after[rows], DRAWN_POINTS // 4)]
             marker = {"symbol": symbol, "color": colour, "size": 6, "line": {"width": 1.2}}
             trace = go.Scatter(x=time[rows], y=series.after[rows], mode="markers", marker=marker, name=words)
-            figure.add_trace(trace, row=3, col=1)
-
-
-def _floor_lines(figure: go.Figure, floor: float) -> None:
-    for value in (floor, -floor):
-        figure.add_hline(y=value, row=3, col=1, line=style.FLOOR_LINE)
-    figure.add_trace(style.floor_in_legend(), row=3, col=1)
+            figure.add_trace(trace, row=row, col=1)
 
 
 def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement] = ()) -> Drawing:

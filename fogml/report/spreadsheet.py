@@ -102,7 +102,7 @@ class _Writer:
 
     def cell(self, sheet: Worksheet, row: int, column: int, value: Any) -> None:
         """A number, a text, or nothing where the value is missing or not finite."""
-        if value is None:
+        if value is None or value == "":
             return
         if isinstance(value, bool | str):
             sheet.write_string(row, column, "yes" if value is True else "no" if value is False else value)

@@ -106,7 +106,11 @@ def _section(index: int, judged: RunJudgement, judgement: Judgement) -> RunSecti
         judged=judged,
         anchor=f"test-{index}",
         in_time=figures_judgement.drift_in_time(judged, judgement.model.get("interval")),
-        against_temperature=figures_judgement.drift_against_temperature(judged, judgement.train),
+        against_temperature=(
+            figures_judgement.drift_against_temperature(judged, judgement.train)
+            if figures_judgement.has_temperature(judged.series)
+            else None
+        ),
         by_regime=figures_judgement.rms_by_regime(judged),
         metrics=metrics_table(judged),
         findings=noticed(judged.findings),

@@ -1,0 +1,171 @@
+"""Figures against closed forms: what is drawn is what was judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogml.report.figures_compare import residuals_in_time, rms_bars
+from fogml.report.figures_index import loop_between
+from fogml.report.figures_inspect import temperature_rates
+from fogml.report.figures_judgement import (
+    direction_of,
+    drift_against_temperature,
+    drift_in_time,
+    rms_by_regime,
+)
+from fogml.report.figures_noise import term_deviation
+from fogml.report.page import Drawing
+from fogml.report.shading import segments_of, shade
+from fogml.report.static_svg import Curve, line_figure
+from fogml.runs.run import Run
+from tests.report.judgements import FLOOR, judged_run, judgement
+
+
+def traces(drawing: Drawing) -> dict[str, Any]:
+    return {trace.name: trace for trace in drawing.figure.data}
+
+
+def test_the_model_is_drawn_as_what_takes_before_to_after() -> None:
+    run = judged_run(offset=0.05)
+    shown = traces(drift_in_time(run))
+    assert np.allclose(shown["drift before"].y - shown["model"].y, shown["left after"].y)
+    assert np.allclose(shown["left after"].x * 3600.0, run.series.time)
+
+
+def test_the_band_stays_within_the_stretches() -> None:
+    run = judged_run(gap=True)
+    band = traces(drift_in_time(run))["90 % band"]
+    time = run.series.time / 3600.0
+    edge = int(np.argmax(np.diff(time)))
+    x = np.asarray(band.x, dtype=float)
+    assert not np.any((x > time[edge]) & (x < time[edge + 1]))
+    assert np.isnan(x).sum() == 2
+    assert np.nanmax(band.y) == pytest.approx(run.series.upper.max())
+
+
+def test_flagged_averages_are_marked_and_unflagged_are_not() -> None:
+    marked = traces(drift_in_time(judged_run(outside=0.2)))["outside training"]
+    run = judged_run(outside=0.2)
+    assert len(marked.x) == int((run.series.flag == 1).sum()) > 0
+    assert "outside training" not in traces(drift_in_time(judged_run()))
+
+
+def test_warming_and_cooling_are_drawn_apart() -> None:
+    run = judged_run()
+    shown = [t for t in drift_against_temperature(run).figure.data if t.xaxis in (None, "x")]
+    by_name = {t.name: t for t in shown}
+    assert np.mean(by_name["warming"].y) - np.mean(by_name["cooling"].y) > 0.4
+    counts = {name: len(by_name[name].x) for name in ("warming", "cooling", "steady")}
+    assert sum(counts.values()) == len(run.series.time)
+
+
+def test_directions_by_the_dead_band() -> None:
+    rate = np.array([0.2, 0.051, 0.05, 0.0, -0.05, -0.051, np.nan])
+    series = replace(judged_run().series, rate=rate)
+    assert direction_of(series).tolist() == [1, 1, 0, 0, 0, -1, 0]
+
+
+def test_rms_by_regime_is_the_rms_and_adds_up() -> None:
+    run = judged_run(left=0.2)
+    after = traces(rms_by_regime(run))["after"]
+    assert after.x[0] == pytest.approx(run.after.rms)
+    counts = [np.sum(run.series.regime == name) for name in ("start_up", "ramp_up", "ramp_down", "soak")]
+    assert np.average(np.square(after.x[1:]), weights=counts) == pytest.approx(run.after.rms**2)
+    assert [label.split(" (")[0] for label in after.y[1:]] == ["start-up", "ramp up", "ramp down", "soak"]
+
+
+def test_bars_are_the_worst_test_run() -> None:
+    models = {"rbf": judgement(3), "mean": judgement(3, left=1.0)}
+    bars = rms_bars(models, ["rbf", "mean"]).figure.data[0]
+    assert bars.x[0] == max(run.after.rms for run in models["rbf"].test)
+    assert list(bars.y) == ["rbf", "mean"]
+
+
+def test_residuals_share_one_scale() -> None:
+    models = {"rbf": judgement(), "mean": judgement(left=1.0)}
+    layout = residuals_in_time(models, ["rbf", "mean"], "b.csv").figure.layout
+    assert layout.yaxis2.matches == "y" or layout.yaxis.matches == "y2"
+
+
+def test_the_loop_between_two_runs_is_their_distance() -> None:
+    base = judged_run(n=4000).series
+    temperature = np.linspace(-20.0, 60.0, 4000)
+    first = replace(base, temperature=temperature, before=0.01 * temperature)
+    second = replace(base, temperature=temperature, before=0.01 * temperature + 0.3)
+    loop = loop_between(first, second)
+    assert loop is not None
+    assert loop.rms == pytest.approx(0.3) and loop.widest == pytest.approx(0.3)
+    assert loop_between(first, replace(second, temperature=temperature + 200.0)) is None
+
+
+@pytest.mark.parametrize(
+    ("name", "at_one_hour"),
+    [("N", 1.0), ("K", 1 / np.sqrt(3)), ("R", 1 / np.sqrt(2)), ("B", np.sqrt(2 * np.log(2) / np.pi))],
+)
+def test_terms_by_their_definition_at_one_hour(name: str, at_one_hour: float) -> None:
+    assert term_deviation(name, 1.0, np.array([3600.0]))[0] == pytest.approx(at_one_hour)
+
+
+def test_quantisation_in_microradians() -> None:
+    # sigma = sqrt(3) Q / tau, with 1 urad = 0.20626 arcsec, over 1 s in deg/h.
+    assert term_deviation("Q", 1.0, np.array([1.0]))[0] == pytest.approx(np.sqrt(3) * 0.2062648, rel=1e-6)
+
+
+@pytest.mark.parametrize(("name", "slope"), [("Q", -1.0), ("N", -0.5), ("B", 0.0), ("K", 0.5), ("R", 1.0)])
+def test_terms_have_the_slopes_of_the_standard(name: str, slope: float) -> None:
+    low, high = term_deviation(name, 0.3, np.array([10.0, 1000.0]))
+    assert np.log10(high / low) / 2.0 == pytest.approx(slope, abs=1e-12)
+
+
+def test_temperature_rates_of_a_ramp() -> None:
+    time = np.arange(7200.0)
+    run = Run.from_columns(time=time, gyro=time * 0, T=0.5 * time / 60.0)
+    rate_time, rate, gaps = temperature_rates(run)["T"]
+    assert np.allclose(rate, 0.5) and gaps.size == 0
+    assert rate_time[0] > 0.0 and rate_time[-1] < 7200.0
+
+
+def test_temperature_rates_do_not_cross_a_gap() -> None:
+    time = np.concatenate([np.arange(3600.0), 20000.0 + np.arange(3600.0)])
+    temperature = np.where(time < 10000.0, 10.0, 50.0)
+    rate_time, rate, gaps = temperature_rates(Run.from_columns(time=time, gyro=time * 0, T=temperature))["T"]
+    assert np.all(rate == 0.0) and len(gaps) == 1
+    assert rate_time[gaps[0]] > 20000.0 > rate_time[gaps[0] - 1]
+
+
+def test_regimes_become_bands_that_stop_at_gaps() -> None:
+    time = np.array([0.0, 1.0, 2.0, 3.0, 50.0, 51.0])
+    names = np.array(["soak", "soak", "ramp_up", "ramp_up", "ramp_up", "ramp_up"])
+    assert segments_of(time, names) == [("soak", 0.0, 1.5), ("ramp_up", 1.5, 3.0), ("ramp_up", 50.0, 51.0)]
+
+
+def test_a_thousand_regimes_stay_quick() -> None:
+    figure = drift_in_time(judged_run()).figure
+    before = len(figure.layout.shapes)
+    shade(figure, [("soak" if i % 2 else "ramp_up", float(i), float(i + 1)) for i in range(1000)])
+    assert len(figure.layout.shapes) - before <= 200
+
+
+def test_alternative_texts_hold_the_figures() -> None:
+    run = judged_run()
+    for drawing in (drift_in_time(run), drift_against_temperature(run), rms_by_regime(run)):
+        assert "b.csv" in drawing.alt or "Rms" in drawing.alt
+        assert "deg/h" in drawing.alt and drawing.caption
+    assert str(FLOOR) in rms_by_regime(run).alt
+
+
+def test_the_small_figure_draws_gaps_as_gaps() -> None:
+    x, y = np.arange(5.0), np.array([0.0, 1.0, np.nan, 1.0, 2.0])
+    svg = line_figure([Curve(x, y, "#000000")], "time [h]", "drift [deg/h]", "a <curve>")
+    outline = next(path for path in svg.split("<path ") if 'fill="none"' in path)
+    assert outline.count("M") == 2 and outline.count("L") == 2
+    assert "a &lt;curve&gt;" in svg
+
+
+def test_the_small_figure_of_a_constant_is_drawn() -> None:
+    svg = line_figure([Curve(np.arange(3.0), np.full(3, 2.0), "#000000")], "x", "y", "constant")
+    assert "nan" not in svg

@@ -1,0 +1,205 @@
+"""Every page: whole, self-contained, readable without seeing, with the right figures in its text."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from fogml.report import compare_page, inspect_page, noise_page, train_page
+from fogml.report.compare_page import ranked
+from fogml.report.reduce import DRAWN_POINTS
+from fogml.report.words import number
+from fogml.runs.findings import Finding
+from fogml.runs.run import Run
+from tests.report.judgements import judged_run, judgement, linear_judgement
+from tests.report.pages import Page, every_page, noise_values, recorded_run
+
+KINDS = ("train", "train of five", "compare", "inspect", "noise", "index", "certificate")
+pages = cache(every_page)
+
+
+@cache
+def page(kind: str) -> Page:
+    return Page(pages()[kind])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_is_self_contained(kind: str) -> None:
+    html, read = pages()[kind], page(kind)
+    for tag, attributes in read.elements:
+        for name in ("src", "srcset", "action", "poster", "data"):
+            assert name not in attributes, f"<{tag} {name}=...> loads something"
+        target = attributes.get("href")
+        assert target is None or not re.match(r"(?i)(\w+:)?//", target)
+    assert not read.of("link") and not read.of("iframe")
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert "url(" not in style and "@import" not in style
+    policy = next(m["content"] for m in read.of("meta") if m.get("http-equiv") == "Content-Security-Policy")
+    assert policy is not None and "default-src 'none'" in policy and "http" not in policy
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_has_language_title_and_one_heading(kind: str) -> None:
+    read = page(kind)
+    assert read.of("html")[0]["lang"] == "en"
+    title = pages()[kind].split("<title>")[1].split("</title>")[0]
+    assert len(title) > 8
+    assert len(read.of("h1")) == 1
+    assert pages()[kind].lstrip().startswith("<!doctype html>")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_plotly_is_inlined_once_and_only_where_needed(kind: str) -> None:
+    read = page(kind)
+    bundles = [script for script in read.inline_scripts if len(script) > 1_000_000]
+    assert len(bundles) == (0 if kind == "certificate" else 1)
+    assert len(pages()[kind]) < (100_000 if kind == "certificate" else 7_000_000)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_figure_says_what_it_shows_and_names_units(kind: str) -> None:
+    read = page(kind)
+    plots = [a for a in read.of("div") if "plot" in (a.get("class") or "").split()]
+    assert len(plots) == len(read.figures)
+    for attributes in [*plots, *read.of("svg")]:
+        assert attributes["role"] == "img"
+        assert len(attributes["aria-label"] or "") > 40
+    for figure in read.figures:
+        axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)]
+        titles = [axis["title"]["text"] for axis in axes if axis.get("title", {}).get("text")]
+        assert len(titles) >= 1
+        assert all("[" in title for title in titles)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_depends_on_colour_alone(kind: str) -> None:
+    # Within a panel; panels are told apart by the titles of their axes.
+    for figure in page(kind).figures:
+        looks: dict[tuple[str, ...], str] = {}
+        for trace in figure["data"]:
+            if trace["type"] != "scatter" or trace.get("showlegend") is False or trace.get("fill"):
+                continue
+            line, marker = trace.get("line", {}), trace.get("marker", {})
+            shape = (
+                trace.get("yaxis", "y"),
+                trace["mode"],
+                str(line.get("dash", "solid")) + str(line.get("width")),
+                str(marker.get("symbol")),
+            )
+            name = trace["name"]
+            assert looks.setdefault(shape, name) == name, f"{name} and {looks[shape]} differ by colour alone"
+
+
+def test_names_from_files_cannot_become_markup() -> None:
+    name = "</script><script>alert(1)</script><b>.csv"
+    judged = replace(judgement(), test=(judged_run(name, notes=("<img src=x>",)),))
+    html = train_page(judged)
+    assert "<script>alert" not in html and "<img" not in html and "<b>" not in html
+    assert name in Page(html).text
+
+
+def test_the_train_page_states_the_figures_of_the_judgement() -> None:
+    judged = judgement(5, left=0.1)
+    text = Page(train_page(judged)).text
+    for run in judged.test:
+        for field in ("bias", "bias_stability", "range", "rms"):
+            before, after = getattr(run.before, field), getattr(run.after, field)
+            assert f"{number(before)} → {number(after)}" in text
+        assert f"Test run {run.run}" in text
+    assert "100 s averages" in text and "noise floor" in text
+    assert text.count("Noise floor") >= 3
+
+
+def test_findings_notes_and_left_out_samples_are_told() -> None:
+    finding = Finding("stuck_sensor", "one value for 12 min while T_out moves", "T_in", 77, 720)
+    text = Page(train_page(judgement(findings=(finding,), notes=("MEMS unit",)))).text
+    assert "stuck sensor" in text and "column T_in, from row 77" in text
+    assert "b.csv: MEMS unit" in text
+    assert "128 samples (0.4 %) left out" in text
+
+
+def test_coefficients_and_candidates_are_shown_where_told() -> None:
+    judged = linear_judgement()
+    text = Page(train_page(judged)).text
+    assert "0.0040000" in text and "Standard error" in text
+    assert "Standard error" not in Page(train_page(judgement())).text
+    weighed = [
+        {"name": "T, dT", "parameters": 3, "held_out_rms": 0.02},
+        {"name": "no compensation", "parameters": 1, "held_out_rms": 0.2},
+    ]
+    model = {**judged.model, "chosen_by": "auto", "candidates": weighed}
+    text = Page(train_page(replace(judged, model=model))).text
+    assert "What auto weighed" in text and text.index("T, dT 3 0.0200") < text.index("no compensation")
+
+
+def test_a_model_that_tells_little_of_itself_is_shown_all_the_same() -> None:
+    judged = replace(judgement(), model={"kind": "mine"}, design_index=None, limits=(), notes=())
+    text = Page(train_page(judged)).text
+    assert "the mine model leaves" in text and "Limits" not in text
+
+
+def test_a_run_without_temperature_or_band_is_drawn() -> None:
+    run = judged_run()
+    nothing = np.full(len(run.series.time), np.nan)
+    series = replace(run.series, temperature=nothing, rate=nothing, lower=nothing, upper=nothing)
+    read = Page(train_page(replace(judgement(), test=(replace(run, series=series),))))
+    assert len(read.figures) == 2
+    assert "90 % band" not in [trace["name"] for trace in read.figures[0]["data"]]
+
+
+def test_the_comparison_is_sorted_and_names_the_choice_and_the_harm() -> None:
+    models = {n: judgement(kind=n, left=left) for n, left in (("mean", 1.0), ("M2", 2.0), ("rbf", 0.01))}
+    models["auto"] = replace(models["rbf"], model={**models["rbf"].model, "kind": "rbf", "chosen_by": "auto"})
+    assert ranked(models)[-2:] == ["mean", "M2"]
+    text = Page(compare_page(models, {"joint": "the table did not turn"})).text
+    assert "auto chose rbf (T, dT, T*dT)" in text
+    assert "Worse than no drift model (mean): M2." in text
+    assert "joint the table did not turn" in text
+    assert len(re.findall("✗ not met", text)) == 2
+
+
+def test_a_model_whose_rms_is_not_a_number_comes_last() -> None:
+    broken = judgement(kind="broken")
+    run = broken.test[0]
+    broken = replace(broken, test=(replace(run, after=replace(run.after, rms=math.nan)),))
+    assert ranked({"broken": broken, "rbf": judgement()}) == ["rbf", "broken"]
+
+
+def test_the_noise_page_tells_terms_and_warnings() -> None:
+    text = Page(noise_page(noise_values(moving=True))).text
+    assert "0.0100 0.00980 … 0.0102 deg/√h" in text
+    assert "Mind: The temperature moves by 4 degC." in text
+    assert text.count("The temperature moves by 4 degC.") == 1
+    assert "not read from a run with moving temperature" in text
+    assert "no more than 0.500" in text
+    assert "overlapping" in text
+
+
+def test_without_overlap_the_noise_page_says_so() -> None:
+    text = Page(noise_page({**noise_values(), "overlapping": False})).text
+    assert "not overlapping" in text and "rest on few pairs" in text
+
+
+def test_the_inspect_page_tells_gaps_findings_and_columns() -> None:
+    text = Page(inspect_page(recorded_run())).text
+    assert "20 000 samples" in text and "10.0 min" in text
+    assert "outliers : 12 outliers over 8 robust sigma" in text.replace("outliers 12", "outliers : 12")
+    assert "9.6481 deg/h" in text and "inner face of the fibre coil" in text
+
+
+def test_a_run_without_temperature_can_be_inspected() -> None:
+    run = Run.from_columns("static.csv", time=np.arange(500.0), gyro=np.sin(np.arange(500.0)))
+    assert "no temperature recorded" in Page(inspect_page(run)).text
+
+
+def test_long_runs_are_drawn_with_few_points() -> None:
+    read = Page(inspect_page(recorded_run(1_000_000)))
+    for trace in read.figures[0]["data"]:
+        y = trace["y"]
+        count = len(y["bdata"]) * 3 // 4 // 8 if isinstance(y, dict) else len(y)
+        assert count <= DRAWN_POINTS + 10

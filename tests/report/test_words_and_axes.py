@@ -1,0 +1,95 @@
+"""Numbers as people read them, and round numbers on axes."""
+
+from __future__ import annotations
+
+import math
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fogml.report import words
+from fogml.report.axes import log_axis, rounded_up, time_unit
+from fogml.report.static_svg import ticks
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0121, "0.0121"),
+        (0.31, "0.310"),
+        (9.996, "10.0"),
+        (0.0999949, "0.100"),
+        (15.041067, "15.0"),
+        (-0.5, "−0.500"),
+        (1e-6, "1.00 × 10^−6"),
+        (2.5e8, "2.50 × 10^8"),
+        (0.0, "0"),
+        (None, "–"),
+        (math.nan, "–"),
+        (math.inf, "∞"),
+        (-math.inf, "−∞"),
+    ],
+)
+def test_number(value: float | None, text: str) -> None:
+    assert words.number(value) == text
+
+
+@given(st.floats(1e-4, 9.9e6), st.sampled_from([-1.0, 1.0]))
+def test_a_number_is_right_to_three_digits(size: float, sign: float) -> None:
+    shown = Decimal(words.number(sign * size).replace("−", "-"))
+    assert abs(float(shown) - sign * size) <= 0.5000001 * 10 ** (math.floor(math.log10(size)) - 2)
+
+
+def test_limits_are_shown_as_they_were_stated() -> None:
+    assert words.stated(0.05) == "0.05"
+    assert words.stated(1.0) == "1"
+
+
+def test_a_share_that_is_not_zero_is_not_shown_as_zero() -> None:
+    assert words.percent(0.0) == "0 %"
+    assert words.percent(1e-5) == "under 0.1 %"
+    assert words.percent(0.99999) == "over 99.9 %"
+    assert words.percent(0.123) == "12.3 %"
+
+
+def test_lists_of_names() -> None:
+    assert words.listed(["a"]) == "a"
+    assert words.listed(["a", "b", "c"]) == "a, b and c"
+    assert words.listed(list("abcdef")) == "a, b, c and 3 more"
+
+
+def test_durations() -> None:
+    assert [words.duration(s) for s in (36, 750, 27288, 400000)] == ["36.0 s", "12.5 min", "7.58 h", "4.63 d"]
+
+
+@given(st.floats(1e-8, 1e8), st.floats(1.0001, 1e9))
+def test_a_log_axis_holds_its_values_and_has_ticks_within(low: float, factor: float) -> None:
+    axis = log_axis(low, low * factor)
+    start, stop = axis["range"]
+    assert start < math.log10(low) and stop > math.log10(low * factor)
+    assert all(start <= math.log10(tick) <= stop + 1e-9 for tick in axis["tickvals"])
+    assert len(axis["tickvals"]) == len(axis["ticktext"]) >= 1
+
+
+def test_log_ticks_read_as_plain_numbers() -> None:
+    assert log_axis(0.01, 0.5)["ticktext"] == ["0.01", "0.02", "0.05", "0.1", "0.2", "0.5"]
+    assert log_axis(1.0, 1e6, room=0.0)["ticktext"][-2:] == ["10<sup>5</sup>", "10<sup>6</sup>"]
+
+
+@given(st.floats(1e-6, 1e6))
+def test_rounded_up_is_the_next_of_one_two_five(value: float) -> None:
+    up = rounded_up(value)
+    assert value * (1 - 1e-6) <= up <= value * 2.5 * (1 + 1e-6)
+    assert f"{up:.3e}"[:5] in ("1.000", "2.000", "5.000")
+
+
+@pytest.mark.parametrize(("span", "unit"), [(60, "s"), (3600, "min"), (36000, "h"), (1e6, "d")])
+def test_time_units(span: float, unit: str) -> None:
+    assert time_unit(span)[1] == unit
+
+
+def test_ticks_are_round_and_within() -> None:
+    assert ticks(-0.4, 0.6) == [-0.4, -0.2, 0.0, 0.2, 0.4, 0.6]
+    assert all(f"{tick:g}" != "-0" for tick in ticks(-0.37, 0.21))
