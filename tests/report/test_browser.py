@@ -71,7 +71,8 @@ def test_figures_are_printed_as_wide_as_the_sheet(tmp_path: Path) -> None:
     probe = (
         "<script>addEventListener('beforeprint', function () {"
         "document.querySelectorAll('.plot').forEach(function (plot) {"
-        "console.log('figure ' + plot.querySelector('.main-svg').getAttribute('width')); }); });</script></body>"
+        "console.log('figure ' + plot.querySelector('.main-svg').getAttribute('width')); });"
+        "});</script></body>"
     )
     html = pages()["train"].replace("</body>", probe)
     _, console = print_page(written(html, tmp_path), tmp_path / "profile")
