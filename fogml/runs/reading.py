@@ -1,0 +1,153 @@
+"""Reading runs: any of the file formats, units converted, every fault named or repaired and counted."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Literal
+
+from fogml.errors import InputError
+from fogml.runs.assemble import Assembler, run_from_table
+from fogml.runs.checks import check_run
+from fogml.runs.raw_table import RawTable
+from fogml.runs.run import Run
+
+Format = Literal["csv", "parquet", "hdf5", "mat"]
+BLOCK_ROWS = 1_000_000
+_HEAD_BYTES = 1024
+_FOREIGN = {
+    b"PK\x03\x04": "a zip archive or an Excel workbook; save the sheet as CSV",
+    b"\x1f\x8b": "compressed by gzip; unpack it first",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook; save the sheet as CSV",
+    b"%PDF": "a PDF; export the table as CSV",
+}
+
+
+def read_run(path: str | Path, *, repair: bool = False, name: str | None = None) -> Run:
+    """Read a run from CSV, Parquet, HDF5 or MATLAB, told apart by content.
+
+    Set-up facts come from the side file of the same stem, else from the file itself.
+
+    Parameters
+    ----------
+    path
+        The file.
+    repair
+        Sort times that go back, drop repeated times and rows that can't be read or hold missing
+        or infinite values; what was done is counted in the run's findings.
+    name
+        Name of the run; the file's base name by default.
+
+    Returns
+    -------
+    Run
+        In internal units, with what `check_run` noticed among its findings.
+
+    Raises
+    ------
+    InputError
+        Naming file, column, first bad row, and what to do.
+    """
+    path = Path(path)
+    kind = file_format(path)
+    run = run_from_table(_read_table(path, kind, repair), path, repair=repair, name=name)
+    return run.with_findings(check_run(run))
+
+
+def read_blocks(path: str | Path, *, block_rows: int = BLOCK_ROWS) -> Iterator[Run]:
+    """Read a run in blocks of at most `block_rows` rows, in bounded memory.
+
+    Blocks share name and facts. Order of time is checked across their borders. MATLAB files are
+    read whole and then cut.
+
+    Raises
+    ------
+    InputError
+        As `read_run`; a fault in a later block is met when that block is asked for.
+    """
+    path = Path(path)
+    kind = file_format(path)
+    if block_rows < 1:
+        raise InputError(f"{block_rows} rows a block: at least 1 is needed")
+    assembler = Assembler(path)
+    for table in _table_blocks(path, kind, block_rows):
+        yield assembler.block(table)
+
+
+def file_format(path: Path) -> Format:
+    """Which of the formats a file has, told by its first bytes.
+
+    Raises
+    ------
+    InputError
+        If it is missing, no file, not readable, empty, or of a known format that holds no run.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: no such file")
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder; name a file")
+    if not os.access(path, os.R_OK):
+        raise InputError(f"{path}: no permission to read it")
+    try:
+        with path.open("rb") as file:
+            head = file.read(_HEAD_BYTES)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    if not head:
+        raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
+    if head.startswith(b"PAR1"):
+        return "parquet"
+    if head.startswith(b"MATLAB"):
+        return "mat"
+    if head.startswith(b"\x89HDF\r\n\x1a\n"):
+        return "mat" if path.suffix.lower() == ".mat" else "hdf5"
+    for magic, what in _FOREIGN.items():
+        if head.startswith(magic):
+            raise InputError(f"{path.name}: is {what}")
+    by_suffix: dict[str, tuple[Format, str]] = {
+        ".parquet": ("parquet", "Parquet"),
+        ".h5": ("hdf5", "HDF5"),
+        ".hdf5": ("hdf5", "HDF5"),
+        ".mat": ("mat", "MATLAB"),
+    }
+    if path.suffix.lower() in by_suffix:
+        label = by_suffix[path.suffix.lower()][1]
+        raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
+    return "csv"
+
+
+def _read_table(path: Path, kind: Format, repair: bool) -> RawTable:
+    # Each format's reader, and the package behind it, is loaded only where it is used.
+    if kind == "csv":
+        from fogml.runs.csv_files import read_csv
+
+        return read_csv(path, repair=repair)
+    if kind == "parquet":
+        from fogml.runs.parquet_files import read_parquet
+
+        return read_parquet(path)
+    if kind == "hdf5":
+        from fogml.runs.hdf5_files import read_hdf5
+
+        return read_hdf5(path)
+    from fogml.runs.mat_files import read_mat
+
+    return read_mat(path)
+
+
+def _table_blocks(path: Path, kind: Format, rows: int) -> Iterator[RawTable]:
+    if kind == "csv":
+        from fogml.runs.csv_files import csv_blocks
+
+        yield from csv_blocks(path, rows)
+    elif kind == "parquet":
+        from fogml.runs.parquet_files import parquet_blocks
+
+        yield from parquet_blocks(path, rows)
+    elif kind == "hdf5":
+        from fogml.runs.hdf5_files import hdf5_blocks
+
+        yield from hdf5_blocks(path, rows)
+    else:
+        yield from _read_table(path, kind, repair=False).blocks(rows)

@@ -1,0 +1,168 @@
+"""Writing runs: CSV, Parquet, HDF5 and MATLAB, with set-up facts, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fogml.errors import InputError
+from fogml.outputs import whole_file
+from fogml.runs.columns import header
+from fogml.runs.facts import Facts, side_file_text
+from fogml.runs.raw_table import FACTS_KEY
+from fogml.runs.run import Run
+
+if TYPE_CHECKING:
+    from pyarrow import Schema, Table
+
+SUFFIXES = (".csv", ".parquet", ".h5", ".hdf5", ".mat")
+_ROW_GROUP = 1 << 20
+
+
+def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | None = None) -> None:
+    """Write a run in the format that the suffix of `path` names; floats keep every digit.
+
+    Facts go into a side file of the same stem where there are any, and into the file itself
+    where its format can hold them (Parquet, HDF5, MATLAB).
+
+    Raises
+    ------
+    InputError
+        If the suffix is not known or the place can't be written.
+    """
+    path = Path(path)
+    suffix = _checked_suffix(path)
+    cells = header_cells(run)
+    if suffix in (".csv", ".parquet"):
+        with BlockWriter(path, run.facts) as writer:
+            writer.write({cell: run.columns[name] for name, cell in cells.items()})
+        return
+    with _with_side_file(path, run.facts) as partial:
+        if suffix == ".mat":
+            from fogml.runs.mat_files import write_mat
+
+            write_mat(run, cells, partial, mat_version)
+        else:
+            from fogml.runs.hdf5_files import write_hdf5
+
+            write_hdf5(run, cells, partial)
+
+
+def header_cells(run: Run) -> dict[str, str]:
+    """Column name to header cell, internal units; the gyro in counts where it was recorded so."""
+    return {name: header(name, run.gyro_unit if name == "gyro" else None) for name in run.columns}
+
+
+class BlockWriter:
+    """Writes a run block by block to CSV or Parquet; the file appears when the block ends well.
+
+    Use as a context manager. The first block's columns are those of the file.
+
+    Parameters
+    ----------
+    path
+        Ends in ``.csv`` or ``.parquet``.
+    facts
+        Set-up facts: into the side file, and into a Parquet file's metadata.
+
+    Raises
+    ------
+    InputError
+        If the suffix is another one or the place can't be written.
+    """
+
+    def __init__(self, path: str | Path, facts: Facts | None = None) -> None:
+        self.path = Path(path)
+        self.facts = facts or Facts()
+        if _checked_suffix(self.path) not in (".csv", ".parquet"):
+            raise InputError(
+                f"{self.path.name}: written block by block are .csv and .parquet; choose one of them"
+            )
+        self._stack = ExitStack()
+        self._sink: Any = None
+        self._schema: Schema | None = None
+
+    def __enter__(self) -> Self:
+        self._partial = self._stack.enter_context(_with_side_file(self.path, self.facts))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if self._sink is not None:
+                self._sink.close()
+            elif kind is None:
+                raise InputError(f"{self.path.name}: there is nothing to write")
+        except BaseException as failure:
+            self._stack.__exit__(type(failure), failure, failure.__traceback__)
+            raise
+        self._stack.__exit__(kind, error, trace)
+
+    def write(self, block: Run | Mapping[str, ArrayLike]) -> None:
+        """Append a block: a run, or header cell to values of shape (n,).
+
+        Raises
+        ------
+        InputError
+            If its columns are not those of the first block.
+        """
+        import pyarrow as arrow
+
+        if isinstance(block, Run):
+            block = {cell: block.columns[name] for name, cell in header_cells(block).items()}
+        table = arrow.table({cell: np.asarray(values) for cell, values in block.items()})
+        if self._schema is None:
+            metadata = {FACTS_KEY: json.dumps(self.facts.as_dict(), ensure_ascii=False)}
+            self._schema = table.schema.with_metadata(metadata)
+            self._sink = self._opened(self._schema)
+        elif not table.schema.equals(self._schema, check_metadata=False):
+            raise InputError(
+                f"{self.path.name}: a block's columns {table.column_names} are not the first block's"
+            )
+        self._append(table)
+
+    def _opened(self, schema: Schema) -> Any:
+        if self.path.suffix.lower() == ".parquet":
+            import pyarrow.parquet as parquet
+
+            # Byte streams compress recorded floats far better than dictionaries do, and faster.
+            return parquet.ParquetWriter(
+                self._partial, schema, compression="zstd", use_dictionary=False, use_byte_stream_split=True
+            )
+        from pyarrow import csv
+
+        plain = not any(mark in name for name in schema.names for mark in ',"\r\n')
+        options = csv.WriteOptions(quoting_style="none" if plain else "needed", batch_size=1 << 16)
+        return csv.CSVWriter(self._partial, schema, write_options=options)
+
+    def _append(self, table: Table) -> None:
+        if self.path.suffix.lower() == ".parquet":
+            self._sink.write_table(table.cast(self._schema), row_group_size=_ROW_GROUP)
+        else:
+            self._sink.write_table(table.cast(self._schema))
+
+
+@contextmanager
+def _with_side_file(path: Path, facts: Facts) -> Iterator[Path]:
+    """A partial file for `path`, and the side file beside it when that is done."""
+    with ExitStack() as stack:
+        partial = stack.enter_context(whole_file(path))
+        side = path.with_suffix(".yaml")
+        if facts != Facts():
+            stack.enter_context(whole_file(side)).write_text(side_file_text(facts), encoding="utf-8")
+        yield partial
+
+
+def _checked_suffix(path: Path) -> str:
+    suffix = path.suffix.lower()
+    if suffix not in SUFFIXES:
+        raise InputError(f"{path.name}: format '{suffix}' is not known; use one of {', '.join(SUFFIXES)}")
+    return suffix
