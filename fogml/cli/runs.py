@@ -16,9 +16,9 @@ def open_run(path: str, *, repair: bool = False) -> Run:
     from fogml.runs.reading import read_run
     from fogml.runs.shipped import shipped_run
 
-    run = (
-        shipped_run(path.removeprefix(SHIPPED)) if path.startswith(SHIPPED) else read_run(path, repair=repair)
-    )
+    if not path.startswith(SHIPPED):
+        return read_run(path, repair=repair)
+    run = shipped_run(path.removeprefix(SHIPPED))
     return run.with_findings(check_run(run))
 
 

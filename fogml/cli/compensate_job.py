@@ -1,0 +1,109 @@
+"""The job of ``fogml compensate``."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.outputs import whole_file
+
+FLAGS = ("good", "outside_training", "window_not_full")
+"""What the flags 0, 1 and 2 mean."""
+
+
+class CompensateSettings(Settings):
+    """Settings of ``fogml compensate``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("run", "model")
+    run: str | None = None
+    model: str | None = None
+    any_unit: bool = False
+    out: str | None = None
+
+    def in_full(self) -> CompensateSettings:
+        """The settings with every path in full."""
+        assert self.run and self.model and self.out
+        paths = {"run": self.run, "model": self.model, "out": self.out}
+        return self.model_copy(update={name: absolute(path) for name, path in paths.items()})
+
+
+def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:
+    """Compensate a run block by block into a file, and print how many samples got which flag."""
+    from fogml.models.compensation import compensate_blocks
+    from fogml.models.saved import load_model
+    from fogml.runs.reading import read_blocks
+    from fogml.runs.writing import BlockWriter, header_cells
+
+    if not settings.run:
+        raise InputError("no run is given; name the run to compensate")
+    if not settings.model:
+        raise InputError("no --model is given; name the folder of the model, e.g. train-results/model")
+    if not settings.out:
+        raise InputError("no --out is given; name the file to write, .csv or .parquet")
+    out = Path(settings.out)
+    if out.exists() and out.samefile(settings.run):
+        raise InputError(f"{out}: is the run itself; choose another --out")
+    model = load_model(settings.model)
+    counts = np.zeros(len(FLAGS), dtype=np.int64)
+    with ExitStack() as stack:
+        config = stack.enter_context(whole_file(out.with_suffix(".config.yaml")))
+        config.write_text(settings.in_full().yaml("compensate"), encoding="utf-8")
+        what = f"compensating {settings.run}"
+        work = stack.enter_context(terminal.work(what, total=_expected_rows(Path(settings.run))))
+        writer: BlockWriter | None = None
+        blocks = read_blocks(settings.run)
+        for block, compensation in compensate_blocks(model, blocks, any_unit=settings.any_unit):
+            if writer is None:
+                writer = stack.enter_context(BlockWriter(out, block.facts))
+            recorded = {cell: block.columns[name] for name, cell in header_cells(block).items()}
+            writer.write({**recorded, **compensation.columns()})
+            counts += np.bincount(compensation.flag, minlength=len(FLAGS))
+            work.advance(len(block))
+        if writer is None:
+            raise InputError(f"{settings.run}: holds no samples, there is nothing to compensate")
+    _print(settings, model.kind, counts, terminal)
+
+
+def _expected_rows(path: Path) -> float | None:
+    """About how many rows a file holds, for the time left; None where that would take reading it."""
+    if path.suffix.lower() == ".parquet":
+        import pyarrow.parquet as parquet
+
+        try:
+            return float(parquet.read_metadata(path).num_rows)
+        except (OSError, ValueError):
+            return None  # reading it says what is wrong
+    if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
+        return None
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    lines = head.count(b"\n")
+    return path.stat().st_size / len(head) * lines if lines else None
+
+
+def _print(settings: CompensateSettings, kind: str, counts: Any, terminal: Terminal) -> None:
+    assert settings.run and settings.out
+    rows = int(counts.sum())
+    values = {
+        "schema": "fogml.compensate/1",
+        "run": Path(settings.run).name,
+        "out": Path(settings.out).name,
+        "model": kind,
+        "rows": rows,
+        "flags": {name: int(count) for name, count in zip(FLAGS, counts, strict=True)},
+    }
+    terminal.table(
+        f"{values['run']} compensated by {kind}, written to {settings.out}",
+        ["flag", "samples", "share"],
+        [
+            [f"{flag} {name.replace('_', ' ')}", str(count), f"{count / max(rows, 1):.1%}"]
+            for flag, (name, count) in enumerate(zip(FLAGS, counts, strict=True))
+        ],
+    )
+    terminal.result(values)
