@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
-from fogml.models.out_of_fold import interval_averaging_s, out_of_fold_intervals
-from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count, usable_rows
+from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
+from fogml.models.table import RunRows, TrainingTable, row_count, usable_rows
 from fogml.runs.run import BoolArray, FloatArray, Run
 
 
@@ -35,9 +35,7 @@ class _ConstantModel(DriftModel):
         self.card_ = training_card(
             group, hashes=hashes, rows=count, notes=[note for part in rows for note in part.notes]
         )
-        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
-        table = averaged_table(rows, lambda atoms: atoms, averaging_s)
-        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold)
+        self.intervals_ = out_of_fold_intervals(interval_table(rows), self._out_of_fold)
         return self
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from typing import Any, ClassVar, Self
 
@@ -19,7 +21,7 @@ from fogml.models.box import distance_outside, learn_box, limit_atoms
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
-from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
+from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.regressors import (
     fit_regressor,
     goes_on_linearly,
@@ -32,13 +34,11 @@ from fogml.models.regressors import (
 from fogml.models.table import (
     RunRows,
     TrainingTable,
-    averaged_table,
-    recorded_s,
     row_count,
     run_rows,
     table_of_rows,
 )
-from fogml.models.tall_least_squares import Part
+from fogml.models.tall_least_squares import Part, one_blas_thread
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import BoolArray, FloatArray, Run
 
@@ -109,9 +109,8 @@ class FeatureModel(DriftModel):
             self.regressor_ = self._fit_regressor(regressor, table)
         notes = [*(note for part in rows for note in part.notes), *self._fit_notes()]
         self.card_ = training_card(group, hashes=hashes, rows=count, box=features.box, notes=notes)
-        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
-        table = averaged_table(rows, features.compose, averaging_s)
-        self.intervals_ = regressor_intervals(self._refitted, table, guard_s=features.window_s)
+        table = interval_table(rows)
+        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=features.window_s)
         return self
 
     def _make_regressor(self, width: int) -> Any:
@@ -125,6 +124,15 @@ class FeatureModel(DriftModel):
         """The regressor fitted to other rows, what was tuned being kept."""
         return refit(self.regressor_, table)
 
+    def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
+        """Drift at rows of atoms, of the model fitted to others and limited to their box."""
+        features = parse_features(self.features_.text)
+        learn_box(features, [fitted.X])
+        regressor = self._refitted(replace(fitted, X=features.compose(fitted.X)))
+        full = np.ones(len(held), dtype=np.bool_)
+        limited, _ = limit_atoms(features, held.X, full, linear=goes_on_linearly(regressor))
+        return predict_rows(regressor, features.compose(limited))
+
     def _fit_notes(self) -> list[str]:
         """What the regressor tells of its fit, for the card."""
         return list(getattr(self.regressor_, "notes_", ()))
@@ -135,9 +143,11 @@ class FeatureModel(DriftModel):
         limited, outside = limit_atoms(self.features_, atoms, full, linear=linear)
         drift = np.empty(len(atoms))
         step = max(1, _PREDICTED_VALUES // len(self.features_))
-        for start in range(0, len(atoms), step):
-            piece = slice(start, start + step)
-            drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
+        # Products of a matrix this narrow with a vector gain nothing from threads, but wait for them.
+        with one_blas_thread() if isinstance(self.regressor_, LinearRegressor) else nullcontext():
+            for start in range(0, len(atoms), step):
+                piece = slice(start, start + step)
+                drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
         return Evaluation(drift, full, outside, partial(distance_outside, atoms, outside, self.features_))
 
     @property

@@ -32,8 +32,8 @@ from fogml.models.box import distance_outside, learn_box, limit_atoms
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
-from fogml.models.out_of_fold import interval_averaging_s, regressor_intervals
-from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
+from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
+from fogml.models.table import RunRows, TrainingTable, row_count
 from fogml.models.tall_least_squares import Part
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.transitions import transition_mask
@@ -109,9 +109,8 @@ class JointModel(DriftModel):
         self.card_ = training_card(
             group, hashes=hashes, rows=row_count(rows), box=self.features_.box, notes=notes
         )
-        averaging_s = interval_averaging_s(recorded_s(rows), group[0].sample_s)
-        table = averaged_table(rows, self._columns, averaging_s)
-        self.intervals_ = regressor_intervals(self._refitted, table, guard_s=self.features_.window_s)
+        table = interval_table(rows)
+        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
         return self
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
@@ -204,8 +203,14 @@ class JointModel(DriftModel):
         y = 3600.0 * run.rate if self.patent else run.reference_deg_h
         return RunRows(np.column_stack((run.gyro, atoms))[used], y[used], run.time[used], tuple(notes))
 
-    def _refitted(self, table: TrainingTable) -> LinearRegressor:
-        return self.regressor_.refitted(table.X, table.y)
+    def _out_of_fold(self, fitted: TrainingTable, held: TrainingTable) -> FloatArray:
+        """Rate at rows of output and atoms, of the model fitted to others and limited to their box."""
+        features = parse_features(self.features_.text)
+        learn_box(features, [fitted.X[:, 1:]])
+        full = np.ones(len(held), dtype=np.bool_)
+        limited, _ = limit_atoms(features, held.X[:, 1:], full, linear=True)
+        regressor = self.regressor_.refitted(self._columns(fitted.X), fitted.y)
+        return regressor.predict(self._columns(np.column_stack((held.X[:, 0], limited))))
 
     def _part(self, rows: RunRows) -> Part:
         return Part(rows.y, lambda piece: self._columns(rows.atoms[piece]), dealt_folds(len(rows.y)))

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.intervals import Intervals, intervals_from_residuals
-from fogml.models.regressors import predict_rows
-from fogml.models.table import TrainingTable
+from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.runs.run import FloatArray
 
 AVERAGING_S = 100.0
@@ -19,9 +17,15 @@ _LEAST_AVERAGES = 60
 _RUNS_TO_LEAVE_OUT = 3
 
 
-def interval_averaging_s(recorded_s: float, sample_s: float) -> float:
-    """Averaging time of the residuals [s]: 100 s, or shorter so that short runs give 60 averages."""
-    return max(min(AVERAGING_S, recorded_s / _LEAST_AVERAGES), sample_s)
+def interval_table(rows: Sequence[RunRows]) -> TrainingTable:
+    """Averages of atom values and y: over 100 s, or shorter so that short runs give 60 of them.
+
+    Atoms and not columns are averaged, so that the atoms of held-out rows can be limited to the
+    box of the others, as in use; within 100 s the temperature hardly bends.
+    """
+    sample_s = max(float(np.median(np.diff(part.time_s))) if len(part.y) > 1 else 0.0 for part in rows)
+    averaging_s = max(min(AVERAGING_S, recorded_s(rows) / _LEAST_AVERAGES), sample_s)
+    return averaged_table(rows, lambda atoms: atoms, averaging_s)
 
 
 def interval_folds(table: TrainingTable, guard_s: float = 0.0) -> tuple[list[Fold], str]:
@@ -41,7 +45,7 @@ def out_of_fold_intervals(
     Parameters
     ----------
     table
-        Rows averaged over ``table.averaging_s``.
+        Rows of atom values, as `interval_table` gives.
     predicted
         Given the rows to fit to and the rows left out, the prediction [deg/h] for the latter.
     guard_s
@@ -54,14 +58,3 @@ def out_of_fold_intervals(
         folds, name = time_folds(table), "time blocks"
     residuals = [table.y[held] - predicted(table.take(fitted), table.take(held)) for fitted, held in folds]
     return intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)
-
-
-def regressor_intervals(
-    refitted: Callable[[TrainingTable], Any], table: TrainingTable, guard_s: float
-) -> Intervals:
-    """Intervals of a regressor that `refitted` fits to the folds of an averaged table."""
-
-    def predicted(fitted: TrainingTable, held: TrainingTable) -> FloatArray:
-        return predict_rows(refitted(fitted), held.X)
-
-    return out_of_fold_intervals(table, predicted, guard_s)
