@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 import yaml
-from fogml.runs.reading import read_run
 
 from fogml.models.saved import load_model
+from fogml.runs.reading import read_run
 from tests.cli.conftest import csv_text
 
 ADDED = ["drift", "gyro_compensated", "flag"]

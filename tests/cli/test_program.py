@@ -1,0 +1,71 @@
+"""The program itself, as a process of its own: exit statuses, streams, signals, no traceback."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+PROGRAM = [sys.executable, "-c", "from fogml.cli.main import main; main()"]
+
+
+def run(*arguments: object, cwd=None):
+    command = [*PROGRAM, *[str(argument) for argument in arguments]]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd)
+
+
+def test_train_and_compensate(run_files, tmp_path):
+    arguments = ("--model", "M1", "--limit", "rms=10", "-o", "out", "--json")
+    found = run("train", "a.csv", "--test", "b.csv", *arguments, cwd=tmp_path)
+    assert (found.returncode, found.stderr) == (0, "")
+    assert json.loads(found.stdout)["schema"] == "fogml.train/1"
+    assert (tmp_path / "out" / "certificate.html").exists()
+    found = run("compensate", "b.csv", "--model", "out/model", "-o", "c.csv", "--quiet", cwd=tmp_path)
+    assert (found.returncode, found.stdout, found.stderr) == (0, "", "")
+    header = (tmp_path / "c.csv").read_text().split("\n", 1)[0]
+    assert header == "time [s],gyro [deg/h],T [degC],drift [deg/h],gyro_compensated [deg/h],flag"
+
+
+def test_an_unmet_limit_is_status_1(run_files, tmp_path):
+    arguments = ("--model", "mean", "--limit", "rms=0.001", "-o", "out")
+    found = run("train", "a.csv", "--test", "b.csv", *arguments, cwd=tmp_path)
+    assert found.returncode == 1
+    assert "NOT met" in found.stdout
+    assert (tmp_path / "out" / "report.json").exists()
+
+
+def test_bad_input_is_status_2_and_one_line(run_files, tmp_path):
+    (tmp_path / "bad.csv").write_bytes(bytes(range(256)) * 20)
+    for name in ("bad.csv", "none.csv"):
+        found = run("train", name, "--test", "b.csv", "-o", "out", cwd=tmp_path)
+        assert found.returncode == 2
+        assert found.stdout == ""
+        assert len(found.stderr.strip().splitlines()) == 1
+        assert name in found.stderr
+        assert not (tmp_path / "out").exists()
+
+
+def test_an_interrupt_leaves_nothing(run_files, tmp_path):
+    # A run long enough that the signal comes while it is read and fitted.
+    arguments = ["train", "a.csv", "--test", "b.csv", "--model", "sklearn.svm.SVR", "-o", "out"]
+    process = subprocess.Popen(
+        [*PROGRAM, *arguments], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    deadline = time.monotonic() + 60
+    while not list(tmp_path.glob(".partial-*")) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    os.kill(process.pid, signal.SIGINT)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert "Traceback" not in errors
+    assert not (tmp_path / "out").exists()
+    assert not list(tmp_path.glob(".partial-*"))
+
+
+def test_a_closed_pipe_is_no_traceback(run_files, tmp_path):
+    shell = " ".join(f"'{part}'" for part in [*PROGRAM, "inspect", str(run_files[0])]) + " | true"
+    found = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=120)
+    assert "Traceback" not in found.stderr
