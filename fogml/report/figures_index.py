@@ -17,6 +17,7 @@ from fogml.report.words import number
 from fogml.validation.results import AveragedSeries, Judgement
 
 _BINS = 40
+_IN_BIN = 6
 _LEAST_IN_BIN = 3
 
 
@@ -39,7 +40,8 @@ def loop_between(first: AveragedSeries, second: AveragedSeries) -> Loop | None:
     high = min(float(np.max(first.temperature)), float(np.max(second.temperature)))
     if not high > low:
         return None
-    edges = np.linspace(low, high, _BINS + 1)
+    fewest = min(int(np.sum((t >= low) & (t <= high))) for t in (first.temperature, second.temperature))
+    edges = np.linspace(low, high, int(np.clip(fewest // _IN_BIN, 1, _BINS)) + 1)
     means, counts = zip(*(_binned(series, edges) for series in (first, second)), strict=True)
     shared = np.minimum(*counts) >= _LEAST_IN_BIN
     if not shared.any():
@@ -102,12 +104,15 @@ def loops(judgements: Mapping[str, Judgement]) -> Drawing:
     figure.update_yaxes(title_text="left [deg/h]", row=2, col=1)
     style.styled(figure, 620, legend={"y": 1.06}, margin={"t": 78})
     distance = f" At equal temperature the two runs differ: {'; '.join(told)}." if told else ""
+    bound = (
+        " A curve in T alone has one value at each temperature: whatever its degree, it leaves at least "
+        "half of that distance in one of the runs."
+    )
     return Drawing(
         figure,
         alt=f"Drift against temperature for {len(axes)} axes, training and test run.{distance}",
         caption=(
-            f"Top: drift against temperature.{distance} A curve in T alone has one value at each "
-            "temperature: whatever its degree, it leaves at least half of that distance in one of the runs. "
+            f"Top: drift against temperature.{distance}{bound if told else ''} "
             "Bottom, on its own scale: what the model leaves; dashed, the noise floor."
         ),
     )

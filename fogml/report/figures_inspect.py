@@ -19,7 +19,8 @@ from fogml.signals.averages import block_averages
 
 FloatArray = NDArray[np.float64]
 RATE_WINDOW_S = 60.0
-_SHOWN_GAP = 0.001
+_BRIDGED = 5.0
+"""Averages are joined over gaps up to this many averaging times."""
 _AVERAGES = 1000
 
 
@@ -93,7 +94,8 @@ def _output(figure: go.Figure, run: Run, time: FloatArray, per_unit: float) -> N
     window_s = rounded_up(max(run.span_s / _AVERAGES, 20.0 * run.sample_s, 1e-6))
     means = block_averages(run.time, run.gyro, window_s=window_s) if run.span_s > 4.0 * window_s else None
     if means is not None and len(means) > 2:
-        x, y = drawn(means.time_s / per_unit, means.values[0])
+        gaps = np.flatnonzero(np.diff(means.time_s) > _BRIDGED * window_s) + 1
+        x, y = drawn(means.time_s / per_unit, means.values[0], gaps=gaps)
         line = {"color": style.BEFORE, "width": 1.6}
         name = f"output, {number(window_s)} s averages"
         figure.add_trace(go.Scatter(x=x, y=y, mode="lines", name=name, line=line), row=1, col=1)

@@ -70,6 +70,9 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
     for value in (judged.floor, -judged.floor):
         figure.add_hline(y=value, row=last, col=1, line=style.FLOOR_LINE)
     figure.add_trace(style.floor_in_legend(), row=last, col=1)
+    low, high = _left_span(judged)
+    figure.update_yaxes(range=[low, high], row=last, col=1)
+    clipped = banded and bool(np.nanmax(series.upper) > high or np.nanmin(series.lower) < low)
     named = shade(figure, segments_of(time, series.regime))
     titles = {"temperature": "T [°C]", "drift": "drift [deg/h]", "left": "left [deg/h]"}
     for row, panel in enumerate(panels, start=1):
@@ -87,8 +90,8 @@ def drift_in_time(judged: RunJudgement, interval: Mapping[str, Any] | None = Non
         ),
         caption=(
             f"{over(judged).capitalize()}. Drift before compensation with the model over it; below, on its "
-            f"own scale, what is left{_band_words(judged, interval) if banded else ''}. Dashed: the noise "
-            f"floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
+            f"own scale, what is left{_band_words(judged, interval, clipped) if banded else ''}. Dashed: the "
+            f"noise floor of ± {number(judged.floor)} deg/h. Shaded: {words}."
         ),
     )
 
@@ -105,10 +108,25 @@ def _temperature_words(series: AveragedSeries) -> str:
     return f"temperature from {number(low)} to {number(high)} °C; "
 
 
-def _band_words(judged: RunJudgement, interval: Mapping[str, Any] | None) -> str:
+def _left_span(judged: RunJudgement) -> tuple[float, float]:
+    """From the least to the greatest of what is left, with the floor, and the band as far as twice that."""
+    series = judged.series
+    low = min(float(np.min(series.after)), -1.3 * judged.floor)
+    high = max(float(np.max(series.after)), 1.3 * judged.floor)
+    if np.isfinite(series.upper).any():
+        reach = 2.0 * max(-low, high)
+        low = min(low, max(float(np.nanmin(series.lower)), -reach))
+        high = max(high, min(float(np.nanmax(series.upper)), reach))
+    room = 0.06 * (high - low)
+    return low - room, high + room
+
+
+def _band_words(judged: RunJudgement, interval: Mapping[str, Any] | None, clipped: bool) -> str:
     seconds = float((interval or {}).get("averaging_s", judged.averaging_s))
     same = abs(seconds - judged.averaging_s) <= 1e-3 * judged.averaging_s
-    return " with the model's 90 % band about zero" + ("" if same else f" (of {averages(seconds)})")
+    told = [] if same else [f"of {averages(seconds)}"]
+    told += ["it reaches beyond the panel"] if clipped else []
+    return " with the model's 90 % band about zero" + (f" ({'; '.join(told)})" if told else "")
 
 
 def _band(time: NDArray[np.float64], series: AveragedSeries, gaps: NDArray[np.intp]) -> go.Scatter:
@@ -163,7 +181,7 @@ def drift_against_temperature(judged: RunJudgement, train: Sequence[RunJudgement
                 legendgroup="train",
                 showlegend=other is train[0],
                 hovertext=other.run,
-                marker={"symbol": "x-thin", "size": 5, "line": {"color": style.TRAINING, "width": 1}},
+                marker={"symbol": "x-thin", "size": 6, "line": {"color": style.TRAINING, "width": 1}},
             ),
             row=1,
             col=1,

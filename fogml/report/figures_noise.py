@@ -108,7 +108,11 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
     return Drawing(
         figure,
         alt=f"Allan deviation against averaging time, both logarithmic: from {first} to {last}{lowest}.",
-        caption="Lines without markers: each term alone, at the value in the table. " + shown,
+        caption=(
+            "Lines without markers: each term alone, at the value in the table. "
+            + shown
+            + (" Star: the lowest deviation that enough averages support." if lowest else "")
+        ),
     )
 
 

@@ -124,17 +124,18 @@ def _table(
             )
         )
     test = next(iter(judgements.values())).test[0]
+    tests = listed([run.run for judgement in judgements.values() for run in judgement.test], 6)
     return Table(
         (
             ("Axis", "", "text"),
             ("Model", "", "text"),
             ("Rms before", "deg/h", "figure"),
-            *((f"Rms with {name}", "deg/h", "figure") for name in beside),
+            *((f"Rms, {name}", "deg/h", "figure") for name in beside),
             ("Rms after", "deg/h", "figure"),
             ("Bias stability after", "deg/h", "figure"),
             ("Noise floor", "deg/h", "figure"),
             ("Distance of the runs at equal T, rms", "deg/h", "figure"),
         ),
         tuple(rows),
-        f"On {test.run} and its like, {averages(test.averaging_s)}.",
+        f"On {tests}, {averages(test.averaging_s)}.",
     )

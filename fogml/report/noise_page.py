@@ -78,7 +78,7 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
                 "Minimum",
                 number(minimum["adev"]),
                 "deg/h",
-                f"at {number(minimum['tau_s'])} s; B = minimum / 0.664",
+                f"at {number(minimum['tau_s'])} s",
             )
         )
     return tiles

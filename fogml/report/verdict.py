@@ -73,15 +73,17 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
         if kind == "mean":
             left = f"{where} only the training runs' mean is taken off"
         return [f"{left}: {after} deg/h stays (bias stability, {over}); {floor}."]
-    if worst.after.rms >= worst.before.rms:
+    rms = f"from {number(worst.before.rms)} to {number(worst.after.rms)} deg/h"
+    if not improves(worst):
         return [
-            f"{where} the {kind} model does harm: rms goes from {number(worst.before.rms)} to "
-            f"{number(worst.after.rms)} deg/h, bias stability from {before} to {after} deg/h "
-            f"({over}); {floor}."
+            f"{where} the {kind} model does harm: rms goes {rms}, bias stability from {before} to {after} "
+            f"deg/h ({over}); {floor}."
         ]
-    sentence = (
-        f"{where} the {kind} model leaves {after} deg/h of {before} deg/h (bias stability, {over}); {floor}."
-    )
+    if worst.after.bias_stability > worst.before.bias_stability:
+        did = f"brings the rms {rms} and makes the bias stability worse, {before} to {after} deg/h ({over})"
+    else:
+        did = f"leaves {after} deg/h of {before} deg/h (bias stability, {over})"
+    sentence = f"{where} the {kind} model {did}; {floor}."
     harmed = [run.run for run in judgement.test if not improves(run)]
     return [sentence, f"It makes {listed(harmed)} worse."] if harmed else [sentence]
 
@@ -91,8 +93,8 @@ def _bias(worst: RunJudgement) -> list[str]:
     if abs(worst.after.bias) <= worst.after.bias_stability or worst.after.rms <= worst.floor:
         return []
     return [
-        f"Its mean is off by {number(worst.after.bias)} deg/h from {reference_of(worst)}; with that, "
-        f"the rms is {number(worst.after.rms)} deg/h."
+        f"Its mean is off by {number(worst.after.bias)} deg/h from {reference_of(worst)}: most of its rms of "
+        f"{number(worst.after.rms)} deg/h."
     ]
 
 
@@ -144,7 +146,10 @@ def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
         if model.get(key):
             rows.append((key, str(model[key])))
     if model.get("box"):
-        spans = [f"{name} {number(low)} to {number(high)}" for name, (low, high) in model["box"].items()]
+        spans = [
+            f"{name} {number(low)} to {number(high)}{_atom_unit(name)}"
+            for name, (low, high) in model["box"].items()
+        ]
         rows.append(("trained within", "; ".join(spans)))
     interval = model.get("interval") or {}
     if interval.get("half_width_90") is not None:
@@ -152,6 +157,13 @@ def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
     if model.get("chosen_by"):
         rows.append(("chosen by", f"{model['chosen_by']}, among those below"))
     return rows
+
+
+def _atom_unit(name: str) -> str:
+    """The unit of a feature's atom, from its name: a temperature, a rate of one, or a direction."""
+    if name.startswith("sign"):
+        return ""
+    return " °C/min" if name.startswith(("dT", "d(")) else " °C"
 
 
 def interval_words(interval: Mapping[str, Any]) -> str:

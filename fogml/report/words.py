@@ -22,6 +22,7 @@ _UNITS = {
     "design_index": "deg/h",
 }
 MISSING = "–"
+_RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def label(quantity: str) -> str:
@@ -46,7 +47,7 @@ def number(value: float | None, digits: int = 3) -> str:
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if exponent < -4 or exponent >= 7:
         mantissa, power = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa} × 10^{int(power)}".replace("-", "−")
+        return f"{mantissa} × 10{str(int(power)).translate(_RAISED)}".replace("-", "−")
     return f"{value:.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
 
 

@@ -169,3 +169,14 @@ def test_the_small_figure_draws_gaps_as_gaps() -> None:
 def test_the_small_figure_of_a_constant_is_drawn() -> None:
     svg = line_figure([Curve(np.arange(3.0), np.full(3, 2.0), "#000000")], "x", "y", "constant")
     assert "nan" not in svg
+
+
+def test_a_wide_band_does_not_flatten_what_is_left() -> None:
+    run = judged_run()
+    series = replace(run.series, lower=-100.0 * run.series.upper, upper=100.0 * run.series.upper)
+    drawing = drift_in_time(replace(run, series=series))
+    low, high = drawing.figure.layout.yaxis3.range
+    assert low < run.series.after.min() and run.series.after.max() < high
+    assert high - low < 6.0 * np.abs(run.series.after).max()
+    assert "reaches beyond the panel" in drawing.caption
+    assert "beyond" not in drift_in_time(run).caption

@@ -10,7 +10,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from fogml.report import compare_page, inspect_page, noise_page, train_page
+from fogml.report import compare_page, index_page, inspect_page, noise_page, train_page
 from fogml.report.compare_page import ranked
 from fogml.report.reduce import DRAWN_POINTS
 from fogml.report.words import number
@@ -168,6 +168,25 @@ def test_a_model_whose_rms_is_not_a_number_comes_last() -> None:
     run = broken.test[0]
     broken = replace(broken, test=(replace(run, after=replace(run.after, rms=math.nan)),))
     assert ranked({"broken": broken, "rbf": judgement()}) == ["rbf", "broken"]
+
+
+def test_the_index_claims_a_loop_only_where_there_is_one() -> None:
+    closed = judgement()
+    run = closed.test[0]
+    apart = replace(run.series, before=run.series.before + 0.4)
+    open_loop = replace(closed, test=(replace(run, series=apart),))
+    text = Page(index_page({"x": open_loop, "y": closed}, {"x": "x/report.html", "y": "elsewhere.html"})).text
+    assert re.search(r"On axis x the two runs lie up to 0\.4\d* deg/h apart", text)
+    assert "no polynomial in T closes" in text
+    assert "no polynomial" not in Page(index_page({"y": closed})).text
+
+
+def test_the_index_links_to_the_axes_and_shows_models_beside() -> None:
+    beside = {"cubic in T": {"x": judgement(left=0.5)}}
+    read = Page(index_page({"x": judgement(), "z": judgement()}, beside=beside, title="A cycle"))
+    assert [a["href"] for a in read.of("a")] == ["x/report.html", "z/report.html"]
+    assert "Rms, cubic in T" in read.text
+    assert number(beside["cubic in T"]["x"].test[0].after.rms) in read.text
 
 
 def test_the_noise_page_tells_terms_and_warnings() -> None:

@@ -37,6 +37,14 @@ def test_harm_is_called_harm() -> None:
     assert "does harm" in verdict(judgement(left=3.0))[0]
 
 
+def test_a_bias_stability_made_worse_is_not_called_what_is_left() -> None:
+    judged = judgement()
+    run = judged.test[0]
+    poor = replace(run, before=replace(run.before, bias_stability=1e-4))
+    lead = verdict(replace(judged, test=(poor,)))[0]
+    assert "makes the bias stability worse" in lead and "leaves" not in lead
+
+
 def test_one_run_made_worse_among_several_is_named() -> None:
     judged = judgement(2)
     poor = replace(judged.test[0], before=replace(judged.test[0].before, rms=1e-4))
@@ -88,6 +96,6 @@ def test_stated_limits_begin_with_the_design_index() -> None:
 def test_the_model_card_tells_size_box_and_band() -> None:
     card = dict(model_card(judgement().model))
     assert card["parameters"] == "41" and card["weights"] == "344 bytes"
-    assert "T −20.0 to 60.0" in card["trained within"]
+    assert "T −20.0 to 60.0 °C; dT −0.670 to 0.670 °C/min" in card["trained within"]
     assert "± 0.0163 deg/h for 100 s averages" in card["90 % band"]
     assert np.all([isinstance(value, str) for value in card.values()])
