@@ -1,0 +1,157 @@
+"""The automatic choice among models, features and sizes, on parts of the training runs held out.
+
+Candidates are scored on averages of the training runs: each run in turn is held out where there
+are several, else blocks of the one run's time. What is held out is limited to the box of the
+rows fitted to, as in use. The rule that picks one is `fogml.models.score.choose`: a larger
+candidate than the standard form only if it beats it beyond noise, a smaller one if it is no
+worse, and no compensation where nothing beats the mean.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any, ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.models.base import DriftModel, Evaluation
+from fogml.models.card import TrainingCard, checked_runs
+from fogml.models.rbf.rates import RATES_THAT_TELL
+from fogml.models.score import choose
+from fogml.models.trial import Trial, fit_candidate
+from fogml.runs.run import BoolArray, FloatArray, Run
+
+Progress = Callable[[int, int, str], None]
+
+
+class AutoModel(DriftModel):
+    """The model that `auto` stands for; what it chose is in ``chosen_``.
+
+    Parameters
+    ----------
+    features
+        Features to keep to; None leaves them open too.
+    seed
+        Seed of the networks.
+    progress
+        Called with (done, of, name) after each candidate.
+
+    Attributes
+    ----------
+    chosen_ : DriftModel
+        The chosen model, fitted to all training runs.
+    scores_ : list of Score
+        All candidates, best first.
+    """
+
+    form: ClassVar[str] = "auto"
+    kind: str = "auto"
+
+    def __init__(self, features: str | None = None, seed: int = 0, progress: Progress | None = None) -> None:
+        self.features = features
+        self.seed = seed
+        self.progress = progress
+
+    def fit(self, runs: Run | Sequence[Run]) -> Self:
+        """Score the candidates on folds of the training runs, and fit the one chosen to all of them.
+
+        Raises
+        ------
+        InputError
+            If the runs don't belong together, lack a temperature, or are too short.
+        """
+        group = checked_runs(runs)
+        trial = Trial(group, self.seed, self.features)
+        scores = []
+        for done, candidate in enumerate(trial.candidates):
+            scores.append(trial.score(candidate))
+            if self.progress is not None:
+                self.progress(done + 1, len(trial.candidates), candidate.name)
+        self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
+        self.choice_ = choose(scores)
+        self.chosen_ = fit_candidate(self.choice_.candidate, group, self.seed)
+        notes = (*self.chosen_.card_.notes, *self._reasons(trial))
+        self.card_ = replace(self.chosen_.card_, notes=notes)
+        self.selection_ = [score.as_dict() for score in self.scores_]
+        self.intervals_ = self.chosen_.intervals_
+        self.features_ = self.chosen_.features_
+        return self
+
+    def _reasons(self, trial: Trial) -> list[str]:
+        """Why this one, and what the training runs could not tell; for the card."""
+        mean = next(score for score in self.scores_ if not score.candidate.features)
+        chosen = self.choice_
+        held_out = "left-out runs" if trial.folds_are_runs else "left-out parts of the training run"
+        rms = [f"{np.sqrt(score.mean_square):.4g}" for score in (chosen, mean)]
+        if not chosen.candidate.features:
+            notes = [f"no compensation: nothing beats the training mean ({rms[1]} deg/h rms) on {held_out}"]
+        else:
+            notes = [
+                f"chosen from {len(self.scores_)} candidates: {chosen.candidate.name} leaves {rms[0]} deg/h "
+                f"rms on {held_out}, the training mean {rms[1]} deg/h"
+            ]
+        if trial.rates < RATES_THAT_TELL:
+            notes.append(
+                f"at most temperatures the training runs hold {trial.rates} distinct rate(s): only terms "
+                "linear in the rate are weighed; train at three or more rates to allow others"
+            )
+        if not trial.folds_are_runs and not trial.both_directions:
+            notes.append(
+                "trained on temperature moving one way only: temperature, time and direction can't be told "
+                "apart, and hysteresis is not seen; train on a run up and a run down"
+            )
+        return notes
+
+    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+        """The chosen model's drift, fullness and distance from the trained box."""
+        return self.chosen_.evaluate_atoms(run, atoms, full)
+
+    @property
+    def feature_names(self) -> list[str]:
+        """The chosen model's features; none before a fit."""
+        return self.chosen_.feature_names if hasattr(self, "chosen_") else []
+
+    def weights(self) -> dict[str, NDArray[Any]]:
+        """The chosen model's arrays."""
+        self._check_fitted()
+        return self.chosen_.weights()
+
+    def parameter_count(self) -> int:
+        """Number of the chosen model's parameters."""
+        self._check_fitted()
+        return self.chosen_.parameter_count()
+
+    def describe(self) -> dict[str, Any]:
+        """The chosen model's description, with ``chosen_by`` and the candidates weighed."""
+        self._check_fitted()
+        return {
+            **self.chosen_.describe(),
+            "notes": list(self.card_.notes),
+            "chosen_by": self.kind,
+            "candidates": self.selection_,
+        }
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The chosen model as JSON-ready values and arrays, with the candidates weighed."""
+        self._check_fitted()
+        values, arrays = self.chosen_.to_saved()
+        chosen = {"form": self.chosen_.form, "kind": self.chosen_.kind, "model": values}
+        return {"chosen": chosen, "selection": self.selection_}, arrays
+
+    @classmethod
+    def from_saved(
+        cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
+    ) -> AutoModel:
+        """The model that `to_saved` gave."""
+        from fogml.models.saved import model_of_form
+
+        chosen = values["chosen"]
+        own = {"kind": str(chosen["kind"]), **chosen["model"]}
+        model = cls()
+        model.chosen_ = model_of_form(str(chosen["form"])).from_saved(own, arrays, card)
+        model.chosen_.card_ = card
+        model.features_ = model.chosen_.features_
+        model.selection_ = list(values["selection"])
+        return model

@@ -1,0 +1,77 @@
+"""How candidates did on what the folds held out, and which of them to take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.models.candidates import Candidate
+from fogml.runs.run import FloatArray
+
+
+@dataclass(frozen=True)
+class Score:
+    """A candidate on what the folds held out.
+
+    Attributes
+    ----------
+    candidate
+        What was scored.
+    parameters
+        Its number of parameters.
+    squared_errors
+        Mean squared error on each block of time [(deg/h)**2], shape (b,).
+    rows
+        Rows of each block, shape (b,).
+    """
+
+    candidate: Candidate
+    parameters: int
+    squared_errors: FloatArray
+    rows: NDArray[np.intp]
+
+    @property
+    def mean_square(self) -> float:
+        """Mean squared error over all rows [(deg/h)**2]."""
+        return float(np.average(self.squared_errors, weights=self.rows))
+
+    def beats(self, other: Score) -> bool:
+        """Whether it is better by more than the standard error of the difference, block by block."""
+        weights = self.rows / self.rows.sum()
+        gain = other.squared_errors - self.squared_errors
+        mean = float(weights @ gain)
+        count = len(weights)
+        error = float(np.sqrt(np.sum((weights * (gain - mean)) ** 2) * count / max(count - 1, 1)))
+        return mean > error
+
+    def as_dict(self) -> dict[str, float | int | str]:
+        """Name, parameters and rms error on the held-out rows [deg/h]."""
+        return {
+            "name": self.candidate.name,
+            "parameters": self.parameters,
+            "held_out_rms": float(np.sqrt(self.mean_square)),
+        }
+
+
+def choose(scores: Sequence[Score]) -> Score:
+    """The candidate to take.
+
+    The first score is the standard form's. A larger candidate replaces it only if it
+    beats it; among those the smallest that the best of them does not beat. A smaller one replaces
+    it if it is no worse; the smallest of those is taken. What does not beat the training runs'
+    mean is not worth its parameters: then the mean is taken.
+    """
+    mean = next(score for score in scores if not score.candidate.features)
+    standard = scores[0]
+    larger = [s for s in scores if s.parameters > standard.parameters and s.beats(standard)]
+    if larger:
+        best = min(larger, key=lambda s: s.mean_square)
+        allowed = [s for s in larger if not best.beats(s)]
+    else:
+        small = [s for s in scores if s.parameters <= standard.parameters]
+        allowed = [s for s in small if s.mean_square <= standard.mean_square]
+    choice = min(allowed, key=lambda s: (s.parameters, s.mean_square))
+    return choice if choice.beats(mean) else mean

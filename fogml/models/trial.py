@@ -1,0 +1,156 @@
+"""Scoring candidates on parts of the training runs held out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from fogml.features.parse import parse_features
+from fogml.models.base import DriftModel
+from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
+from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
+from fogml.models.linear import LinearRegressor
+from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
+from fogml.models.regressors import fit_regressor, parameter_count, predict_rows
+from fogml.models.score import Score
+from fogml.models.table import RunRows, TrainingTable, recorded_s, run_rows
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.averages import block_averages
+
+SCORED_ROWS = 2500
+"""Training rows are averaged over blocks of time down to this number for scoring."""
+FOLDS, BLOCKS_PER_FOLD = 10, 2
+MOVING_DEGC_MIN = 0.1
+"""A temperature rate above this is moving [degC/min]."""
+_MOTION = parse_features("T, dT")
+
+
+class Trial:
+    """The training runs, averaged and parted into folds, for any number of candidates.
+
+    Parameters
+    ----------
+    runs
+        Training runs.
+    seed
+        Seed of the networks.
+    features
+        Features to keep to; None leaves them open too.
+
+    Attributes
+    ----------
+    candidates
+        What there is to choose from, the standard form first.
+    rates
+        Number of distinct rates of temperature in the training runs.
+    folds_are_runs
+        Whether a fold holds out a run, rather than a part of the only one.
+    both_directions
+        Whether temperatures go up and down in the training runs.
+    """
+
+    def __init__(self, runs: Sequence[Run], seed: int, features: str | None = None) -> None:
+        self.seed = seed
+        temperature, rate = _temperatures_and_rates(runs)
+        self.rates = distinct_rates(rate, temperature)
+        self.both_directions = bool(
+            rate.min(initial=0.0) < -MOVING_DEGC_MIN and rate.max(initial=0.0) > MOVING_DEGC_MIN
+        )
+        self.candidates = (
+            candidates_of(features) if features else candidates_for(runs, self.rates >= RATES_THAT_TELL)
+        )
+        union = union_of(self.candidates)
+        self._column = {atom.text: column for column, atom in enumerate(union.atoms)}
+        rows = [run_rows(run, union) for run in runs]
+        averaged = _averaged(rows)
+        self._atoms = np.concatenate([part.atoms for part in averaged])
+        self._table = _table(averaged)
+        self.folds_are_runs = len(runs) > 1
+        self._folds: list[Fold] = (
+            run_folds(self._table)
+            if self.folds_are_runs
+            else time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)
+        )
+
+    def score(self, candidate: Candidate) -> Score:
+        """Errors of a candidate on the rows that each fold holds out."""
+        table = self._table
+        predicted = np.empty(len(table))
+        parameters = 1
+        for fitted, held in self._folds:
+            if not candidate.features:
+                predicted[held] = table.y[fitted].mean()
+                continue
+            predicted[held], parameters = self._predicted(candidate, fitted, held)
+        squares = (table.y - predicted) ** 2
+        starts = np.flatnonzero(np.diff(table.block, prepend=-1))
+        counts = np.diff(starts, append=len(table))
+        return Score(candidate, parameters, np.add.reduceat(squares, starts) / counts, counts)
+
+    def _predicted(
+        self, candidate: Candidate, fitted: IndexArray, held: IndexArray
+    ) -> tuple[FloatArray, int]:
+        features = parse_features(candidate.features)
+        atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
+        low, high = atoms[fitted].min(axis=0), atoms[fitted].max(axis=0)
+        names = [atom.text for atom in features.atoms]
+        features.set_box({n: (float(a), float(b)) for n, a, b in zip(names, low, high, strict=True)})
+        table = replace(self._table.take(fitted), X=features.compose(atoms[fitted]))
+        regressor = fit_regressor(regressor_for(candidate, self.seed), table)
+        limited, _ = features.limit(atoms[held])
+        return predict_rows(regressor, features.compose(limited)), parameter_count(regressor)
+
+
+def regressor_for(candidate: Candidate, seed: int) -> Any:
+    """The bare regressor of a candidate."""
+    if candidate.network:
+        from fogml.models.rbf import RBFRegressor
+
+        return RBFRegressor(seed=seed)
+    return LinearRegressor()
+
+
+def fit_candidate(candidate: Candidate, runs: Sequence[Run], seed: int) -> DriftModel:
+    """The candidate as a drift model, fitted to all training runs."""
+    from fogml.models.names import make_model
+
+    if not candidate.features:
+        return make_model("mean").fit(runs)
+    name = "rbf" if candidate.network else "polynomial"
+    return make_model(name, features=candidate.features, seed=seed).fit(runs)
+
+
+def _temperatures_and_rates(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
+    """Temperature [degC] and its rate [degC/min] over all rows with full windows."""
+    rows = [atoms[full] for atoms, full in (_MOTION.atom_values(run) for run in runs)]
+    temperature, rate = np.concatenate(rows).T
+    return temperature, rate
+
+
+def _averaged(rows: Sequence[RunRows]) -> list[RunRows]:
+    """Rows averaged over time down to `SCORED_ROWS` in all; as they are where there are fewer."""
+    if sum(len(part.y) for part in rows) <= SCORED_ROWS:
+        return list(rows)
+    window_s = recorded_s(rows) / SCORED_ROWS
+    averaged = []
+    for part in rows:
+        means = block_averages(part.time_s, part.atoms, part.y, window_s=window_s)
+        averaged.append(RunRows(means.values[0], means.values[1], means.time_s))
+    return averaged
+
+
+def _table(rows: Sequence[RunRows]) -> TrainingTable:
+    """A table without features: those are composed for each candidate."""
+    blocks = [dealt_blocks(len(part.y)) for part in rows]
+    first = np.cumsum([0, *(int(block[-1]) + 1 if len(block) else 0 for block in blocks)])
+    y = np.concatenate([part.y for part in rows])
+    return TrainingTable(
+        X=np.empty((len(y), 0)),
+        y=y,
+        run_index=np.repeat(np.arange(len(rows)), [len(part.y) for part in rows]),
+        time_s=np.concatenate([part.time_s for part in rows]),
+        block=np.concatenate([block + start for block, start in zip(blocks, first)]),
+    )
