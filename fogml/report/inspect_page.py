@@ -14,7 +14,8 @@ from fogml.report.words import MISSING, duration, listed, number, percent, plura
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
 
-_LISTED = 40
+_REGIMES_LISTED = 40
+_GAPS_LISTED = 12
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,10 @@ def _inspected(index: int, run: Run, told: Mapping[str, Any]) -> InspectedRun:
         tiles=_tiles(told),
         drawing=recording(run),
         columns=_columns(told),
-        regimes=_regimes(segments[:_LISTED]),
-        regimes_more=max(int(told["regimes"]["count"]) - _LISTED, 0),
-        gaps=_gaps(gaps[:_LISTED]),
-        gaps_more=max(int(told["gaps"]["count"]) - _LISTED, 0),
+        regimes=_regimes(segments[:_REGIMES_LISTED]),
+        regimes_more=max(int(told["regimes"]["count"]) - _REGIMES_LISTED, 0),
+        gaps=_gaps(gaps[:_GAPS_LISTED]),
+        gaps_more=max(int(told["gaps"]["count"]) - _GAPS_LISTED, 0),
         findings=noticed(told["findings"]),
         about=_about(told),
     )
