@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from fogml.cli.runs import open_blocks
 from fogml.cli.settings import Settings, absolute
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.outputs import whole_file
+from fogml.runs.run import Run
+
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
 
 FLAGS = ("good", "outside_training", "window_not_full")
 """What the flags 0, 1 and 2 mean."""
@@ -35,10 +43,7 @@ class CompensateSettings(Settings):
 
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:
     """Compensate a run block by block into a file, and print how many samples got which flag."""
-    from fogml.models.compensation import compensate_blocks
     from fogml.models.saved import load_model
-    from fogml.runs.reading import read_blocks
-    from fogml.runs.writing import BlockWriter, header_cells
 
     if not settings.run:
         raise InputError("no run is given; name the run to compensate")
@@ -47,47 +52,44 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     if not settings.out:
         raise InputError("no --out is given; name the file to write, .csv or .parquet")
     out = Path(settings.out)
-    if out.exists() and out.samefile(settings.run):
+    if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
         raise InputError(f"{out}: is the run itself; choose another --out")
     model = load_model(settings.model)
-    counts = np.zeros(len(FLAGS), dtype=np.int64)
-    with ExitStack() as stack:
-        config = stack.enter_context(whole_file(out.with_suffix(".config.yaml")))
+    with whole_file(out.with_suffix(".config.yaml")) as config:
         config.write_text(settings.in_full().yaml("compensate"), encoding="utf-8")
-        what = f"compensating {settings.run}"
-        work = stack.enter_context(terminal.work(what, total=_expected_rows(Path(settings.run))))
-        writer: BlockWriter | None = None
-        blocks = read_blocks(settings.run)
-        for block, compensation in compensate_blocks(model, blocks, any_unit=settings.any_unit):
-            if writer is None:
-                writer = stack.enter_context(BlockWriter(out, block.facts))
-            recorded = {cell: block.columns[name] for name, cell in header_cells(block).items()}
-            writer.write({**recorded, **compensation.columns()})
-            counts += np.bincount(compensation.flag, minlength=len(FLAGS))
-            work.advance(len(block))
-        if writer is None:
-            raise InputError(f"{settings.run}: holds no samples, there is nothing to compensate")
+        with terminal.work(f"compensating {settings.run}", total=_expected_rows(settings.run)) as work:
+            counts = _compensate(model, open_blocks(settings.run), out, settings.any_unit, work)
     _print(settings, model.kind, counts, terminal)
 
 
-def _expected_rows(path: Path) -> float | None:
-    """About how many rows a file holds, for the time left; None where that would take reading it."""
-    if path.suffix.lower() == ".parquet":
-        import pyarrow.parquet as parquet
+def _compensate(
+    model: DriftModel, blocks: Iterable[Run], out: Path, any_unit: bool, work: Work
+) -> NDArray[np.int64]:
+    """Write the compensated run; how many samples got each flag, shape (3,)."""
+    from fogml.models.compensation import compensate_blocks
+    from fogml.runs.writing import BlockWriter, header_cells
 
-        try:
-            return float(parquet.read_metadata(path).num_rows)
-        except (OSError, ValueError):
-            return None  # reading it says what is wrong
-    if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
-        return None
-    with path.open("rb") as file:
-        head = file.read(1 << 16)
-    lines = head.count(b"\n")
-    return path.stat().st_size / len(head) * lines if lines else None
+    counts = np.zeros(len(FLAGS), dtype=np.int64)
+    written: Future[None] | None = None
+    with ExitStack() as stack:
+        for block, compensation in compensate_blocks(model, blocks, any_unit=any_unit):
+            if written is None:
+                writer = stack.enter_context(BlockWriter(out, block.facts))
+                # Compressing takes as long as the rest: a block is written beside the next one's work.
+                beside = stack.enter_context(ThreadPoolExecutor(max_workers=1))
+            else:
+                written.result()
+            recorded = {cell: block.columns[name] for name, cell in header_cells(block).items()}
+            written = beside.submit(writer.write, {**recorded, **compensation.columns()})
+            counts += np.bincount(compensation.flag, minlength=len(FLAGS))
+            work.advance(len(block))
+        if written is None:
+            raise InputError("the run holds no samples, there is nothing to compensate")
+        written.result()
+    return counts
 
 
-def _print(settings: CompensateSettings, kind: str, counts: Any, terminal: Terminal) -> None:
+def _print(settings: CompensateSettings, kind: str, counts: NDArray[np.int64], terminal: Terminal) -> None:
     assert settings.run and settings.out
     rows = int(counts.sum())
     values = {
@@ -107,3 +109,21 @@ def _print(settings: CompensateSettings, kind: str, counts: Any, terminal: Termi
         ],
     )
     terminal.result(values)
+
+
+def _expected_rows(run: str) -> float | None:
+    """About how many rows a file holds, for the time left; None where that would take reading it."""
+    path = Path(run)
+    if path.suffix.lower() == ".parquet" and path.is_file():
+        import pyarrow.parquet as parquet
+
+        try:
+            return float(parquet.read_metadata(path).num_rows)
+        except (OSError, ValueError):
+            return None  # reading it says what is wrong
+    if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
+        return None
+    with path.open("rb") as file:
+        head = file.read(1 << 16)
+    lines = head.count(b"\n")
+    return path.stat().st_size / len(head) * lines if lines else None

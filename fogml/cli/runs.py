@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal
@@ -20,6 +20,13 @@ def open_run(path: str, *, repair: bool = False) -> Run:
         return read_run(path, repair=repair)
     run = shipped_run(path.removeprefix(SHIPPED))
     return run.with_findings(check_run(run))
+
+
+def open_blocks(path: str) -> Iterable[Run]:
+    """The run in a file in blocks of bounded size, or ``shipped:NAME`` whole."""
+    from fogml.runs.reading import read_blocks
+
+    return [open_run(path)] if path.startswith(SHIPPED) else read_blocks(path)
 
 
 def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: bool = False) -> list[Run]:

@@ -10,6 +10,7 @@ import yaml
 
 from fogml.models.saved import load_model
 from fogml.runs.reading import read_run
+from fogml.runs.shipped import shipped_run
 from tests.cli.conftest import csv_text
 
 ADDED = ["drift", "gyro_compensated", "flag"]
@@ -38,6 +39,15 @@ def test_equals_the_model_on_the_whole_run(invoke_json, model, run_files, tmp_pa
     assert values["rows"] == len(run)
     assert list(values["flags"].values()) == np.bincount(expected.flag, minlength=3).tolist()
     assert written.facts == run.facts
+
+
+def test_a_shipped_run(invoke_json, tmp_path):
+    out = tmp_path / "out"
+    arguments = ("--model", "M1", "--averaging", "10", "-o", out)
+    invoke_json("train", "shipped:thermal-cycle-2-x", "--test", "shipped:thermal-cycle-3-x", *arguments)
+    written = tmp_path / "written.csv"
+    values = invoke_json("compensate", "shipped:thermal-cycle-3-x", "--model", out / "model", "-o", written)
+    assert len(read_run(written)) == values["rows"] == len(shipped_run("thermal-cycle-3-x"))
 
 
 def test_samples_outside_training_are_flagged(invoke_json, model, tmp_path):
