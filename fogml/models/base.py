@@ -139,11 +139,6 @@ class DriftModel(BaseEstimator, ABC):
         """
         raise NotImplementedError(f"{type(self).__name__} does not evaluate atoms")
 
-    @property
-    def acting(self) -> DriftModel:
-        """The model that evaluates: this one, unless it stands for another that it chose."""
-        return self
-
     @abstractmethod
     def weights(self) -> dict[str, NDArray[Any]]:
         """The arrays that the fitted model consists of, by name."""

@@ -36,7 +36,6 @@ def compensate_blocks(
     InputError
         If the model does not apply to the recording, or a block begins before the last ended.
     """
-    acting = model.acting
     atoms: FeatureBlocks | None = None
     first = True
     for block in blocks:
@@ -44,11 +43,11 @@ def compensate_blocks(
             continue
         if first:
             model.check_applies(block, any_unit)
-            if acting.features_ is not None:
-                atoms = acting.features_.blocks(block.sample_s)
+            if model.features_ is not None:
+                atoms = model.features_.blocks(block.sample_s)
             first = False
         if atoms is None:
-            evaluation = acting.evaluate(block)
+            evaluation = model.evaluate(block)
         else:
-            evaluation = acting.evaluate_atoms(block, *atoms.push(block))
+            evaluation = model.evaluate_atoms(block, *atoms.push(block))
         yield block, compensation_of(block, evaluation)
