@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
+from fogml.models.intervals import Intervals
 from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.score import choose
 from fogml.models.trial import Trial, fit_candidate
@@ -75,7 +76,6 @@ class AutoModel(DriftModel):
         notes = (*self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)
         self.selection_ = [score.as_dict() for score in self.scores_]
-        self.intervals_ = self.chosen_.intervals_
         self.features_ = self.chosen_.features_
         return self
 
@@ -103,6 +103,15 @@ class AutoModel(DriftModel):
                 "apart, and hysteresis is not seen; train on a run up and a run down"
             )
         return notes
+
+    @property
+    def intervals_(self) -> Intervals:
+        """The chosen model's half-widths of the prediction interval."""
+        return self.chosen_.intervals_
+
+    @intervals_.setter
+    def intervals_(self, intervals: Intervals) -> None:
+        self.chosen_.intervals_ = intervals
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """The chosen model's drift, fullness and distance from the trained box."""

@@ -1,0 +1,136 @@
+"""The automatic choice: parsimony, no harm, and what it says of the training runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.synthetic_world import World, cycle, programme
+from fogml.models import trial
+from fogml.models.auto import AutoModel
+from fogml.models.candidates import STANDARD, Candidate, candidates_for
+from fogml.models.saved import load_model, save_model
+from fogml.models.score import Score, choose
+from fogml.runs.run import Run
+
+SAMPLE_S = 20.0
+WORLD = World(noise=0.05)
+
+
+def world_run(rate: float, seed: int, world: World = WORLD) -> tuple[Run, np.ndarray]:
+    return world.run(cycle(rate, SAMPLE_S), SAMPLE_S, seed, f"{rate}-{seed}.csv")
+
+
+@pytest.fixture
+def linear_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Leave networks out: their own tests are elsewhere, and they take most of the time."""
+
+    def without_networks(*arguments: object) -> list[Candidate]:
+        return [c for c in candidates_for(*arguments) if not c.network]  # type: ignore[arg-type]
+
+    monkeypatch.setattr(trial, "candidates_for", without_networks)
+
+
+def score(features: str, parameters: int, squares: list[float]) -> Score:
+    return Score(Candidate(features), parameters, np.array(squares), np.ones(len(squares), dtype=np.intp))
+
+
+def test_a_larger_candidate_needs_a_gain_beyond_its_standard_error() -> None:
+    mean = score("", 1, [9.0, 9.0, 9.0, 9.0])
+    standard = score(STANDARD.features, 6, [1.0, 1.0, 1.0, 1.0])
+    unsure = score("T^1..5", 7, [0.2, 1.6, 0.9, 1.2])  # gains 0.025 on average, scattered by 0.6
+    sure = score("T^1..4", 8, [0.9, 0.91, 0.92, 0.9])
+    assert choose([standard, unsure, mean]) is standard
+    assert choose([standard, unsure, sure, mean]) is sure
+
+
+def test_a_smaller_candidate_is_taken_if_it_is_no_worse() -> None:
+    mean = score("", 1, [9.0, 9.0, 9.0, 9.0])
+    standard = score(STANDARD.features, 6, [1.0, 1.0, 1.0, 1.0])
+    as_good = score("T, dT", 3, [1.0, 0.9, 1.1, 1.0])
+    worse = score("T", 2, [1.1, 1.1, 1.0, 1.0])
+    assert choose([standard, worse, as_good, mean]) is as_good
+
+
+def test_nothing_is_better_than_a_gain_within_its_noise() -> None:
+    mean = score("", 1, [1.0, 1.0, 1.0, 1.0])
+    standard = score(STANDARD.features, 6, [0.2, 1.9, 0.9, 0.9])
+    assert choose([standard, mean]) is mean
+
+
+def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
+    quiet = World(polynomial=(1.0,), gradient=0.0, rate=0.0, product=0.0, noise=0.1)
+    taken = []
+    for seed in range(8):
+        run, _ = world_run(1.0, seed, quiet)
+        model = AutoModel().fit(run)
+        taken.append(model.choice_.candidate.features)
+        if not taken[-1]:
+            assert "no compensation" in model.card_.notes[0]
+            np.testing.assert_allclose(model.predict(run), run.gyro.mean(), rtol=1e-9)
+    # A candidate may beat the mean by one standard error by luck; it must not be the rule.
+    assert taken.count("") >= 6
+
+
+def test_it_finds_the_drift_and_holds_at_another_rate(linear_only: None) -> None:
+    run, _ = world_run(1.0, 0)
+    model = AutoModel().fit(run)
+    other, truth = world_run(0.6, 1)
+    evaluation = model.evaluate(other)
+    error = (evaluation.drift - truth)[evaluation.full]
+    assert np.sqrt(np.mean(error**2)) < 0.25 * truth.std()
+
+
+def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
+    run, _ = world_run(1.0, 0)
+    few = {c.features for c in candidates_for([run], rates_told=False)}
+    many = {c.features for c in candidates_for([run], rates_told=True)}
+    assert not any("sign" in text or "d(T_in-T_out)" in text for text in few)
+    assert any("sign" in text for text in many) and any("d(T_in-T_out)" in text for text in many)
+    assert few < many
+
+
+def test_rates_of_the_training_runs_are_told() -> None:
+    runs = [world_run(rate, seed)[0] for seed, rate in enumerate((0.4, 1.0, 2.0))]
+    assert trial.Trial(runs[:1], 0).rates < 3
+    assert trial.Trial(runs, 0).rates >= 3
+
+
+def test_one_direction_only_is_said(linear_only: None) -> None:
+    chamber = programme([("soak", 30.0, 0.0), ("ramp", 60.0, 1.0)], -20.0, SAMPLE_S)
+    up, _ = WORLD.run(chamber, SAMPLE_S, 0, "up.csv")
+    both, _ = world_run(1.0, 0)
+    assert any("one way only" in note for note in AutoModel().fit(up).card_.notes)
+    assert not any("one way only" in note for note in AutoModel().fit(both).card_.notes)
+
+
+def test_left_out_runs_reveal_what_one_run_hides(linear_only: None) -> None:
+    """Two ramps whose drift goes with time, not with temperature: no model may be made of that."""
+    up = programme([("ramp", 60.0, 1.0)], -20.0, SAMPLE_S)
+    runs = []
+    for name, chamber in (("up", up), ("down", up[::-1])):
+        run, _ = World(noise=0.01).run(chamber, SAMPLE_S, 3, name)
+        drift = np.linspace(0.0, 1.0, len(run))
+        noise = 0.01 * np.random.default_rng(len(name)).standard_normal(len(run))
+        runs.append(run.with_columns(gyro=drift + noise))
+    assert AutoModel().fit(runs[:1]).choice_.candidate.features
+    assert AutoModel().fit(runs).choice_.candidate.features == ""
+
+
+def test_saving_keeps_choice_and_numbers(linear_only: None, tmp_path) -> None:
+    run, _ = world_run(1.0, 0)
+    model = AutoModel().fit(run)
+    save_model(model, tmp_path / "model")
+    loaded = load_model(tmp_path / "model")
+    np.testing.assert_array_equal(loaded.predict(run), model.predict(run))
+    assert loaded.describe() == model.describe()
+    for ours, theirs in zip(loaded.predict_interval(run), model.predict_interval(run), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+def test_stated_features_are_kept(linear_only: None) -> None:
+    run, _ = world_run(1.0, 0)
+    model = AutoModel(features="T, dT")
+    names = {c.name for c in trial.Trial([run], 0, "T, dT").candidates}
+    assert names == {"mean", "T, dT", "RBF network of T, dT"}
+    assert model.get_params()["features"] == "T, dT"
