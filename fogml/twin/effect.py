@@ -1,0 +1,202 @@
+"""The effect: one declaration that simulator, diagnosis, documentation and tests all read."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+from fogml.twin.inputs import Inputs
+from fogml.twin.quantities import Grade, Quantity
+
+if TYPE_CHECKING:
+    from fogml.twin.plant.network import ThermalNetwork
+
+Stage = Literal["thermal", "rig", "bias", "scale_factor", "loop", "readout", "sensor", "logger", "noise"]
+STAGES: tuple[Stage, ...] = (
+    "thermal",
+    "rig",
+    "bias",
+    "scale_factor",
+    "loop",
+    "readout",
+    "sensor",
+    "logger",
+    "noise",
+)
+
+
+class Effect(ABC):
+    """An entry of the catalogue. The docstring of each class states its equation and source.
+
+    Attributes
+    ----------
+    id, code, title
+        Name that configurations and reports use; letter code; a few words.
+    stage
+        Where in the chain it acts.
+    amplitude
+        The linear coefficient of the equation.
+    shape
+        Parameters that the response is not linear in.
+    needs
+        Names that the signature asks of `Inputs`, beside time; nothing else may change it.
+    conflicts
+        Ids that can't be on at the same time.
+    sources
+        Where equation and ranges come from.
+    shows
+        Where in a recording it shows.
+    confused_with
+        Id of a look-alike to what separates the two.
+    candidate
+        Whether a diagnosis offers it unless told otherwise.
+    """
+
+    id: ClassVar[str]
+    code: ClassVar[str]
+    title: ClassVar[str]
+    stage: ClassVar[Stage]
+    amplitude: ClassVar[Quantity]
+    shape: ClassVar[tuple[Quantity, ...]] = ()
+    needs: ClassVar[tuple[str, ...]] = ()
+    conflicts: ClassVar[tuple[str, ...]] = ()
+    sources: ClassVar[tuple[str, ...]] = ()
+    shows: ClassVar[str] = ""
+    confused_with: ClassVar[Mapping[str, str]] = {}
+    candidate: ClassVar[bool] = True
+
+    @abstractmethod
+    def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Response per unit of amplitude, shape (n,): ppm for scale factor effects, else deg/h."""
+
+    def response(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Change of the gyro's output [deg/h] per unit of amplitude, shape (n,)."""
+        return self.signature(inputs, **shape)
+
+    def default_shape(self, grade: Grade = "tactical") -> dict[str, float]:
+        """Shape parameters in the middle of a grade's range."""
+        return {parameter.name: parameter.typical(grade) for parameter in self.shape}
+
+    def checked(self, values: Mapping[str, Any]) -> tuple[float, dict[str, float]]:
+        """Amplitude and shape from a mapping such as a twin file's.
+
+        Shape parameters that are not stated take their tactical middle.
+
+        Raises
+        ------
+        InputError
+            Naming the unknown key, or the value outside its physical limits.
+        """
+        owner = f"effect '{self.id}'"
+        known = {"amplitude": self.amplitude, **{p.name: p for p in self.shape}}
+        for key in values:
+            if key not in known:
+                raise InputError(f"{owner}: unknown key '{key}'; known keys are {', '.join(known)}")
+        if "amplitude" not in values:
+            raise InputError(f"{owner}: 'amplitude' [{self.amplitude.unit}] is missing")
+        shape = self.default_shape() | {
+            key: known[key].check(value, owner) for key, value in values.items() if key != "amplitude"
+        }
+        return self.amplitude.check(values["amplitude"], owner), shape
+
+
+class BiasEffect(Effect):
+    """Adds to the bias [deg/h]."""
+
+    stage: ClassVar[Stage] = "bias"
+
+
+class RigEffect(Effect):
+    """Adds to the rate about the input axis [deg/h], before the scale factor."""
+
+    stage: ClassVar[Stage] = "rig"
+
+
+class ScaleFactorEffect(Effect):
+    """Adds to the scale factor error [ppm]."""
+
+    stage: ClassVar[Stage] = "scale_factor"
+
+    def response(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Change of the gyro's output [deg/h] per unit of amplitude, shape (n,)."""
+        return 1e-6 * inputs.input_rate_deg_h * self.signature(inputs, **shape)
+
+
+class LoopEffect(Effect):
+    """Distorts the rate that the closed loop gives; `signature` reads ``inputs.output``."""
+
+    stage: ClassVar[Stage] = "loop"
+
+    def apply(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        """The loop's output [deg/h] for an undistorted `output` [deg/h], both of shape (n,)."""
+        return output + amplitude * self.signature(inputs.with_output(output), **shape)
+
+
+class ReadoutEffect(LoopEffect):
+    """Acts on the samples as they are read out; `signature` reads ``inputs.output``."""
+
+    stage: ClassVar[Stage] = "readout"
+
+
+class SensorEffect(Effect):
+    """Falsifies measured temperatures.
+
+    The signature is what the output differs from a replay that trusts the sensors, to first
+    order: the replay's slope against temperature times the sensors' error.
+    """
+
+    stage: ClassVar[Stage] = "sensor"
+
+    @abstractmethod
+    def sense(
+        self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
+    ) -> FloatArray:
+        """What the sensor `name` gives [degC] where its place has `temperature` [degC]; shape (n,)."""
+
+
+class LoggerEffect(Effect):
+    """Falsifies the recording: clocks and columns."""
+
+    stage: ClassVar[Stage] = "logger"
+
+    @abstractmethod
+    def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        """The output as logged [deg/h], shape (n,)."""
+
+
+class ThermalEffect(Effect):
+    """Changes what the plant does; in a replay its signature is what sensors don't show."""
+
+    stage: ClassVar[Stage] = "thermal"
+
+    def change_chamber(
+        self, chamber: FloatArray, inputs: Inputs, amplitude: float, **shape: float
+    ) -> FloatArray:
+        """Chamber air [degC] with the effect, shape (n,)."""
+        return chamber
+
+    def change_plant(self, plant: ThermalNetwork, amplitude: float, **shape: float) -> ThermalNetwork:
+        """The plant with the effect."""
+        return plant
+
+
+class NoiseEffect(Effect):
+    """A random error; its mean response is zero, `draw` gives one realisation."""
+
+    stage: ClassVar[Stage] = "noise"
+    candidate = False
+
+    def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Zeros: a noise has no mean response."""
+        return np.zeros(len(inputs))
+
+    @abstractmethod
+    def draw(
+        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
+    ) -> FloatArray:
+        """One realisation [deg/h], shape (count,)."""

@@ -1,0 +1,141 @@
+"""What a recording or a simulation offers to the effects: temperatures, rates, drives, facts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.twin.memory import Memory
+
+REST = {
+    "power": 0.0,
+    "supply": 0.0,
+    "humidity": 0.0,
+    "vibration": 0.0,
+    "compressor": 0.0,
+    "heater": 0.0,
+    "fan": 1.0,
+    "B_x": 0.0,
+    "B_y": 0.0,
+    "B_z": 0.0,
+    "shaking": 0.0,
+}
+"""What a drive that is not recorded is taken to be; its effects then vanish or stay constant."""
+
+
+@dataclass(frozen=True, eq=False)
+class Inputs:
+    """Everything an effect may ask for, over n samples.
+
+    Attributes
+    ----------
+    time
+        Time [s], shape (n,).
+    temperatures
+        Node or sensor name of the run format (``T_in``, ``T_out``, ``T_case``,
+        ``T_electronics``, ``T_chamber`` and the twin's ``T_hub``, ``T_plate``) to degC, shape (n,).
+    table_rate
+        Table rate about the input axis [deg/s], shape (n,).
+    earth_deg_h
+        Earth rate along the input axis [deg/h].
+    facts
+        Set-up facts.
+    powered_on_s
+        Power-on on the clock of `time` [s]; minus infinity where it was long before.
+    drives
+        Other recorded quantities by the run format's names, internal units, shape (n,).
+    rate_window_s
+        Window of temperature rates [s]; 0 for neighbouring samples.
+    output
+        The output that the effect meets [deg/h], shape (n,); for loop, sensor and logger effects.
+    slopes
+        Change of the nominal output with each temperature [deg/h/degC], shape (n,).
+    memory
+        States that go on from block to block.
+    cache
+        What was worked out for these samples from `memory`, which may be asked once a block.
+    """
+
+    time: FloatArray
+    temperatures: Mapping[str, FloatArray]
+    table_rate: FloatArray
+    earth_deg_h: float = 0.0
+    facts: Facts = field(default_factory=Facts)
+    powered_on_s: float = -np.inf
+    drives: Mapping[str, FloatArray] = field(default_factory=dict)
+    rate_window_s: float = 64.0
+    output: FloatArray | None = None
+    slopes: Mapping[str, FloatArray] = field(default_factory=dict)
+    memory: Memory = field(default_factory=Memory)
+    cache: dict[str, FloatArray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def temperature(self, name: str = "T") -> FloatArray:
+        """A temperature [degC], shape (n,); ``T`` stands for ``T_in`` where it is not its own.
+
+        Raises
+        ------
+        InputError
+            If neither recording nor plant gives it.
+        """
+        if name in self.temperatures:
+            return self.temperatures[name]
+        if name == "T" and "T_in" in self.temperatures:
+            return self.temperatures["T_in"]
+        if name in ("T_in", "T_out") and "T" in self.temperatures:
+            return self.temperatures["T"]
+        held = ", ".join(self.temperatures) or "none"
+        raise InputError(f"no temperature '{name}' is recorded or given by the plant; there is {held}")
+
+    def u(self, name: str = "T") -> FloatArray:
+        """Temperature less 25 degC, shape (n,)."""
+        return self.temperature(name) - 25.0
+
+    def dT(self, name: str = "T") -> FloatArray:
+        """Rate of a temperature [degC/min], shape (n,)."""
+        key = f"dT({name})"
+        if key not in self.cache:
+            rate = self.memory.rate(key, self.time, self.temperature(name), self.rate_window_s)
+            self.cache[key] = rate
+        return self.cache[key]
+
+    @cached_property
+    def gradient(self) -> FloatArray:
+        """T_out - T_in [degC], shape (n,)."""
+        return self.temperature("T_out") - self.temperature("T_in")
+
+    def drive(self, name: str) -> FloatArray:
+        """A drive by its name, shape (n,); its rest value where it is not recorded."""
+        return self.drives[name] if name in self.drives else np.full(len(self), REST[name])
+
+    @property
+    def angle_deg(self) -> FloatArray:
+        """Table angle [deg], shape (n,); the integral of the table rate where not recorded."""
+        if "angle" in self.drives:
+            return self.drives["angle"]
+        if "angle" not in self.cache:
+            step = self.time - self.memory.previous("angle time", self.time)
+            self.cache["angle"] = self.memory.total("angle", step * self.table_rate)
+        return self.cache["angle"]
+
+    @cached_property
+    def time_on_s(self) -> FloatArray:
+        """Time since power-on [s], at least 0; infinite where it was long before; shape (n,)."""
+        return np.maximum(self.time - self.powered_on_s, 0.0)
+
+    @cached_property
+    def input_rate_deg_h(self) -> FloatArray:
+        """Rate about the input axis [deg/h]: table and Earth, shape (n,)."""
+        return 3600.0 * self.table_rate + self.earth_deg_h
+
+    def with_output(self, output: FloatArray) -> Inputs:
+        """The same inputs with the output that an effect meets [deg/h], shape (n,)."""
+        return replace(self, output=output)

@@ -1,0 +1,85 @@
+"""Quantities with a unit, a range for each grade of gyro, and the prior that follows."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fogml.errors import InputError
+
+Grade = Literal["tactical", "navigation"]
+GRADES: tuple[Grade, ...] = ("tactical", "navigation")
+# A grade's range is read as the central 90 % of a log-normal or normal law.
+_Z90 = 1.6448536269514722
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """An amplitude or a shape parameter.
+
+    Attributes
+    ----------
+    name
+        Whole words, e.g. ``half_width``.
+    unit
+        Its unit, e.g. ``degC``; ``1`` for a pure number.
+    tactical, navigation
+        Usual range (low, high) for the grade; of the size where `signed`.
+    limits
+        What is physically possible; outside is an error.
+    signed
+        Whether either sign occurs: then the range is that of the size.
+    meaning
+        A few words.
+    """
+
+    name: str
+    unit: str
+    tactical: tuple[float, float]
+    navigation: tuple[float, float]
+    meaning: str = ""
+    limits: tuple[float, float] = (-math.inf, math.inf)
+    signed: bool = False
+
+    def range(self, grade: Grade) -> tuple[float, float]:
+        """Usual range (low, high) for a grade."""
+        return self.tactical if grade == "tactical" else self.navigation
+
+    def typical(self, grade: Grade = "tactical") -> float:
+        """Middle of the grade's range: geometric where all of it is positive."""
+        low, high = self.range(grade)
+        return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
+
+    def draw(self, rng: np.random.Generator, grade: Grade = "tactical") -> float:
+        """A value from the prior: log-normal with the range as its central 90 %, normal where
+        the range reaches zero or below; the sign is fair where `signed`; within `limits`."""
+        low, high = self.range(grade)
+        z = float(rng.standard_normal())
+        sign = float(rng.choice((-1.0, 1.0))) if self.signed else 1.0
+        if low > 0.0:
+            middle, spread = 0.5 * math.log(low * high), 0.5 * math.log(high / low) / _Z90
+            value = math.exp(middle + spread * z)
+        else:
+            value = 0.5 * (low + high) + 0.5 * (high - low) / _Z90 * z
+        return float(np.clip(sign * value, *self.limits))
+
+    def check(self, value: float, owner: str) -> float:
+        """The value as a float.
+
+        Raises
+        ------
+        InputError
+            If it is not a finite number within `limits`; the message names owner and key.
+        """
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise InputError(f"{owner}: '{self.name}' is {value!r}; a number in {self.unit} is needed")
+        low, high = self.limits
+        if not low <= value <= high:
+            raise InputError(
+                f"{owner}: '{self.name}' is {value:g} {self.unit}, which is not physical; "
+                f"it lies between {low:g} and {high:g} {self.unit}"
+            )
+        return float(value)
