@@ -165,16 +165,23 @@ def write_results(
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
+    from fogml.report.words import label, unit_of
+
     rows = []
     for run in judgement.test:
-        for label, figures in (("before", run.before), ("after", run.after)):
+        for when, figures in (("before", run.before), ("after", run.after)):
             values = (figures.bias, figures.bias_stability, figures.range, figures.rms)
-            rows.append([f"{run.run} {label}", *(number(value) for value in values)])
+            rows.append([f"{run.run} {when}", *(number(value) for value in values)])
         rows.append([f"{run.run} noise floor", "–", number(run.floor), "–", "–"])
     averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
     for run in judgement.test:
+        for name in _TOLD_BY_SOME:
+            before, after = getattr(run.before, name), getattr(run.after, name)
+            if after is not None:
+                text = f"{number(before)} before, {number(after)} after"
+                terminal.say(f"{run.run}: {label(name)}: {text} [{unit_of(name)}]")
         if run.outside_training:
             terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
     stated = [*judgement.limits]
@@ -182,7 +189,11 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         stated.insert(0, judgement.design_index)
     for outcome in stated:
         verdict = "met" if outcome.met else "NOT met"
-        label = "design index (rms)" if outcome is judgement.design_index else outcome.quantity
-        terminal.say(f"{label}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
+        name = "design index (rms)" if outcome is judgement.design_index else outcome.quantity
+        terminal.say(f"{name}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
     for note in judgement.notes:
         terminal.say(note)
+
+
+_TOLD_BY_SOME = ("scale_factor_error", "scale_factor_error_largest", "temperature_sensitivity", "hysteresis")
+"""Figures that only runs with turns or soaks tell."""

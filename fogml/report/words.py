@@ -12,12 +12,14 @@ _LABELS = {
     "range": "Range",
     "rms": "Rms",
     "scale_factor_error": "Scale-factor error",
+    "scale_factor_error_largest": "Scale-factor error, largest of single turns",
     "temperature_sensitivity": "Bias temperature sensitivity",
     "hysteresis": "Thermal hysteresis",
     "design_index": "Design index (largest rms)",
 }
 _UNITS = {
     "scale_factor_error": "ppm",
+    "scale_factor_error_largest": "ppm",
     "temperature_sensitivity": "deg/h/°C",
     "design_index": "deg/h",
 }

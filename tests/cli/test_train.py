@@ -157,6 +157,28 @@ def test_bad_usage_is_one_message_and_nothing_is_written(invoke, run_files, monk
     assert sorted(folder.iterdir()) == before
 
 
+def test_an_unknown_key_in_the_configuration(invoke, run_files, tmp_path):
+    config = tmp_path / "mine.yaml"
+    config.write_text("runs: [a.csv]\ntest: [b.csv]\nmodle: M1\n")
+    result = invoke("train", "--config", config, "-o", tmp_path / "out", status=2)
+    assert result.stderr == (
+        "fogml: mine.yaml: unknown key 'modle'; did you mean 'model'? known keys are seed, averaging, "
+        "design_index, limits, runs, test, model, features, train_again, repair, strict, any_unit, out\n"
+    )
+    assert not (tmp_path / "out").exists()
+
+
+def test_turns_are_told(invoke, tmp_path):
+    rate = [0.0] * 600 + [10.0] * 60 + [-10.0] * 60 + [0.0] * 600
+    lines = ["time [s],gyro [deg/h],T [degC],rate [deg/s]"]
+    lines += [f"{i},{3600 * r * 1.0005:.6f},{20 + i / 100},{r}" for i, r in enumerate(rate)]
+    for name in ("a.csv", "b.csv"):
+        (tmp_path / name).write_text("\n".join(lines) + "\n")
+    arguments = ("--model", "mean", "-o", tmp_path / "out")
+    result = invoke("train", tmp_path / "a.csv", "--test", tmp_path / "b.csv", *arguments)
+    assert "b.csv: Scale-factor error: 500 before, 500 after [ppm]" in result.stdout
+
+
 def test_a_closed_folder_is_found_before_training(invoke, run_files, tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)
     result = invoke("train", run_files[0], "--test", run_files[1], *QUICK, "-o", tmp_path / "out", status=2)
