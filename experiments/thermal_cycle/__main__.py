@@ -44,7 +44,7 @@ def results() -> list[dict]:
         for train, test in permutations(LEGS, 2):
             for label, (name, features) in MODELS.items():
                 with warnings.catch_warnings():
-                    # A process on a thousand noise-free-looking rows runs into its bounds; that is its result.
+                    # The process may run into the bounds of its search; that is its result here.
                     warnings.simplefilter("ignore")
                     model = make_model(name, features=features).fit(runs[train])
                 averaging_s = ROWS_PER_AVERAGE * runs[test].sample_s
@@ -101,8 +101,9 @@ def page(rows: list[dict]) -> str:
 
 Data: the shipped thermal cycle of a **MEMS** unit (no fibre-optic gyro), 52 → −17.6 → 74 → 36 °C, legs
 `down`, `up` and `last down`, three axes. Each model is fitted on one leg and judged on another.
-Averages over {ROWS_PER_AVERAGE} rows ({averaging_s:.1f} s); all in deg/h. Earth rate is not known here, so biases are
-relative to the training leg's mean, and `none` gives the same figures as `mean`, the no-model baseline.
+Averages over {ROWS_PER_AVERAGE} rows ({averaging_s:.1f} s); all in deg/h. Earth rate is not known here, so
+biases are relative to the training leg's mean, and `none` gives the same figures as `mean`, the no-model
+baseline.
 fogml {__version__}; `python -m experiments.thermal_cycle`.
 
 ## rms (bias included)
