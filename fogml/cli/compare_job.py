@@ -100,7 +100,8 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
     test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else None
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *(test_runs or []))])
-    with terminal.work("comparing", total=len(makers)) as work:
+    fits = len(makers) * (1 if test_runs is not None else len(train_runs) + 1)
+    with terminal.work("comparing", total=fits) as work:
         begun: list[str] = []
 
         def step(name: str) -> None:

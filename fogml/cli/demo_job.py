@@ -9,6 +9,7 @@ from fogml.cli.settings import SHIPPED, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import TrainSettings, fit_and_judge, write_results
 from fogml.outputs import whole_folder
+from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement
 
@@ -52,6 +53,8 @@ def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
 
 def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -> tuple[Judgement, Judgement]:
     """The judgement of the default on one axis, its results written, and of the cubic in T."""
+    from fogml.models.names import make_model
+
     runs = [f"{SHIPPED}thermal-cycle-{leg}-{axis}" for leg in (TRAINING_LEG, TEST_LEG)]
     training, test = open_runs(runs[:1], terminal), open_runs(runs[1:], terminal)
     train_settings = TrainSettings(
@@ -64,8 +67,9 @@ def _axis(folder: Path, axis: str, settings: DemoSettings, terminal: Terminal) -
     model, judgement = fit_and_judge(train_settings, training, test, terminal)
     folder.mkdir()
     write_results(folder, train_settings, model, judgement, terminal)
-    cubic = train_settings.model_copy(update={"model": "polynomial", "features": "T^1..3"})
-    return judgement, fit_and_judge(cubic, training, test, terminal)[1]
+    cubic = make_model("polynomial", "T^1..3").fit(training)
+    averaging_s = train_settings.averaging
+    return judgement, judge(cubic, training, test, averaging_s=averaging_s, beside=[model])
 
 
 def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: Terminal) -> None:

@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperCommand
 
 Config = Annotated[
-    Path | None, typer.Option("--config", help="YAML file with any of these settings; flags go before it.")
+    Path | None, typer.Option("--config", help="YAML file with any of these settings; flags override it.")
 ]
 Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random (0).")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result alone, as JSON.")]

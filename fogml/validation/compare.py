@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import FogmlError, InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, judge
-from fogml.validation.leave_one_out import leave_one_run_out
-from fogml.validation.limits import check_limits
+from fogml.validation.judge import DEFAULT_AVERAGING_S, judgement_of
+from fogml.validation.leave_one_out import merged_folds, splits_of
+from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.results import Judgement
+from fogml.validation.run_errors import RunErrors, common_rows, run_errors
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 ModelMaker = Callable[[], "DriftModel"]
+# A regressor from outside may refuse the data in its own words.
+_REFUSALS = (FogmlError, ValueError, ArithmeticError, MemoryError)
 
 
 @dataclass(frozen=True)
@@ -38,7 +41,10 @@ def compare(
     any_unit: bool = False,
     step: Callable[[str], None] | None = None,
 ) -> Comparison:
-    """Fit and judge each model on the same runs.
+    """Fit and judge each model on the same runs, and on the same rows of them.
+
+    Rows count where the windows of every fitted model are full, so that a model without windows
+    is not judged on rows that the others leave out.
 
     Parameters
     ----------
@@ -51,7 +57,7 @@ def compare(
     averaging_s, design_index, limits, any_unit
         As in :func:`~fogml.validation.judge.judge`.
     step
-        Called with a model's name before its turn.
+        Called with a model's name before each of its fits.
 
     Returns
     -------
@@ -64,37 +70,75 @@ def compare(
         If no model could be fitted and judged, or a limit is unknown.
     """
     limits = check_limits(limits or {})
-    judgements: dict[str, Judgement] = {}
-    failed: dict[str, str] = {}
-    for name, make in makers.items():
-        if step is not None:
-            step(name)
-        try:
-            if test_runs is None:
-                judgements[name] = leave_one_run_out(
-                    make,
-                    train_runs,
-                    averaging_s=averaging_s,
-                    design_index=design_index,
-                    limits=limits,
-                    any_unit=any_unit,
+    check_design_index(design_index)
+    contest = _Contest(dict(makers), averaging_s, any_unit, step or (lambda name: None))
+    if test_runs is not None:
+        judgements = contest.judged(train_runs, test_runs, design_index, limits)
+    else:
+        folds = [contest.judged(others, held_out) for others, held_out in splits_of(train_runs)]
+        whole = contest.judged(train_runs, [])
+        judgements = {}
+        for name in whole:
+            try:
+                judgements[name] = merged_folds(
+                    whole[name], [fold[name] for fold in folds], design_index, limits
                 )
-            else:
-                judgements[name] = judge(
-                    make().fit(train_runs),
-                    train_runs,
-                    test_runs,
-                    averaging_s=averaging_s,
-                    design_index=design_index,
-                    limits=limits,
-                    any_unit=any_unit,
-                )
-        except FogmlError as error:
-            failed[name] = str(error)
-        except (ValueError, ArithmeticError, MemoryError) as error:
-            # A regressor from outside may refuse the data in its own words.
-            failed[name] = f"{type(error).__name__}: {error}"
+            except InputError as error:
+                contest.failed[name] = str(error)
     if not judgements:
-        name, reason = next(iter(failed.items()), ("", "no model was named"))
+        name, reason = next(iter(contest.failed.items()), ("", "no model was named"))
         raise InputError(f"no model could be fitted and judged; {name}: {reason}")
-    return Comparison(judgements, failed)
+    return Comparison(judgements, contest.failed)
+
+
+class _Contest:
+    """Models still in the contest, and why the others are not."""
+
+    def __init__(
+        self, makers: dict[str, ModelMaker], averaging_s: float, any_unit: bool, step: Callable[[str], None]
+    ) -> None:
+        self.makers = makers
+        self.failed: dict[str, str] = {}
+        self._averaging_s = averaging_s
+        self._any_unit = any_unit
+        self._step = step
+
+    def judged(
+        self,
+        train: Sequence[Run],
+        test: Sequence[Run],
+        design_index: float | None = None,
+        limits: Mapping[str, float] | None = None,
+    ) -> dict[str, Judgement]:
+        """Judgements of the models that can be fitted to a split; the others leave the contest."""
+        fitted: dict[str, tuple[DriftModel, list[RunErrors]]] = {}
+        for name in list(self.makers):
+            self._step(name)
+            try:
+                model = self.makers[name]().fit(train)
+                errors = [run_errors(model, run, any_unit=True) for run in train]
+                errors += [run_errors(model, run, any_unit=self._any_unit) for run in test]
+                fitted[name] = model, errors
+            except _REFUSALS as error:
+                self._drop(name, error)
+        rows = [common_rows(of_run) for of_run in zip(*(errors for _, errors in fitted.values()))]
+        judgements = {}
+        for name, (model, errors) in fitted.items():
+            shared = [e.within(full) for e, full in zip(errors, rows, strict=True)]
+            try:
+                judgements[name] = judgement_of(
+                    model,
+                    shared[: len(train)],
+                    shared[len(train) :],
+                    averaging_s=self._averaging_s,
+                    design_index=design_index,
+                    limits=limits,
+                )
+            except _REFUSALS as error:
+                self._drop(name, error)
+        return judgements
+
+    def _drop(self, name: str, error: BaseException) -> None:
+        del self.makers[name]
+        known = isinstance(error, FogmlError)
+        self.failed[name] = str(error) if known else f"{type(error).__name__}: {error}"

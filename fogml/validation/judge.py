@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.models.base import NOT_FULL, OUTSIDE
-from fogml.models.table import usable_rows
+from fogml.models.base import OUTSIDE
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import FloatArray, Run
 from fogml.validation.floors import floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
+from fogml.validation.run_errors import RunErrors, run_errors, training_means
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -37,6 +35,7 @@ def judge(
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
     any_unit: bool = False,
+    beside: Sequence[DriftModel] = (),
     notes: Sequence[str] = (),
 ) -> Judgement:
     """Judge a fitted model on its training runs and on test runs.
@@ -62,6 +61,9 @@ def judge(
         :class:`~fogml.validation.results.Metrics`.
     any_unit
         Judge runs of another unit or axis than the model's as well.
+    beside
+        Fitted models that this one is compared with: only rows whose windows are full for them
+        too count, so that all are judged on the same rows.
     notes
         What else the judgement should say.
 
@@ -77,13 +79,37 @@ def judge(
         raise InputError("a judgement needs at least one training run and one test run")
     limits = check_limits(limits or {})
     check_design_index(design_index)
-    train_errors = [_errors(model, run, any_unit=True) for run in train]
-    test_errors = [_errors(model, run, any_unit=any_unit) for run in test]
-    earth_known = all(run.earth_known for run in (*train, *test))
-    constant = (0.0, 0.0) if earth_known else _training_means(train_errors)
-    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in train_errors)
+    train_errors = [_within(run_errors(model, run, any_unit=True), beside) for run in train]
+    test_errors = [_within(run_errors(model, run, any_unit=any_unit), beside) for run in test]
+    return judgement_of(
+        model,
+        train_errors,
+        test_errors,
+        averaging_s=averaging_s,
+        design_index=design_index,
+        limits=limits,
+        notes=notes,
+    )
+
+
+def judgement_of(
+    model: DriftModel,
+    train: Sequence[RunErrors],
+    test: Sequence[RunErrors],
+    *,
+    averaging_s: float,
+    design_index: float | None = None,
+    limits: Mapping[str, float] | None = None,
+    notes: Sequence[str] = (),
+) -> Judgement:
+    """The judgement of a model from its errors on training runs and on test runs, as in :func:`judge`."""
+    limits = limits or {}
+    train_runs, test_runs = [e.run for e in train], [e.run for e in test]
+    earth_known = all(run.earth_known for run in (*train_runs, *test_runs))
+    constant = (0.0, 0.0) if earth_known else training_means(train)
+    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in train)
     judged_test = tuple(
-        _judge_run(e, averaging_s, constant, earth_known, seen=_seen(e.run, train)) for e in test_errors
+        _judge_run(e, averaging_s, constant, earth_known, seen=_seen(e.run, train_runs)) for e in test
     )
     return Judgement(
         model=model.describe(),
@@ -91,38 +117,14 @@ def judge(
         test=judged_test,
         design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
-        notes=(*notes, *_notes(train, test)),
+        notes=(*notes, *_notes(train_runs, test_runs)),
     )
 
 
-@dataclass(frozen=True)
-class _Errors:
-    """One run's error before and after the model [deg/h], and which rows count.
-
-    ``half_width`` is the 90 % prediction interval's [deg/h]; every array has shape (n,).
-    """
-
-    run: Run
-    before: FloatArray
-    drift: FloatArray
-    half_width: FloatArray
-    flag: NDArray[np.int8]
-    used: BoolArray
-    notes: tuple[str, ...]
-
-    @property
-    def after(self) -> FloatArray:
-        return self.before - self.drift
-
-
-def _errors(model: DriftModel, run: Run, *, any_unit: bool) -> _Errors:
-    notes = model.check_applies(run, any_unit=any_unit)
-    evaluation = model.evaluate(run)
-    half_width = model.intervals_.half_width(0.9, evaluation.excess)
-    used, left_out = usable_rows(run, evaluation.full)
-    return _Errors(
-        run, run.error_deg_h, evaluation.drift, half_width, evaluation.flag, used, (*notes, *left_out)
-    )
+def _within(errors: RunErrors, models: Sequence[DriftModel]) -> RunErrors:
+    for model in models:
+        errors = errors.within(model.evaluate(errors.run).full)
+    return errors
 
 
 def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
@@ -137,26 +139,15 @@ def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
     return ()
 
 
-def _training_means(errors: Sequence[_Errors]) -> tuple[float, float]:
-    """Mean error before and after over the used rows of all training runs [deg/h]."""
-    rows = sum(int(e.used.sum()) for e in errors)
-    if rows == 0:
-        names = ", ".join(e.run.name for e in errors)
-        raise InputError(f"{names}: no usable row; the windows of the features are longer than the runs")
-    before = sum(float(e.before[e.used].sum()) for e in errors) / rows
-    after = sum(float(e.after[e.used].sum()) for e in errors) / rows
-    return before, after
-
-
 def _judge_run(
-    errors: _Errors,
+    errors: RunErrors,
     averaging_s: float,
     constant: tuple[float, float],
     earth_known: bool,
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
     run, used = errors.run, errors.used
-    metrics = RunMetrics(run, used, averaging_s, full=errors.flag != NOT_FULL)
+    metrics = RunMetrics(run, used, averaging_s, full=errors.full)
     before = errors.before - constant[0]
     after = errors.after - constant[1]
     outside = int((errors.flag[used] == OUTSIDE).sum())
@@ -174,7 +165,7 @@ def _judge_run(
         averaging_s=averaging_s,
         before=metrics.figures(before),
         after=metrics.figures(after),
-        floor=floor_of_run(run, used, errors.after, averaging_s),
+        floor=floor_of_run(run, used, errors.before, averaging_s),
         outside_training=share,
         rows_used=int(used.sum()),
         rows_left_out=int((~used).sum()),
@@ -198,7 +189,7 @@ def _noise(run: Run) -> dict[str, Any] | None:
     return found
 
 
-def _series(errors: _Errors, metrics: RunMetrics, before: FloatArray, after: FloatArray) -> AveragedSeries:
+def _series(errors: RunErrors, metrics: RunMetrics, before: FloatArray, after: FloatArray) -> AveragedSeries:
     run, used = errors.run, errors.used
     temperature = run.temperature("T") if run.temperature_columns else np.full(len(run), np.nan)
     columns = [temperature, before, after, errors.drift, errors.half_width]

@@ -7,12 +7,15 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, judge
-from fogml.validation.limits import check_limits, outcome_of
-from fogml.validation.results import Judgement, RunJudgement
+from fogml.validation.judge import DEFAULT_AVERAGING_S, judge, judgement_of
+from fogml.validation.limits import check_design_index, check_limits, outcome_of
+from fogml.validation.results import Judgement
+from fogml.validation.run_errors import run_errors
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
+
+Split = tuple[list[Run], list[Run]]
 
 
 def leave_one_run_out(
@@ -46,20 +49,42 @@ def leave_one_run_out(
     InputError
         If there are fewer than two runs.
     """
+    limits = check_limits(limits or {})
+    check_design_index(design_index)
+    folds = [
+        judge(make().fit(others), others, held_out, averaging_s=averaging_s, any_unit=any_unit)
+        for others, held_out in splits_of(runs)
+    ]
+    model = make().fit(runs)
+    errors = [run_errors(model, run, any_unit=True) for run in runs]
+    whole = judgement_of(model, errors, [], averaging_s=averaging_s)
+    return merged_folds(whole, folds, design_index, limits)
+
+
+def splits_of(runs: Sequence[Run]) -> list[Split]:
+    """The others and the run left out, for each run.
+
+    Raises
+    ------
+    InputError
+        If there are fewer than two runs.
+    """
     if len(runs) < 2:
         raise InputError(f"leaving one run out needs at least two runs, {len(runs)} given")
-    limits = check_limits(limits or {})
-    held_out: list[RunJudgement] = []
-    for number, run in enumerate(runs):
-        others = [*runs[:number], *runs[number + 1 :]]
-        judged = judge(make().fit(others), others, run, averaging_s=averaging_s, any_unit=any_unit)
-        held_out.extend(judged.test)
-    whole = judge(make().fit(runs), runs, runs, averaging_s=averaging_s, any_unit=any_unit)
+    return [([*runs[:i], *runs[i + 1 :]], [run]) for i, run in enumerate(runs)]
+
+
+def merged_folds(
+    whole: Judgement, folds: Sequence[Judgement], design_index: float | None, limits: Mapping[str, float]
+) -> Judgement:
+    """The judgement whose test runs are those of the folds, model and training those of the whole."""
+    test = tuple(run for fold in folds for run in fold.test)
+    note = f"Each of the {len(test)} runs is judged by a model fitted on the others."
     return Judgement(
         model=whole.model,
         train=whole.train,
-        test=tuple(held_out),
-        design_index=outcome_of("rms", design_index, held_out) if design_index is not None else None,
-        limits=tuple(outcome_of(name, limit, held_out) for name, limit in limits.items()),
-        notes=(*whole.notes, f"Each of the {len(runs)} runs is judged by a model fitted on the others."),
+        test=test,
+        design_index=outcome_of("rms", design_index, test) if design_index is not None else None,
+        limits=tuple(outcome_of(name, limit, test) for name, limit in limits.items()),
+        notes=(*whole.notes, note),
     )

@@ -42,6 +42,29 @@ def test_each_model_is_judged_as_if_alone(runs):
     assert list(result.judgements) == ["mean", "M1"]
 
 
+def test_all_are_judged_on_the_same_rows(runs):
+    def late():
+        return KnownDrift(full_from_s=1000.0)
+
+    result = compare({"mean": makers("mean")["mean"], "late": late}, runs[:1], runs[1:2])
+    used = {name: judgement.test[0].rows_used for name, judgement in result.judgements.items()}
+    assert used == {"mean": 2500, "late": 2500}
+    mean, late_model = (make().fit(runs[:1]) for make in (makers("mean")["mean"], late))
+    alone = judge(mean, runs[:1], runs[1:2])
+    beside = judge(mean, runs[:1], runs[1:2], beside=[late_model])
+    assert alone.test[0].rows_used == 3000
+    assert beside.test[0].after == result.judgements["mean"].test[0].after != alone.test[0].after
+
+
+def test_leaving_one_out_of_several_models_is_each_alone(runs):
+    together = compare(makers("mean", "M1"), runs, None, limits={"rms": 5.0})
+    for name, judgement in together.judgements.items():
+        alone = leave_one_run_out(makers(name)[name], runs, limits={"rms": 5.0})
+        assert [run.after for run in judgement.test] == [run.after for run in alone.test]
+        assert judgement.limits == alone.limits
+        assert judgement.notes == alone.notes
+
+
 def test_one_that_cannot_be_fitted_does_not_stop_the_rest(runs):
     steps = []
     result = compare(makers("joint", "M3", "mean"), runs[:1], runs[1:2], step=steps.append)
