@@ -24,6 +24,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.regressors import (
     fit_regressor,
+    for_features,
     goes_on_linearly,
     parameter_count,
     predict_rows,
@@ -99,7 +100,8 @@ class FeatureModel(DriftModel):
         rows = [run_rows(run, features) for run in group]
         count = row_count(rows)
         learn_box(features, [part.atoms for part in rows])
-        regressor = self._make_regressor(len(features.names()))
+        regressor = self._make_regressor(len(features))
+        regressor = for_features(regressor, features, [part.atoms for part in rows])
         self.features_ = features
         if isinstance(regressor, LinearRegressor) and self.max_rows is None:
             self.regressor_ = regressor.fit_parts([_part(part, features) for part in rows])

@@ -6,6 +6,9 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
     any of these: the run of each row, its time [s], the fold of time it falls in;
 ``predict_unchecked(X)``
     predict for columns known to be finite float64;
+``for_features(features, atom_values)``
+    an unfitted regressor that heeds which columns it will get and what the training rows'
+    atoms, shape (n, a), tell of them;
 ``refitted(X, y)``
     a new regressor fitted to other rows, what was tuned (shape, size, ridge) being kept;
 ``linear_beyond``
@@ -19,6 +22,7 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
 from __future__ import annotations
 
 import inspect
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Any
 
@@ -27,6 +31,7 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from fogml.errors import InputError
+from fogml.features.features import Features
 from fogml.models.folds import FOLDS
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
@@ -39,6 +44,16 @@ FORMS = {
 """Forms of saved regressors, and where their classes are."""
 SKOPS = "skops"
 _PREDICTED_ROWS = 4096
+
+
+def for_features(regressor: Any, features: Features, atoms: Sequence[FloatArray]) -> Any:
+    """The unfitted regressor, made for features and training rows where it has such a way.
+
+    ``atoms`` are the values of the features' atoms in each training run, shapes (n, a).
+    """
+    if hasattr(regressor, "for_features"):
+        return regressor.for_features(features, np.concatenate(atoms))
+    return regressor
 
 
 def fit_regressor(regressor: Any, table: TrainingTable) -> Any:
