@@ -1,0 +1,132 @@
+"""Radial heat conduction through the coil, layer by layer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+from fogml.twin.plant.network import PlantState, ThermalNetwork
+
+_FACE_SHARE = 1e-3
+_LARGEST_LAYERS = 1000
+
+
+@dataclass(frozen=True)
+class RadialLine:
+    """The coil as a hollow cylinder in which heat flows radially.
+
+    ::
+
+        dT/dt = kappa (1/r) d/dr (r dT/dr)
+
+    Finite volumes: layers of equal thickness, counted from the inside, each with its temperature
+    in the middle; the conductance between two middles is that of the cylinder between them.
+
+    Attributes
+    ----------
+    inner_radius, outer_radius
+        Of the winding pack [m].
+    diffusivity
+        kappa across the pack [m^2/s].
+    layers
+        Number of layers.
+    """
+
+    inner_radius: float = 0.047
+    outer_radius: float = 0.053
+    diffusivity: float = 2e-7
+    layers: int = 32
+
+    def __post_init__(self) -> None:
+        if not 0.0 < self.inner_radius < self.outer_radius < 10.0:
+            raise InputError(
+                f"coil: radii are {self.inner_radius:g} and {self.outer_radius:g} m; "
+                "the inner one is above 0 and below the outer one"
+            )
+        if not 1e-9 <= self.diffusivity <= 1e-3:
+            raise InputError(f"coil: diffusivity is {self.diffusivity:g} m2/s; about 1e-7 to 3e-7 is usual")
+        if not 1 <= self.layers <= _LARGEST_LAYERS:
+            raise InputError(f"coil: layers is {self.layers}; it lies between 1 and {_LARGEST_LAYERS}")
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of the layers in a network, from the inside."""
+        return tuple(f"T_layer_{number}" for number in range(1, self.layers + 1))
+
+    @cached_property
+    def radii(self) -> FloatArray:
+        """Radius in the middle of each layer [m], from the inside, shape (layers,)."""
+        edges = np.linspace(self.inner_radius, self.outer_radius, self.layers + 1)
+        return 0.5 * (edges[1:] + edges[:-1])
+
+    @property
+    def diffusion_time_s(self) -> float:
+        """h^2 / (pi^2 kappa) [s], the slowest decay of a pack of thickness h held at both faces."""
+        thickness = self.outer_radius - self.inner_radius
+        return thickness**2 / (math.pi**2 * self.diffusivity)
+
+    def between_faces(self, capacity: float = 1.0) -> ThermalNetwork:
+        """The coil alone, driven by the temperatures of its faces ``T_out`` and ``T_in``.
+
+        `capacity` is that of the whole coil [J/K]; the temperatures don't depend on it.
+        """
+        # Rings of equal thickness hold heat in proportion to the radius in their middle.
+        capacities = capacity * self.radii / self.radii.sum()
+        ring = math.pi * (self.outer_radius**2 - self.inner_radius**2)
+        conductivity = self.diffusivity * capacity / ring
+        places = np.concatenate([[self.inner_radius], self.radii, [self.outer_radius]])
+        conductances = 2.0 * math.pi * conductivity / np.log(places[1:] / places[:-1])
+        chain = ("T_in", *self.names, "T_out")
+        links = dict(zip(pairwise(chain), conductances.tolist()))
+        return ThermalNetwork(dict(zip(self.names, capacities.tolist())), links)
+
+    def temperatures(
+        self, time: FloatArray, outer: FloatArray, inner: FloatArray, state: PlantState | None = None
+    ) -> FloatArray:
+        """Temperature of each layer [degC] between given faces, shape (layers, n), from the inside.
+
+        Parameters
+        ----------
+        time, outer, inner
+            Time [s] and temperature of the faces [degC], linear between samples, shape (n,).
+        state
+            Left by the block before; at rest where fresh.
+        """
+        network = self.between_faces()
+        solved = network.temperatures(time, {"T_out": outer, "T_in": inner}, state=state)
+        return np.stack([solved[name] for name in self.names])
+
+
+def with_line(network: ThermalNetwork, line: RadialLine) -> ThermalNetwork:
+    """A network with its coil replaced by a conduction line of the same heat capacity.
+
+    The links of ``T_out`` to the case and of ``T_in`` to the hub stay as they are. The faces carry
+    a thousandth of the layer beside them, so that they remain nodes which may be recorded.
+
+    Raises
+    ------
+    InputError
+        If the network has no nodes for both faces of the coil and for the hub.
+    """
+    missing = [name for name in ("T_out", "T_in", "T_hub") if name not in network.capacities]
+    if missing:
+        raise InputError(
+            f"thermal plant: a conduction line needs a node '{missing[0]}'; take order 5 or more"
+        )
+    coil = [name for name in network.capacities if name in ("T_out", "T_in") or name.startswith("T_coil_")]
+    alone = line.between_faces(sum(network.capacities[name] for name in coil))
+    capacities = dict(alone.capacities)
+    faces = {}
+    for face, layer in (("T_out", line.names[-1]), ("T_in", line.names[0])):
+        faces[face] = _FACE_SHARE * capacities[layer]
+        capacities[layer] -= faces[face]
+    # Only links that leave the coil stay.
+    kept = {pair: value for pair, value in network.links.items() if not set(pair) <= set(coil)}
+    others = {name: value for name, value in network.capacities.items() if name not in coil}
+    return replace(network, capacities={**others, **faces, **capacities}, links={**kept, **alone.links})
