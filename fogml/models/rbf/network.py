@@ -1,0 +1,191 @@
+"""A fitted network: its arrays, its value, and the exact solution for its output weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.models.rbf.evaluate import basis_functions, evaluate_network
+from fogml.models.rbf.objective import LINEAR_PRECISION
+from fogml.models.tall_least_squares import Part, condense
+
+FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
+
+_PIECE = 1 << 13
+_FIXED = 1e150  # on the diagonal of the triangle: as good as infinite, and products stay finite
+
+
+@dataclass(frozen=True)
+class Network:
+    """``constant + linear . x + sum_j weights_j exp(-|(x - centres_j) / widths_j|^2)``.
+
+    Attributes
+    ----------
+    columns
+        Which of the k inputs the network sees, shape (d,).
+    centres, widths
+        Shape (j, d), in the inputs' units.
+    weights, linear, constant
+        Output weights, shapes (j,) and (k,), and the constant, in the target's unit.
+    """
+
+    columns: IndexArray
+    centres: FloatArray
+    widths: FloatArray
+    weights: FloatArray
+    linear: FloatArray
+    constant: float
+
+    def __call__(self, inputs: FloatArray, threads: int | None = None, single: bool = False) -> FloatArray:
+        """Value at rows, shape (n,)."""
+        return evaluate_network(
+            inputs,
+            self.columns,
+            self.centres,
+            self.widths,
+            self.weights,
+            self.linear,
+            self.constant,
+            threads=threads,
+            single=single,
+        )
+
+    @property
+    def parameter_count(self) -> int:
+        """Centres, widths, output weights, linear part and constant."""
+        return self.centres.size + self.widths.size + len(self.weights) + len(self.linear) + 1
+
+    def rounded(self) -> Network:
+        """The network with every number rounded to float32."""
+        return Network(
+            self.columns,
+            _single(self.centres),
+            _single(self.widths),
+            _single(self.weights),
+            _single(self.linear),
+            float(np.float32(self.constant)),
+        )
+
+    def arrays(self, dtype: str) -> dict[str, NDArray[Any]]:
+        """Arrays for saving, in ``float32`` or ``float64``."""
+        kind = np.dtype(dtype)
+        return {
+            "centres": self.centres.astype(kind),
+            "widths": self.widths.astype(kind),
+            "weights": self.weights.astype(kind),
+            "linear": np.append(self.linear, self.constant).astype(kind),
+        }
+
+    @classmethod
+    def from_arrays(cls, columns: IndexArray, arrays: dict[str, NDArray[Any]]) -> Network:
+        """The network that `arrays` gave."""
+        values = {name: np.asarray(array, dtype=np.float64) for name, array in arrays.items()}
+        linear = values["linear"]
+        count, dimensions = len(values["weights"]), len(columns)
+        if values["centres"].shape != (count, dimensions) or values["widths"].shape != (count, dimensions):
+            raise ValueError("arrays of the network do not match")
+        return cls(
+            columns, values["centres"], values["widths"], values["weights"], linear[:-1], float(linear[-1])
+        )
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Output weights solved exactly, and what their spread follows from.
+
+    Attributes
+    ----------
+    network
+        The network, in float64.
+    noise_std
+        Standard deviation of what the network leaves, in the target's unit.
+    triangle, shift, scale
+        Factor R of the penalised normal matrix R'R of the columns ``[1, (c - shift) / scale]``,
+        c being the basis functions and, with a linear part, the inputs.
+    """
+
+    network: Network
+    noise_std: float
+    triangle: FloatArray
+    shift: FloatArray
+    scale: FloatArray
+    linear_part: bool = True
+
+    def standard_deviation(self, inputs: FloatArray, threads: int | None = None) -> FloatArray:
+        """Standard deviation of the network's value for a noise of variance one, shape (n,)."""
+        from scipy.linalg import solve_triangular
+
+        spread = np.empty(len(inputs))
+        for start in range(0, len(inputs), _PIECE):
+            rows = slice(start, start + _PIECE)
+            columns = _columns(self.network, inputs[rows], threads, self.linear_part)
+            scaled = np.vstack([np.ones(len(columns)), ((columns - self.shift) / self.scale).T])
+            spread[rows] = np.sqrt(np.sum(solve_triangular(self.triangle, scaled, trans="T") ** 2, axis=0))
+        return spread
+
+
+def solve_network(
+    inputs: FloatArray,
+    target: FloatArray,
+    columns: IndexArray,
+    centres: FloatArray,
+    widths: FloatArray,
+    ridge: float,
+    linear_part: bool = True,
+) -> Solution:
+    """Output weights by least squares with a ridge, over all rows, by QR in float64.
+
+    Parameters
+    ----------
+    inputs, target
+        Rows, shapes (n, k) and (n,).
+    columns, centres, widths
+        As in `Network`; centres and widths are rounded to float32 first, so that a saved network
+        is the one that was solved for.
+    ridge
+        Penalty on the square of each output weight, in squared units of the rows' target.
+    linear_part
+        Whether there is a linear part beside the constant.
+    """
+    blank = np.zeros(len(centres)), np.zeros(inputs.shape[1]), 0.0
+    empty = Network(columns, _single(centres), _single(widths), *blank)
+
+    def built(rows: slice) -> FloatArray:
+        return _columns(empty, inputs[rows], 1, linear_part)
+
+    condensed = condense([Part(target, built, np.zeros(len(target), dtype=np.intp))], 1)
+    factor = condensed.factors[0]
+    penalty = np.full(factor.shape[1] - 1, LINEAR_PRECISION)
+    penalty[0] = 0.0
+    penalty[1 : 1 + len(centres)] = ridge / condensed.scale[: len(centres)] ** 2
+    matrix = np.vstack([factor[:, :-1], np.diag(np.sqrt(penalty))])
+    image = np.append(factor[:, -1], np.zeros(len(penalty)))
+    solution, *_ = np.linalg.lstsq(matrix, image, rcond=None)
+    rest = float(np.sum((factor[:, :-1] @ solution - factor[:, -1]) ** 2))
+    triangle = np.asarray(np.linalg.qr(matrix, mode="r"))
+    # A column that others tell, or that is zero, has no spread of its own.
+    diagonal = np.abs(np.diag(triangle))
+    weak = np.flatnonzero(diagonal <= 1e-12 * diagonal.max(initial=1.0))
+    triangle[weak, weak] = _FIXED
+    share = np.linalg.lstsq(matrix.T @ matrix, factor[:, :-1].T @ factor[:, :-1], rcond=None)[0]
+    freedom = max(1.0, len(target) - float(np.trace(share)))
+    slopes = solution[1:] / condensed.scale
+    constant = float(condensed.y_shift + solution[0] - slopes @ condensed.shift)
+    linear = slopes[len(centres) :] if linear_part else empty.linear
+    network = replace(empty, weights=slopes[: len(centres)], linear=linear, constant=constant)
+    noise_std = float(np.sqrt(rest / freedom))
+    return Solution(network, noise_std, triangle, condensed.shift, condensed.scale, linear_part)
+
+
+def _columns(network: Network, inputs: FloatArray, threads: int | None, linear_part: bool) -> FloatArray:
+    """Basis functions, and the inputs where there is a linear part, of rows; shape (n, j + k)."""
+    basis = basis_functions(inputs, network.columns, network.centres, network.widths, threads)
+    return np.vstack([basis, inputs.T]).T if linear_part else basis.T
+
+
+def _single(values: FloatArray) -> FloatArray:
+    return values.astype(np.float32).astype(np.float64)

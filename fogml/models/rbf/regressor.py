@@ -1,0 +1,251 @@
+"""The RBF network as a scikit-learn regressor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from fogml.errors import InputError
+from fogml.models.rbf.blocks import average_in_blocks
+from fogml.models.rbf.fitted import NetworkRegressor
+from fogml.models.rbf.rates import RATES_THAT_TELL, rate_columns, restrained_inputs, training_rates
+from fogml.models.rbf.search import Frame, Search, SearchSettings
+from fogml.models.rbf.tuning import TuningSettings
+
+if TYPE_CHECKING:
+    from fogml.features.features import Features
+
+FloatArray = NDArray[np.float64]
+
+SIZES = (16, 32, 64)
+"""Numbers of centres among which ``centres="evidence"`` chooses."""
+
+
+class RBFRegressor(NetworkRegressor):
+    """RBF network with own width per centre and input, and a linear part beside it.
+
+    ``y = w0 + a . x + sum_j w_j exp(-|(x - c_j) / s_j|^2)``, the division input by input. Beyond
+    the training rows only the linear part is left.
+
+    Rows are taken to be in order of time. Centres and widths are tuned on averages of blocks of
+    time, by L-BFGS on the log evidence with the output weights solved exactly at every step
+    (variable projection); the output weights are then solved for on all rows by QR in float64.
+    The same rows, parameters and machine give the same network.
+
+    Parameters
+    ----------
+    centres
+        Number of centres; ``"evidence"`` chooses among `SIZES`, a sequence among its numbers.
+        Fewer are used where there are fewer than three averaged rows to each.
+    centre_choice
+        Where tuning begins: ``"kmeans"``, or ``"ols"`` for orthogonal least squares.
+    tune
+        Whether centres and own widths are tuned. Shared widths always are.
+    objective
+        ``"evidence"``, or ``"validation"``: plain variable projection on four fifths of the blocks
+        of time, stopped when the error on the last fifth no longer falls.
+    ridge
+        ``"evidence"`` learns it; or a number, the ratio of the noise variance of an averaged row
+        to the variance of an output weight. With ``objective="validation"``, ``"evidence"`` stands
+        for 1e-6.
+    network_inputs
+        Indices of the inputs that the network sees; the others enter the linear part only. None: all.
+    wide_inputs
+        Indices of inputs along which widths also start e^3 times wider: those in which the target
+        bends little. None: starts are tried input by input.
+    average_rows
+        Rows are averaged in blocks down to about this number for tuning.
+    width_prior
+        Standard deviation of the log-normal prior of own widths about the shared ones.
+    seed
+        Seed of k-means.
+    threads
+        Threads; by default all cores.
+    device, dtype
+        Where torch tunes (``"cpu"``, ``"cuda"``), and in ``"float64"`` or ``"float32"``.
+
+    Attributes
+    ----------
+    sizes_tried_ : dict
+        Objective, less is better, by number of centres.
+
+    Further attributes are those of `NetworkRegressor`.
+    """
+
+    def __init__(
+        self,
+        centres: int | Literal["evidence"] | Sequence[int] = "evidence",
+        *,
+        centre_choice: Literal["kmeans", "ols"] = "kmeans",
+        tune: bool = True,
+        objective: Literal["evidence", "validation"] = "evidence",
+        ridge: float | Literal["evidence"] = "evidence",
+        network_inputs: Sequence[int] | None = None,
+        wide_inputs: Sequence[int] | None = None,
+        average_rows: int = 5000,
+        width_prior: float = 0.3,
+        seed: int = 0,
+        threads: int | None = None,
+        device: str = "cpu",
+        dtype: Literal["float64", "float32"] = "float64",
+    ) -> None:
+        self.centres = centres
+        self.centre_choice = centre_choice
+        self.tune = tune
+        self.objective = objective
+        self.ridge = ridge
+        self.network_inputs = network_inputs
+        self.wide_inputs = wide_inputs
+        self.average_rows = average_rows
+        self.width_prior = width_prior
+        self.seed = seed
+        self.threads = threads
+        self.device = device
+        self.dtype = dtype
+
+    def for_features(self, features: Features, atom_values: FloatArray) -> RBFRegressor:
+        """A regressor of the same parameters that heeds what the training rows tell of rates.
+
+        With fewer than three distinct rates of temperature, whatever holds a rate enters linearly.
+
+        Parameters
+        ----------
+        features
+            Features whose columns the regressor will get.
+        atom_values
+            Values of their atoms in the training rows, shape (n, a).
+        """
+        parameters = self.get_params()
+        if self.wide_inputs is None:
+            parameters["wide_inputs"] = rate_columns(features).tolist()
+        told: list[str] = []
+        if self.network_inputs is None:
+            seen = restrained_inputs(features, atom_values)
+            if len(seen) < len(features):
+                parameters["network_inputs"] = seen.tolist()
+                names = features.names()
+                network = ", ".join(names[i] for i in seen) or "no input"
+                linear = ", ".join(name for i, name in enumerate(names) if i not in seen)
+                told.append(
+                    f"the training runs hold {training_rates(features, atom_values)} distinct rates of "
+                    f"temperature, {RATES_THAT_TELL} tell how the drift bends with the rate: the network "
+                    f"is of {network} alone, {linear} enter linearly"
+                )
+        regressor = RBFRegressor(**parameters)
+        regressor._told = told
+        return regressor
+
+    def fit(
+        self, X: ArrayLike, y: ArrayLike, *, groups: ArrayLike | None = None, time: ArrayLike | None = None
+    ) -> Self:
+        """Fit to rows in time order.
+
+        Parameters
+        ----------
+        X
+            Inputs, shape (n, k).
+        y
+            Values, shape (n,).
+        groups
+            Labels of the runs that rows come from, shape (n,); by default one run.
+        time
+            Times of the rows [s], shape (n,); by default rows follow each other evenly.
+        """
+        self._check_parameters()
+        inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
+        inputs, target = np.ascontiguousarray(inputs), np.asarray(target, dtype=np.float64)
+        seen = self._seen(inputs.shape[1])
+        rows = average_in_blocks(inputs, target, self.average_rows, groups, time)
+        frame = Frame.of(inputs, target)
+        found = Search(rows, frame, seen, self._settings()).run()
+        self.sizes_tried_ = {str(size): value for size, value in found.tried.items()}
+        self.ridge_ = float(np.exp(found.shape.log_ridge)) * rows.per_row
+        self._solve(
+            inputs,
+            target,
+            seen,
+            frame.shift[seen] + frame.scale[seen] * found.shape.centres,
+            frame.scale[seen] * np.exp(found.shape.log_widths),
+            (rows.inputs, rows.target),
+        )
+        self.notes_ = list(getattr(self, "_told", ()))
+        if not rows.in_time:
+            self.notes_.append(
+                "rows are not in order of time: rows near in the inputs were averaged for tuning"
+            )
+        return self
+
+    def describe(self) -> dict[str, Any]:
+        """What reports say of the network."""
+        check_is_fitted(self)
+        return {
+            "centres": len(self.network_.weights),
+            "network_inputs": self.network_.columns.tolist(),
+            "objective": self.objective,
+            "sizes_tried": self.sizes_tried_,
+            "ridge": self.ridge_,
+            "noise_std": self.noise_std_,
+            "weights_dtype": self.weights_dtype_,
+            "rounding_error": self.rounding_error_,
+        }
+
+    @classmethod
+    def _saved(cls) -> tuple[str, ...]:
+        return (*super()._saved(), "sizes_tried_")
+
+    def _seen(self, width: int) -> NDArray[np.intp]:
+        """Indices of the network's inputs."""
+        if self.network_inputs is None:
+            return np.arange(width, dtype=np.intp)
+        seen = np.unique(np.asarray(self.network_inputs, dtype=np.intp))
+        if seen.size and (seen[0] < 0 or seen[-1] >= width):
+            raise InputError(f"network_inputs {list(self.network_inputs)}: there are inputs 0 to {width - 1}")
+        return seen
+
+    def _settings(self) -> SearchSettings:
+        if isinstance(self.centres, str):
+            sizes: tuple[int, ...] = SIZES
+        elif isinstance(self.centres, Sequence):
+            sizes = tuple(sorted(int(size) for size in self.centres))
+        else:
+            sizes = (int(self.centres),)
+        learned = isinstance(self.ridge, str)
+        return SearchSettings(
+            sizes=sizes,
+            centre_choice=self.centre_choice,
+            tune=self.tune,
+            evidence=self.objective == "evidence",
+            tuning=TuningSettings(
+                width_prior=self.width_prior,
+                log_ridge=None if learned else float(np.log(max(float(self.ridge), 1e-300))),
+            ),
+            wide_inputs=None if self.wide_inputs is None else tuple(int(i) for i in self.wide_inputs),
+            seed=self.seed,
+            threads=self.threads,
+            device=self.device,
+            dtype=self.dtype,
+        )
+
+    def _check_parameters(self) -> None:
+        choices = {
+            "centre_choice": ("kmeans", "ols"),
+            "objective": ("evidence", "validation"),
+            "dtype": ("float64", "float32"),
+        }
+        for name, known in choices.items():
+            if getattr(self, name) not in known:
+                raise InputError(f"{name} '{getattr(self, name)}': must be {' or '.join(map(repr, known))}")
+        if isinstance(self.centres, str) and self.centres != "evidence":
+            raise InputError(f"centres '{self.centres}': must be 'evidence', a number, or several numbers")
+        if isinstance(self.ridge, str) and self.ridge != "evidence":
+            raise InputError(f"ridge '{self.ridge}': must be 'evidence', 0 or a positive number")
+        if not isinstance(self.ridge, str) and not float(self.ridge) >= 0.0:
+            raise InputError(f"ridge {self.ridge}: must be 'evidence', 0 or a positive number")
+        if min(self._settings().sizes, default=-1) < 0:
+            raise InputError(f"centres {self.centres}: must not be negative")
+        if not (self.average_rows >= 10 and self.width_prior > 0.0):
+            raise InputError("average_rows must be at least 10, and width_prior positive")
