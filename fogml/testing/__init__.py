@@ -1,4 +1,4 @@
-"""The contract tests that anyone's addition runs, to features or to models.
+"""The contract tests that anyone's addition runs, to features, to models or to effects.
 
 The names load on first use.
 """
@@ -8,7 +8,11 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-_HOMES = {"check_feature": "fogml.testing.features", "check_model": "fogml.testing.models"}
+_HOMES = {
+    "check_effect": "fogml.testing.effects",
+    "check_feature": "fogml.testing.features",
+    "check_model": "fogml.testing.models",
+}
 
 __all__ = list(_HOMES)
 

@@ -16,6 +16,8 @@ from fogml.twin.quantities import Grade, Quantity
 if TYPE_CHECKING:
     from fogml.twin.plant.network import ThermalNetwork
 
+SET_UP = ("rate", "angle", "earth", "powered_on", "facts", "output", "slopes")
+"""What an effect may need beside temperatures and drives; `angle` is that of `Inputs.angle_deg`."""
 Stage = Literal["thermal", "rig", "bias", "scale_factor", "loop", "readout", "sensor", "logger", "noise"]
 STAGES: tuple[Stage, ...] = (
     "thermal",
@@ -44,7 +46,8 @@ class Effect(ABC):
     shape
         Parameters that the response is not linear in.
     needs
-        Names that the signature asks of `Inputs`, beside time; nothing else may change it.
+        What the signature asks of `Inputs`, beside time: temperatures, drives, names of `SET_UP`.
+        Nothing else may change it.
     conflicts
         Ids that can't be on at the same time.
     sources
@@ -55,6 +58,9 @@ class Effect(ABC):
         Id of a look-alike to what separates the two.
     candidate
         Whether a diagnosis offers it unless told otherwise.
+    drawn_per_run
+        Whether the amplitude is another one each time that the unit is used: then repeats of one
+        unit draw it anew.
     """
 
     id: ClassVar[str]
@@ -69,6 +75,7 @@ class Effect(ABC):
     shows: ClassVar[str] = ""
     confused_with: ClassVar[Mapping[str, str]] = {}
     candidate: ClassVar[bool] = True
+    drawn_per_run: ClassVar[bool] = False
 
     @abstractmethod
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:

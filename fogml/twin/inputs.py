@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
@@ -16,7 +17,7 @@ from fogml.twin.memory import Memory
 REST = {
     "power": 0.0,
     "supply": 0.0,
-    "humidity": 0.0,
+    "humidity": 50.0,
     "vibration": 0.0,
     "compressor": 0.0,
     "heater": 0.0,
@@ -25,8 +26,23 @@ REST = {
     "B_y": 0.0,
     "B_z": 0.0,
     "shaking": 0.0,
+    "dose": 0.0,
 }
-"""What a drive that is not recorded is taken to be; its effects then vanish or stay constant."""
+"""What a drive that is not recorded is taken to be; its effects then vanish or stay constant.
+
+Units are the run format's; ``dose`` is the absorbed radiation dose [Gy].
+"""
+STAND_INS = {
+    "T": ("T_in",),
+    "T_in": ("T",),
+    "T_out": ("T",),
+    "T_case": ("T_out", "T"),
+    "T_electronics": ("T_case", "T_out", "T"),
+    "T_hub": ("T_in", "T"),
+    "T_chamber": ("T_case", "T_out", "T"),
+    "T_plate": ("T_chamber", "T_case", "T_out", "T"),
+}
+"""The nearest places, nearest first, for one that neither recording nor plant gives."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +64,8 @@ class Inputs:
         Set-up facts.
     powered_on_s
         Power-on on the clock of `time` [s]; minus infinity where it was long before.
+    power_ons_s
+        Later power-ons on the same clock [s], in time order.
     drives
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
@@ -68,6 +86,7 @@ class Inputs:
     earth_deg_h: float = 0.0
     facts: Facts = field(default_factory=Facts)
     powered_on_s: float = -np.inf
+    power_ons_s: tuple[float, ...] = ()
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     rate_window_s: float = 64.0
     output: FloatArray | None = None
@@ -79,21 +98,24 @@ class Inputs:
         return len(self.time)
 
     def temperature(self, name: str = "T") -> FloatArray:
-        """A temperature [degC], shape (n,); ``T`` stands for ``T_in`` where it is not its own.
+        """A temperature [degC], shape (n,); by `STAND_INS` where neither recording nor plant gives it.
+
+        What depends on the difference of two places that stand in for each other then vanishes.
 
         Raises
         ------
         InputError
-            If neither recording nor plant gives it.
+            If there is no stand-in either.
         """
-        if name in self.temperatures:
-            return self.temperatures[name]
-        if name == "T" and "T_in" in self.temperatures:
-            return self.temperatures["T_in"]
-        if name in ("T_in", "T_out") and "T" in self.temperatures:
-            return self.temperatures["T"]
+        place = self.place(name)
+        if place is not None:
+            return self.temperatures[place]
         held = ", ".join(self.temperatures) or "none"
         raise InputError(f"no temperature '{name}' is recorded or given by the plant; there is {held}")
+
+    def place(self, name: str) -> str | None:
+        """The temperature that `name` is read from: itself, or its nearest stand-in, or None."""
+        return next((x for x in (name, *STAND_INS.get(name, ())) if x in self.temperatures), None)
 
     def u(self, name: str = "T") -> FloatArray:
         """Temperature less 25 degC, shape (n,)."""
@@ -101,7 +123,7 @@ class Inputs:
 
     def dT(self, name: str = "T") -> FloatArray:
         """Rate of a temperature [degC/min], shape (n,)."""
-        key = f"dT({name})"
+        key = f"dT({self.place(name)})"
         if key not in self.cache:
             rate = self.memory.rate(key, self.time, self.temperature(name), self.rate_window_s)
             self.cache[key] = rate
@@ -128,13 +150,26 @@ class Inputs:
 
     @cached_property
     def time_on_s(self) -> FloatArray:
-        """Time since power-on [s], at least 0; infinite where it was long before; shape (n,)."""
-        return np.maximum(self.time - self.powered_on_s, 0.0)
+        """Time since the latest power-on [s], at least 0; infinite where it was long before; shape (n,)."""
+        starts = np.array([self.powered_on_s, *self.power_ons_s])
+        return np.maximum(self.time - starts[self.power_cycle], 0.0)
+
+    @cached_property
+    def power_cycle(self) -> NDArray[np.int64]:
+        """How many power-ons came after the first one, shape (n,)."""
+        return np.searchsorted(np.array(self.power_ons_s), self.time, side="right")
 
     @cached_property
     def input_rate_deg_h(self) -> FloatArray:
         """Rate about the input axis [deg/h]: table and Earth, shape (n,)."""
         return 3600.0 * self.table_rate + self.earth_deg_h
+
+    def afresh(self) -> Inputs:
+        """The same whole run with nothing remembered, for another signature on it.
+
+        What depends on these samples alone, such as rates of temperature, is kept.
+        """
+        return replace(self, memory=Memory())
 
     def with_output(self, output: FloatArray) -> Inputs:
         """The same inputs with the output that an effect meets [deg/h], shape (n,)."""

@@ -34,6 +34,8 @@ class Quantity:
         Whether either sign occurs: then the range is that of the size.
     meaning
         A few words.
+    default
+        What is taken where nothing is stated; the middle of the grade's range if None.
     """
 
     name: str
@@ -43,13 +45,16 @@ class Quantity:
     meaning: str = ""
     limits: tuple[float, float] = (-math.inf, math.inf)
     signed: bool = False
+    default: float | None = None
 
     def range(self, grade: Grade) -> tuple[float, float]:
         """Usual range (low, high) for a grade."""
         return self.tactical if grade == "tactical" else self.navigation
 
     def typical(self, grade: Grade = "tactical") -> float:
-        """Middle of the grade's range: geometric where all of it is positive."""
+        """`default`, else the middle of the grade's range: geometric where all of it is positive."""
+        if self.default is not None:
+            return self.default
         low, high = self.range(grade)
         return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
 

@@ -1,0 +1,167 @@
+"""Inputs that effects are checked on: a programme with everything in it, and poorer recordings."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import SET_UP
+from fogml.twin.inputs import REST, STAND_INS, Inputs
+from fogml.twin.memory import Memory
+from fogml.twin.plant.standard import standard_network
+
+SAMPLE_S = 10.0
+BLOCK_EDGES = (0.001, 0.13, 0.1305, 0.5, 0.77)
+"""Where the blocks of a blockwise check begin, as shares of the run."""
+SCRAMBLED = (*STAND_INS, *REST, *SET_UP)
+"""Everything beside time that an effect may need."""
+
+
+def standard_inputs() -> dict[str, Inputs]:
+    """Inputs by name: a simulated programme, and recordings of several kinds.
+
+    ``programme`` has every node and drive, turns, a thermal shock, power-on at the start and a
+    power cycle; ``only T`` is a recording with one sensor and no facts; ``two faces`` one with
+    ``T_in`` and ``T_out``; ``irregular`` has uneven steps and gaps; ``still`` never moves.
+    """
+    programme = _programme()
+    bare = replace(programme, drives={}, facts=Facts(), powered_on_s=-np.inf, power_ons_s=(), earth_deg_h=0.0)
+    nodes = programme.temperatures
+    rng = np.random.default_rng(5)
+    keep = np.sort(rng.permutation(len(programme))[: int(0.8 * len(programme))])
+    keep = keep[(keep < 700) | (keep > 760)]
+    still = {name: np.full(len(programme), 31.0) for name in nodes}
+    return {
+        "programme": programme,
+        "only T": replace(bare, temperatures={"T": nodes["T"]}, slopes={"T": programme.slopes["T"]}),
+        "two faces": replace(bare, temperatures={name: nodes[name] for name in ("T_in", "T_out")}),
+        "irregular": rows(programme, keep),
+        "still": replace(bare, temperatures=still, table_rate=np.zeros(len(programme))),
+    }
+
+
+def _programme() -> Inputs:
+    """25 to -40 to 60 degC and a shock back to 30 degC, about 9 h at 0.1 Hz, turning in the soaks."""
+    points = [(0, 25), (30, 25), (95, -40), (215, -40), (315, 60), (435, 60), (439, 30), (530, 30)]
+    minutes, set_point = np.array(points, dtype=np.float64).T
+    time = np.arange(0.0, 60.0 * minutes[-1], SAMPLE_S)
+    chamber = np.interp(time / 60.0, minutes, set_point)
+    n = len(time)
+    nodes = {name: np.ascontiguousarray(values) for name, values in _nodes(time, chamber).items()}
+    nodes["T"] = nodes["T_in"]
+    table_rate = np.zeros(n)
+    for start, rate in ((60, 10.0), (900, -10.0), (906, 10.0), (2300, 2e-3), (2310, -2e-3), (2400, -100.0)):
+        table_rate[start : start + 6] = rate
+    wave = np.sin(2.0 * np.pi * time / 1800.0)
+    drives = {
+        "power": 5.0 + 0.5 * wave,
+        "supply": 28.0 + 0.2 * (time > 9000.0) + 0.05 * wave,
+        "humidity": np.where(time > 12000.0, 20.0, 50.0),
+        "vibration": 0.02 + 0.05 * (wave > 0.0),
+        "compressor": (wave > 0.3).astype(np.float64),
+        "heater": (wave < -0.3).astype(np.float64),
+        "fan": np.where((time > 15000.0) & (time < 15600.0), 0.0, 1.0),
+        "B_x": 20.0 + 5.0 * wave,
+        "B_y": -8.0 + 3.0 * np.cos(2.0 * np.pi * time / 2400.0),
+        "B_z": 40.0 + 2.0 * wave**2,
+        "shaking": np.abs(wave),
+        "dose": 1.0 + time / 3600.0,
+    }
+    shaped = 3600.0 * table_rate + 7.5 + 0.02 * (nodes["T"] - 25.0)
+    slopes = {"T": 0.02 + 1e-4 * (nodes["T"] - 25.0), "T_in": np.full(n, 0.3), "T_out": np.full(n, -0.3)}
+    return Inputs(
+        time=time,
+        temperatures=nodes,
+        table_rate=table_rate,
+        earth_deg_h=7.520533,
+        facts=Facts(unit="CHECK-1", axis="x", latitude=30.0, input_axis="up", powered_on=0.0),
+        powered_on_s=0.0,
+        power_ons_s=(27000.0,),
+        drives=drives,
+        output=shaped,
+        slopes=slopes,
+    )
+
+
+def _nodes(time: FloatArray, chamber: FloatArray) -> dict[str, FloatArray]:
+    # Half of the usual delays: a shock of the air then still is one for the coil.
+    network = standard_network().with_heating(5.0, 8.0, 1200.0)
+    capacities = {name: 0.2 * value for name, value in network.capacities.items()}
+    quick = replace(network, capacities=capacities)
+    return quick.temperatures(time, chamber, powered=((0.0, 26400.0), (27000.0, np.inf)))
+
+
+def block(inputs: Inputs, start: int, stop: int, memory: Memory | None = None) -> Inputs:
+    """The rows [start, stop) as a block that goes on from a memory, a fresh one if None."""
+    return rows(inputs, slice(start, stop), memory)
+
+
+def rows(inputs: Inputs, which: slice | NDArray[np.int64], memory: Memory | None = None) -> Inputs:
+    """Some rows of inputs."""
+    return replace(
+        inputs,
+        time=inputs.time[which],
+        temperatures={name: values[which] for name, values in inputs.temperatures.items()},
+        table_rate=inputs.table_rate[which],
+        drives={name: values[which] for name, values in inputs.drives.items()},
+        output=None if inputs.output is None else inputs.output[which],
+        slopes={name: values[which] for name, values in inputs.slopes.items()},
+        memory=Memory() if memory is None else memory,
+        cache={},
+    )
+
+
+def without_rows(inputs: Inputs, first: int, last: int) -> Inputs:
+    """The inputs with the rows [first, last) missing."""
+    return rows(inputs, np.r_[0:first, last : len(inputs)])
+
+
+def still_stretch(inputs: Inputs) -> tuple[Inputs, tuple[int, int]]:
+    """The inputs with everything held for two hours, and the rows of the hour in the middle of it."""
+    per_hour = int(3600.0 / SAMPLE_S)
+    start = len(inputs) // 3
+    source = np.r_[0 : start + 1, np.full(2 * per_hour, start), start + 1 : len(inputs)]
+    held = rows(inputs, source)
+    time = inputs.time[0] + SAMPLE_S * np.arange(len(source))
+    table_rate = held.table_rate.copy()
+    table_rate[start : start + 2 * per_hour] = 0.0
+    held = replace(held, time=time, table_rate=table_rate)
+    return held, (start + per_hour // 2, start + per_hour // 2 + per_hour)
+
+
+def scrambled(inputs: Inputs, keep: Collection[str], value: float = np.nan) -> Inputs:
+    """The inputs with all that is not in `keep` set to NaN, or moved by a wave of size `value`."""
+
+    def spoil(column: FloatArray, name: str) -> FloatArray:
+        if name in keep:
+            return column
+        if np.isnan(value):
+            return np.full_like(column, np.nan)
+        return column + value * np.sin(np.arange(len(column)) / 20.0)
+
+    def number(held: float, name: str) -> float:
+        return held if name in keep else (np.nan if np.isnan(value) else held + 100.0 * value)
+
+    drives = {name: spoil(column, name) for name, column in inputs.drives.items()}
+    # The angle is the table's, by integration; its own column tells the two apart.
+    if "rate" not in keep and "angle" in keep:
+        drives["angle"] = replace(inputs, memory=Memory(), cache={}).angle_deg
+    return replace(
+        inputs,
+        temperatures={name: spoil(column, name) for name, column in inputs.temperatures.items()},
+        table_rate=spoil(inputs.table_rate, "rate"),
+        earth_deg_h=number(inputs.earth_deg_h, "earth"),
+        facts=inputs.facts if "facts" in keep else Facts(),
+        powered_on_s=number(inputs.powered_on_s, "powered_on"),
+        power_ons_s=inputs.power_ons_s if "powered_on" in keep else (),
+        drives=drives,
+        output=None if inputs.output is None else spoil(inputs.output, "output"),
+        slopes={name: spoil(column, "slopes") for name, column in inputs.slopes.items()},
+        memory=Memory(),
+        cache={},
+    )

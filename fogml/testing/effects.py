@@ -1,0 +1,373 @@
+"""The contract of the twin's effects, as a check that any effect can be put to."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+from fogml.testing.effect_inputs import (
+    BLOCK_EDGES,
+    SCRAMBLED,
+    block,
+    scrambled,
+    standard_inputs,
+    still_stretch,
+    without_rows,
+)
+from fogml.twin import registry
+from fogml.twin.effect import (
+    SET_UP,
+    STAGES,
+    Effect,
+    LoggerEffect,
+    LoopEffect,
+    NoiseEffect,
+    ScaleFactorEffect,
+    SensorEffect,
+    ThermalEffect,
+)
+from fogml.twin.inputs import REST, STAND_INS, Inputs
+from fogml.twin.memory import Memory
+from fogml.twin.quantities import GRADES
+
+AGREEMENT = 1e-9
+"""Greatest difference between two ways to the same value, relative to the values' size."""
+SMOOTHNESS = 0.05
+"""Greatest relative change of a slope against a shape parameter when the step is halved."""
+_WORD = re.compile(r"[a-z]{2,}(_[a-z]{2,})*\Z")
+
+
+def check_effect(effect: Effect | type[Effect]) -> None:
+    """Check that an effect keeps the contract that simulator, diagnosis and documentation rely on.
+
+    The checks: the declaration is whole, with units, ranges, priors, equation and source; the
+    signature is finite on simulated inputs and on recordings that lack what is optional, and leaves
+    its inputs alone; amplitude 0 changes nothing and the response is linear in the amplitude; no
+    value depends on later samples, nor on anything outside `needs`, and everything in `needs` and
+    every shape parameter matters; samples that are missing while nothing moves leave no trace;
+    block by block gives what the whole run gives; slopes against the shape parameters by finite
+    differences are finite and smooth; it registers and unregisters.
+
+    Parameters
+    ----------
+    effect
+        An effect or its class.
+
+    Raises
+    ------
+    AssertionError
+        Naming the part of the contract that is not kept.
+    """
+    checked: Effect = effect() if isinstance(effect, type) else effect
+    inputs = standard_inputs()
+    _check_declaration(checked)
+    _check_priors(checked)
+    _check_values(checked, inputs)
+    _check_finite(checked, inputs)
+    if not isinstance(checked, NoiseEffect):
+        _check_needs(checked, inputs)
+        _check_causality(checked, inputs["programme"])
+        _check_blocks(checked, inputs["programme"])
+        _check_gap(checked, inputs["programme"])
+        _check_shape(checked, inputs["programme"])
+    _check_amplitude(checked, inputs["programme"])
+    _check_registry(checked)
+
+
+def _check_declaration(effect: Effect) -> None:
+    name = type(effect).__name__
+    for attribute in ("id", "code", "title", "stage", "amplitude"):
+        assert hasattr(effect, attribute), f"{name} does not state '{attribute}'"
+    assert name == registry.class_name(effect.id), (
+        f"the class of '{effect.id}' is to be called {registry.class_name(effect.id)}, not {name}"
+    )
+    assert effect.title.strip() and effect.code.strip(), f"{name}: title or letter code is empty"
+    assert effect.stage in STAGES, f"{name}: stage '{effect.stage}' is none of {', '.join(STAGES)}"
+    text = type(effect).__doc__ or ""
+    assert "=" in text and "::" in text, f"{name}: the docstring states no equation after '::'"
+    assert re.search(r"\bSources?:", text), f"{name}: the docstring has no line 'Source:'"
+    assert effect.sources and all(source.strip() for source in effect.sources), f"{name} states no sources"
+    assert effect.shows.strip(), f"{name} does not say where it shows"
+    for other, what in effect.confused_with.items():
+        assert other != effect.id and what.strip(), f"{name}: confused_with '{other}' says nothing"
+    known = {*STAND_INS, *REST, *SET_UP}
+    assert set(effect.needs) <= known, f"{name} needs {sorted(set(effect.needs) - known)}, which no input has"
+    assert len(set(effect.needs)) == len(effect.needs), f"{name}: needs repeat"
+    assert effect.id not in effect.conflicts, f"{name} conflicts with itself"
+    assert effect.amplitude.name == "amplitude", f"{name}: the amplitude's key is 'amplitude'"
+    names = [quantity.name for quantity in effect.shape]
+    assert len(set(names)) == len(names) and "amplitude" not in names, f"{name}: shape names repeat: {names}"
+    for quantity in names:
+        assert _WORD.match(quantity), f"{name}: shape parameter '{quantity}' must be whole lower-case words"
+
+
+def _check_priors(effect: Effect) -> None:
+    rng = np.random.default_rng(0)
+    for quantity in (effect.amplitude, *effect.shape):
+        owner = f"{effect.id}: {quantity.name}"
+        assert quantity.unit.strip(), f"{owner} has no unit; a pure number has unit '1'"
+        low, high = quantity.limits
+        assert low < high, f"{owner}: limits {quantity.limits} hold nothing"
+        for grade in GRADES:
+            least, most = quantity.range(grade)
+            assert math.isfinite(least) and math.isfinite(most) and least <= most, (
+                f"{owner}: {grade} range {least:g} to {most:g}"
+            )
+            assert low <= least and most <= high, f"{owner}: the {grade} range passes the limits"
+            assert not quantity.signed or least >= 0.0, f"{owner}: a signed quantity's range is of its size"
+            assert not quantity.signed or low == -high, f"{owner}: limits of a signed quantity are lopsided"
+            assert quantity.check(quantity.typical(grade), owner) == quantity.typical(grade)
+            drawn = np.array([quantity.draw(rng, grade) for _ in range(400)])
+            assert np.isfinite(drawn).all() and drawn.min() >= low and drawn.max() <= high, (
+                f"{owner}: its prior leaves the limits"
+            )
+            size = np.abs(drawn) if quantity.signed else drawn
+            slack = 1e-9 * max(abs(least), abs(most))
+            inside = np.mean((size >= least - slack) & (size <= most + slack))
+            assert inside >= 0.8, f"{owner}: only {inside:.0%} of its {grade} prior lie in the range"
+    most_n, most_t = effect.amplitude.navigation[1], effect.amplitude.tactical[1]
+    assert most_n <= most_t, f"{effect.id}: a navigation gyro is to have no more of it than a tactical one"
+
+
+def _check_values(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
+    stated = {"amplitude": effect.amplitude.typical(), **effect.default_shape()}
+    amplitude, shape = effect.checked({"amplitude": stated["amplitude"]})
+    assert amplitude == stated["amplitude"] and shape == effect.default_shape(), (
+        "values that are not stated do not take their defaults"
+    )
+    for values in ({**stated, "nonsense": 1.0}, {**stated, "amplitude": math.nan}, effect.default_shape()):
+        try:
+            effect.checked(values)
+        except InputError as error:
+            assert effect.id in str(error), f"the message does not name the effect: {error}"
+        else:
+            raise AssertionError(f"{effect.id} accepts {values}")
+
+
+def _check_finite(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
+    for grade in GRADES:
+        shape = effect.default_shape(grade)
+        for name, given in inputs.items():
+            before = _columns(given)
+            copies = {key: values.copy() for key, values in before.items()}
+            signature = _signature(effect, given, shape)
+            assert isinstance(signature, np.ndarray) and signature.dtype == np.float64, (
+                f"{effect.id}: the signature on '{name}' is no float64 array"
+            )
+            assert signature.shape == (len(given),), (
+                f"{effect.id}: the signature on '{name}' has shape {signature.shape}, not ({len(given)},)"
+            )
+            assert np.isfinite(signature).all(), f"{effect.id}: not finite everywhere on '{name}'"
+            again = _signature(effect, given, shape)
+            assert np.array_equal(signature, again), f"{effect.id}: a second call on '{name}' differs"
+            for key, values in copies.items():
+                assert np.array_equal(values, before[key]), f"{effect.id}: the signature changed {key}"
+            empty = _signature(effect, block(given, 0, 0), shape)
+            assert empty.shape == (0,), f"{effect.id}: no samples do not give an empty signature"
+
+
+def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
+    shape = effect.default_shape()
+    given = inputs["programme"]
+    whole = _signature(effect, given, shape)
+    alone = _signature(effect, scrambled(given, keep=effect.needs), shape)
+    assert np.array_equal(whole, alone), (
+        f"{effect.id}: its signature depends on inputs outside {effect.needs}"
+    )
+    bare = replace(given, drives={})
+    for need in effect.needs:
+        others = [name for name in SCRAMBLED if name != need]
+        touched = any(
+            not np.array_equal(
+                _signature(effect, base, shape),
+                _signature(effect, scrambled(base, keep=others, value=3.0), shape),
+            )
+            for base in (given, bare)
+        )
+        assert touched, f"{effect.id} states that it needs '{need}', which makes no difference to it"
+
+
+def _check_causality(effect: Effect, inputs: Inputs) -> None:
+    shape = effect.default_shape()
+    half = len(inputs) // 2 + 7
+    whole = _signature(effect, inputs, shape)
+    first = _signature(effect, block(inputs, 0, half), shape)
+    _same(whole[:half], first, f"{effect.id}: a value depends on whether later samples exist")
+
+
+def _check_blocks(effect: Effect, inputs: Inputs) -> None:
+    shape = effect.default_shape()
+    memory = Memory()
+    edges = [0, *(int(share * len(inputs)) for share in BLOCK_EDGES), len(inputs)]
+    pieces = [
+        effect.signature(block(inputs, start, stop, memory), **shape) for start, stop in pairwise(edges)
+    ]
+    whole = _signature(effect, inputs, shape)
+    _same(whole, np.concatenate(pieces), f"{effect.id}: block by block and the whole run")
+
+
+def _check_gap(effect: Effect, inputs: Inputs) -> None:
+    """Samples that are missing in a soak, where nothing moves, must leave no trace beyond a window."""
+    shape = effect.default_shape()
+    still, (first, last) = still_stretch(inputs)
+    whole = _signature(effect, still, shape)
+    cut = _signature(effect, without_rows(still, first, last), shape)
+    assert np.isfinite(cut).all(), f"{effect.id}: not finite after a gap"
+    later = last + int(3.0 * inputs.rate_window_s / (inputs.time[1] - inputs.time[0])) + 1
+    size = float(np.abs(whole).max())
+    worst = float(np.abs(whole[later:] - cut[later - (last - first) :]).max(initial=0.0))
+    assert worst <= 1e-6 * size, f"{effect.id}: a gap in a soak leaves a trace of {worst:.2g} of {size:.2g}"
+    # In motion, a gap may cost accuracy but must not make a spike.
+    moving = _signature(effect, without_rows(inputs, len(inputs) // 4, len(inputs) // 4 + 60), shape)
+    assert np.isfinite(moving).all() and np.abs(moving).max() <= 2.0 * np.abs(
+        _signature(effect, inputs, shape)
+    ).max(initial=1e-300), f"{effect.id}: a gap in a ramp makes a spike"
+
+
+def _check_shape(effect: Effect, inputs: Inputs) -> None:
+    for quantity in effect.shape:
+        shape = effect.default_shape()
+        middle = shape[quantity.name]
+        low, high = quantity.range("tactical")
+        step = 1e-4 * max(abs(middle), 0.1 * (high - low), 1e-6)
+        if middle - step < quantity.limits[0] or middle + step > quantity.limits[1]:
+            middle = float(np.clip(middle, quantity.limits[0] + step, quantity.limits[1] - step))
+
+        def slope(h: float, name: str = quantity.name, at: float = middle, shape: Any = shape) -> FloatArray:
+            above = _signature(effect, inputs, {**shape, name: at + h})
+            below = _signature(effect, inputs, {**shape, name: at - h})
+            return (above - below) / (2.0 * h)
+
+        coarse, fine = slope(step), slope(0.5 * step)
+        assert np.isfinite(coarse).all(), f"{effect.id}: slope against {quantity.name} is not finite"
+        size = float(np.sqrt(np.mean(fine**2)))
+        scale = float(np.abs(_signature(effect, inputs, shape)).max(initial=0.0))
+        assert size * (high - low + abs(middle)) > 1e-9 * scale or size > 0.0, (
+            f"{effect.id}: shape parameter {quantity.name} makes no difference"
+        )
+        rough = float(np.sqrt(np.mean((coarse - fine) ** 2)))
+        assert rough <= SMOOTHNESS * size, (
+            f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
+        )
+
+
+def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
+    shape = effect.default_shape()
+    response = effect.response(_fresh(inputs), **shape)
+    assert response.shape == (len(inputs),) and np.isfinite(response).all(), (
+        f"{effect.id}: response has wrong shape or is not finite"
+    )
+    if isinstance(effect, ScaleFactorEffect):
+        wanted = 1e-6 * inputs.input_rate_deg_h * _signature(effect, inputs, shape)
+        _same(wanted, response, f"{effect.id}: response is not the input rate times the ppm")
+    for name, apply, untouched in _hooks(effect, inputs, shape):
+        _same(untouched, apply(0.0), f"{effect.id}: {name} with amplitude 0 changes something", exact=True)
+        changed = apply(effect.amplitude.typical())
+        assert changed.shape == untouched.shape and np.isfinite(changed).all(), (
+            f"{effect.id}: {name} gives a wrong shape or values that are not finite"
+        )
+    if isinstance(effect, LoopEffect):
+        output = inputs.output
+        assert output is not None
+        step = 1e-6 * effect.amplitude.typical("navigation")
+        change = effect.apply(output, _fresh(inputs), step, **shape) - output
+        wanted = step * _signature(effect, inputs, shape)
+        slack = 0.02 * float(np.sqrt(np.mean(wanted**2))) + 1e-10 * float(np.abs(output).max())
+        assert float(np.sqrt(np.mean((change - wanted) ** 2))) <= slack, (
+            f"{effect.id}: apply is not the amplitude times the signature for a small amplitude"
+        )
+
+
+def _hooks(
+    effect: Effect, inputs: Inputs, shape: Mapping[str, float]
+) -> Iterator[tuple[str, Callable[[float], FloatArray], FloatArray]]:
+    """Each forward hook of an effect as a function of the amplitude, with what it starts from."""
+    assert inputs.output is not None
+    output = inputs.output
+    if isinstance(effect, LoopEffect):
+        yield "apply", lambda a: effect.apply(output, _fresh(inputs), a, **shape), output
+    if isinstance(effect, SensorEffect):
+        for name in ("T", "T_in", "T_out", "T_electronics"):
+            true = inputs.temperatures[name]
+            yield (
+                "sense",
+                lambda a, name=name, true=true: effect.sense(name, true, _fresh(inputs), a, **shape),
+                true,
+            )
+    if isinstance(effect, LoggerEffect):
+        yield "record", lambda a: effect.record(output, _fresh(inputs), a, **shape), output
+    if isinstance(effect, ThermalEffect):
+        from fogml.twin.plant.standard import standard_network
+
+        chamber, plant = inputs.temperatures["T_chamber"], standard_network()
+        yield "change_chamber", lambda a: effect.change_chamber(chamber, _fresh(inputs), a, **shape), chamber
+
+        def solved(a: float) -> FloatArray:
+            nodes = effect.change_plant(plant, a, **shape).temperatures(
+                inputs.time, chamber, fan=inputs.drives["fan"], table_rate=inputs.table_rate
+            )
+            return np.concatenate([nodes[name] for name in plant.nodes])
+
+        start = plant.temperatures(inputs.time, chamber)
+        yield "change_plant", solved, np.concatenate([start[name] for name in plant.nodes])
+    if isinstance(effect, NoiseEffect):
+
+        def drawn(a: float) -> FloatArray:
+            return effect.draw(np.random.default_rng(1), len(inputs), 10.0, a, **shape)
+
+        yield "draw", drawn, np.zeros(len(inputs))
+        assert np.array_equal(drawn(1.0), drawn(1.0)), f"{effect.id}: the same seed draws other numbers"
+
+
+def _check_registry(effect: Effect) -> None:
+    held = registry.effects().get(effect.id)
+    if held is not None:
+        registry.unregister(effect.id)
+    try:
+        registry.register(effect)
+        assert registry.effect(effect.id) is effect, f"{effect.id} is not found after it was registered"
+        try:
+            registry.register(effect)
+        except InputError:
+            pass
+        else:
+            raise AssertionError(f"{effect.id} can be registered twice")
+        registry.unregister(effect.id)
+        assert effect.id not in registry.effects(), f"{effect.id} is still there after unregistering"
+    finally:
+        if effect.id in registry.effects():
+            registry.unregister(effect.id)
+        if held is not None:
+            registry.register(held)
+
+
+def _fresh(inputs: Inputs) -> Inputs:
+    return replace(inputs, memory=Memory(), cache={})
+
+
+def _signature(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
+    return effect.signature(_fresh(inputs), **shape)
+
+
+def _columns(inputs: Inputs) -> dict[str, FloatArray]:
+    columns = {**inputs.temperatures, **inputs.drives, **{f"slope {k}": v for k, v in inputs.slopes.items()}}
+    columns |= {"time": inputs.time, "table_rate": inputs.table_rate}
+    if inputs.output is not None:
+        columns["output"] = inputs.output
+    return columns
+
+
+def _same(wanted: FloatArray, found: FloatArray, what: str, *, exact: bool = False) -> None:
+    assert wanted.shape == found.shape, f"{what}: shapes {wanted.shape} and {found.shape}"
+    size = float(np.abs(wanted).max(initial=0.0))
+    worst = float(np.abs(wanted - found).max(initial=0.0))
+    slack = 0.0 if exact else AGREEMENT * size
+    assert worst <= slack, f"{what}: they differ by {worst:.2g}, size {size:.2g}"

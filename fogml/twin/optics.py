@@ -1,0 +1,167 @@
+"""Optics of the interferometer: Sagnac constant, proper frequency, resets, polarisation, photon noise.
+
+Numbers are those of one fibre coil, stated by `Coil`; the defaults are the reference coil of the
+catalogue: 1 km of silica fibre on 0.1 m at 1550 nm.
+
+References
+----------
+H. C. Lefevre, The Fiber-Optic Gyroscope, 2nd ed. (2014), for all of them.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+from fogml.errors import InputError
+
+LIGHT_M_S = 299_792_458.0
+ELECTRON_C = 1.602176634e-19
+BOLTZMANN_J_K = 1.380649e-23
+DEG_H = math.pi / 180.0 / 3600.0
+"""One deg/h in rad/s."""
+
+
+@dataclass(frozen=True)
+class Coil:
+    """A fibre coil and its light.
+
+    Attributes
+    ----------
+    length, diameter
+        Of the fibre and of the coil [m].
+    wavelength
+        Mean wavelength in vacuum [m].
+    index, index_slope, expansion
+        Refractive index n, dn/dT [1/K] and expansion alpha of the fibre [1/K].
+    """
+
+    length: float = 1000.0
+    diameter: float = 0.10
+    wavelength: float = 1550e-9
+    index: float = 1.4525
+    index_slope: float = 0.97e-5
+    expansion: float = 0.55e-6
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            lowest = -math.inf if entry.name in ("index_slope", "expansion") else 0.0
+            if not (math.isfinite(value) and value > lowest):
+                raise InputError(f"coil: {entry.name} is {value:g}; it must be a number above {lowest:g}")
+
+    @property
+    def phase_slope(self) -> float:
+        """c_T = dn/dT + n alpha [1/K], which turns a change of temperature into one of optical path."""
+        return self.index_slope + self.index * self.expansion
+
+    @property
+    def sagnac_s(self) -> float:
+        """Sagnac constant K_S = 2 pi L D / (lambda c): radians of phase per rad/s."""
+        return 2.0 * math.pi * self.length * self.diameter / (self.wavelength * LIGHT_M_S)
+
+    @property
+    def phase_per_deg_h(self) -> float:
+        """Sagnac phase of 1 deg/h [rad]."""
+        return self.sagnac_s * DEG_H
+
+    @property
+    def transit_s(self) -> float:
+        """Transit time of the coil n L / c [s]."""
+        return self.index * self.length / LIGHT_M_S
+
+    @property
+    def proper_frequency_hz(self) -> float:
+        """Proper frequency 1 / (2 transit time) [Hz]."""
+        return 0.5 / self.transit_s
+
+    @property
+    def proper_frequency_slope(self) -> float:
+        """Relative change of the transit time with temperature, dn/dT / n + alpha [1/K].
+
+        The proper frequency falls by as much.
+        """
+        return self.index_slope / self.index + self.expansion
+
+    @property
+    def fringe_offset_deg_s(self) -> float:
+        """Rate error of a closed loop that is one fringe (2 pi) off, lambda c / (L D) [deg/s]."""
+        return math.degrees(2.0 * math.pi / self.sagnac_s)
+
+    def reset_rate_hz(self, rate_deg_h: float) -> float:
+        """2 pi resets per second of the closed loop's serrodyne, D Omega / (n lambda), at a rate [deg/h]."""
+        return self.diameter * rate_deg_h * DEG_H / (self.index * self.wavelength)
+
+
+def polarization_period(
+    length: float, wavelength: float = 1550e-9, birefringence_slope: float = 5e-7
+) -> float:
+    """Period in temperature [degC] of the beat of two polarisations over a length of fibre [m].
+
+    lambda / (L |dB/dT|) with the birefringence's slope dB/dT [1/K].
+    """
+    return wavelength / (length * abs(birefringence_slope))
+
+
+def relative_intensity_noise(line_width: float, wavelength: float = 1550e-9) -> float:
+    """Excess noise of a broadband source lambda**2 / (c dlambda) [1/Hz]; line width in m."""
+    return wavelength * wavelength / (LIGHT_M_S * line_width)
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """Source and receiver of the light.
+
+    Attributes
+    ----------
+    line_width
+        Of the source [m].
+    responsivity
+        Of the diode [A/W].
+    resistance
+        Of the transimpedance amplifier [ohm].
+    temperature_k
+        Of that resistance [K].
+    """
+
+    line_width: float = 10e-9
+    responsivity: float = 0.9
+    resistance: float = 100e3
+    temperature_k: float = 300.0
+
+    def angle_random_walk(self, coil: Coil, power: float, modulation_depth: float) -> float:
+        """Angle random walk [deg/sqrt(h)] from shot, thermal and excess noise.
+
+        Parameters
+        ----------
+        coil
+            The coil, for the Sagnac constant.
+        power
+            Peak power at the diode P0 [W].
+        modulation_depth
+            Phase bias phi_m [rad].
+
+        Notes
+        -----
+        One-sided phase density ``S = (2 e I + 4 k T / R_f + I**2 RIN) / (R P0 sin(phi_m) / 2)**2``
+        with ``I = R P0 (1 + cos phi_m) / 2``, and ``N = sqrt(S / 2) / K_S``.
+        """
+        return phase_noise_to_walk(self.phase_density(coil, power, modulation_depth), coil)
+
+    def phase_density(self, coil: Coil, power: float, modulation_depth: float) -> float:
+        """One-sided density of the phase noise S [rad**2/Hz]; parameters as `angle_random_walk`."""
+        current = 0.5 * self.responsivity * power * (1.0 + math.cos(modulation_depth))
+        slope = 0.5 * self.responsivity * power * math.sin(modulation_depth)
+        shot = 2.0 * ELECTRON_C * current
+        thermal = 4.0 * BOLTZMANN_J_K * self.temperature_k / self.resistance
+        excess = current * current * relative_intensity_noise(self.line_width, coil.wavelength)
+        return (shot + thermal + excess) / (slope * slope)
+
+
+def phase_noise_to_walk(density: float, coil: Coil) -> float:
+    """Angle random walk [deg/sqrt(h)] of a one-sided white phase noise [rad**2/Hz]."""
+    return math.degrees(math.sqrt(0.5 * density) / coil.sagnac_s) * 60.0
+
+
+REFERENCE_COIL = Coil()
+"""The coil of all worked numbers in the catalogue."""

@@ -1,0 +1,159 @@
+"""The catalogue's index: built-in effects, those of outside packages, and any registered by hand.
+
+A module of ``fogml.twin.effects`` holds the effect that it is named after, as a class named in
+CamelCase; it is found by being there. Another package adds its effects by the entry point group
+``fogml.effects``, each naming a class or an object.
+"""
+
+from __future__ import annotations
+
+import difflib
+import pkgutil
+import re
+from importlib import import_module
+from importlib.metadata import entry_points
+from inspect import isabstract
+from typing import Any, TypeVar
+
+from fogml.errors import InputError
+from fogml.twin.effect import STAGES, Effect
+from fogml.twin.quantities import Quantity
+
+GROUP = "fogml.effects"
+_ID = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*\Z")
+_CODE = re.compile(r"([A-Za-z]*)(\d*)")
+_Declared = TypeVar("_Declared", bound="type[Effect] | Effect")
+
+_catalogue: dict[str, Effect] = {}
+_discovered = False
+
+
+def effects() -> dict[str, Effect]:
+    """Every effect by its id, in the order of the catalogue's letter codes.
+
+    Raises
+    ------
+    InputError
+        If a package's effect cannot be loaded or its id is taken.
+    """
+    _discover()
+    return dict(sorted(_catalogue.items(), key=lambda item: (*_order(item[1].code), item[0])))
+
+
+def effect(id: str) -> Effect:
+    """The effect of an id.
+
+    Raises
+    ------
+    InputError
+        If there is none; the message names ids that look alike.
+    """
+    _discover()
+    if id not in _catalogue:
+        raise InputError(f"there is no effect '{id}'{_near(id)}; `fogml effects` lists them")
+    return _catalogue[id]
+
+
+def register(declared: _Declared) -> _Declared:
+    """Add an effect, given as its class or an object of it; it can decorate a class.
+
+    Raises
+    ------
+    InputError
+        If the declaration is incomplete or its id is taken.
+    """
+    _discover()
+    _add(declared, "register")
+    return declared
+
+
+def unregister(id: str) -> Effect:
+    """Take an effect out of the catalogue and return it.
+
+    Raises
+    ------
+    InputError
+        If there is none of this id.
+    """
+    found = effect(id)
+    del _catalogue[id]
+    return found
+
+
+def class_name(id: str) -> str:
+    """The name of the class of an effect, e.g. ``shupe_pure`` to ``ShupePure``."""
+    return "".join(part.capitalize() for part in id.split("_"))
+
+
+def _discover() -> None:
+    global _discovered
+    if _discovered:
+        return
+    found = dict(_catalogue)
+    try:
+        for module in _modules():
+            _add(_built_in(module), f"fogml.twin.effects.{module}")
+        for point in entry_points(group=GROUP):
+            origin = f"entry point '{point.name}' of {point.dist.name if point.dist else 'a package'}"
+            try:
+                declared = point.load()
+            except Exception as error:
+                raise InputError(f"{origin} in group '{GROUP}' does not load: {error}") from error
+            _add(declared, origin)
+    except InputError:
+        _catalogue.clear()
+        _catalogue.update(found)
+        raise
+    _discovered = True
+
+
+def _modules() -> list[str]:
+    package = import_module("fogml.twin.effects")
+    return [
+        module.name for module in pkgutil.iter_modules(package.__path__) if not module.name.startswith("_")
+    ]
+
+
+def _built_in(module: str) -> type[Effect]:
+    found = getattr(import_module(f"fogml.twin.effects.{module}"), class_name(module), None)
+    if found is None or found.id != module:
+        raise InputError(
+            f"fogml/twin/effects/{module}.py must hold class {class_name(module)} with id '{module}'"
+        )
+    return found  # type: ignore[no-any-return]
+
+
+def _add(declared: Any, origin: str) -> None:
+    if isinstance(declared, type) and issubclass(declared, Effect):
+        if isabstract(declared):
+            missing = ", ".join(sorted(declared.__abstractmethods__))
+            raise InputError(f"{origin}: class {declared.__name__} does not define {missing}")
+        declared = declared()
+    if not isinstance(declared, Effect):
+        raise InputError(f"{origin}: {declared!r} is no effect; a class derived from Effect is needed")
+    for name in ("id", "code", "title", "stage", "amplitude"):
+        if not hasattr(declared, name):
+            raise InputError(f"{origin}: class {type(declared).__name__} does not state '{name}'")
+    if not _ID.match(declared.id):
+        raise InputError(f"{origin}: id '{declared.id}' must be lower-case words joined by '_'")
+    if declared.stage not in STAGES:
+        raise InputError(
+            f"{origin}: effect '{declared.id}' is in stage '{declared.stage}'; stages are {', '.join(STAGES)}"
+        )
+    if not isinstance(declared.amplitude, Quantity):
+        raise InputError(f"{origin}: the amplitude of effect '{declared.id}' must be a Quantity")
+    if declared.id in _catalogue:
+        raise InputError(f"{origin}: there is an effect '{declared.id}' already; unregister it first")
+    _catalogue[declared.id] = declared
+
+
+def _order(code: str) -> tuple[str, int]:
+    match = _CODE.match(code)
+    letters, digits = match.groups() if match else ("", "")
+    return letters, int(digits or 0)
+
+
+def _near(id: str) -> str:
+    near = difflib.get_close_matches(id, _catalogue, n=3, cutoff=0.5)
+    near += [name for name in _catalogue if id and id in name and name not in near][: 3 - len(near)]
+    return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""
