@@ -55,8 +55,8 @@ class RBFRegressor(NetworkRegressor):
     network_inputs
         Indices of the inputs that the network sees; the others enter the linear part only. None: all.
     wide_inputs
-        Indices of inputs along which widths also start e^3 times wider: those in which the target
-        bends little. None: starts are tried input by input.
+        Indices of the inputs that hold a rate, in which the target bends little: widths along them
+        also start e^3 times wider. None: starts are tried input by input.
     average_rows
         Rows are averaged in blocks down to about this number for tuning.
     width_prior
@@ -64,7 +64,7 @@ class RBFRegressor(NetworkRegressor):
     seed
         Seed of k-means.
     threads
-        Threads; by default all cores.
+        Threads; by default all cores for prediction, and one for tuning.
     device, dtype
         Where torch tunes (``"cpu"``, ``"cuda"``), and in ``"float64"`` or ``"float32"``.
 
@@ -86,7 +86,7 @@ class RBFRegressor(NetworkRegressor):
         ridge: float | Literal["evidence"] = "evidence",
         network_inputs: Sequence[int] | None = None,
         wide_inputs: Sequence[int] | None = None,
-        average_rows: int = 5000,
+        average_rows: int = 3000,
         width_prior: float = 0.3,
         seed: int = 0,
         threads: int | None = None,
@@ -178,6 +178,13 @@ class RBFRegressor(NetworkRegressor):
                 "rows are not in order of time: rows near in the inputs were averaged for tuning"
             )
         return self
+
+    @property
+    def linear_beyond(self) -> bool:
+        """Whether rates and differences in time enter linearly, so that the network follows them further."""
+        check_is_fitted(self)
+        seen = self.network_.columns
+        return len(seen) == 0 or (self.wide_inputs is not None and not np.isin(seen, self.wide_inputs).any())
 
     def describe(self) -> dict[str, Any]:
         """What reports say of the network."""

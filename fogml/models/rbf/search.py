@@ -14,6 +14,7 @@ from fogml.models.rbf.centres import kmeans_centres, ols_centres, thinned
 from fogml.models.rbf.objective import Objective, Shape
 from fogml.models.rbf.stopping import Watch, held_out_rows
 from fogml.models.rbf.tuning import TuningSettings, tune_own, tune_shared
+from fogml.models.tall_least_squares import one_blas_thread
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -23,7 +24,6 @@ _ROWS_PER_CENTRE = 3
 _MANY_INPUTS = 6  # more inputs than this are not tried one by one
 _START_ROWS = 1500
 _START_STEPS = 30
-_SMALL = 200_000  # entries of a design matrix that one thread handles sooner than several
 _ROUNDING = 1e-9  # of the target's standard deviation
 _VALIDATION_RIDGE = 1e-6
 
@@ -103,7 +103,7 @@ class Search:
             return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0})
         tried: dict[int, float] = {}
         best: Shape | None = None
-        with _threads(self._threads(sizes[-1])):
+        with one_blas_thread(), _torch_threads(self.settings.threads or 1):
             widths, log_ridge = self._start(sizes[0])
             for size in sizes:
                 value, shape = self._tuned(size, widths, log_ridge)
@@ -184,21 +184,19 @@ class Search:
         place = {"device": self.settings.device, "dtype": self.settings.dtype}
         return Objective(inputs, linear, target, evidence=evidence, **place)
 
-    def _threads(self, count: int) -> int | None:
-        """Threads for matrices of this size."""
-        return 1 if len(self._target) * count < _SMALL else self.settings.threads
-
 
 @contextmanager
-def _threads(count: int | None) -> Iterator[None]:
-    """Let torch use so many threads; None leaves its setting."""
+def _torch_threads(count: int) -> Iterator[None]:
+    """Let torch use so many threads.
+
+    One is the default: matrices of a few thousand rows gain little from more, and where other
+    work shares the cores, threads that wait for each other cost many times what they bring.
+    """
     import torch
 
     before = torch.get_num_threads()
-    if count is not None:
-        torch.set_num_threads(count)
+    torch.set_num_threads(count)
     try:
         yield
     finally:
-        if count is not None:
-            torch.set_num_threads(before)
+        torch.set_num_threads(before)
