@@ -84,14 +84,9 @@ def read_config(path: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        If the file is missing or holds no mapping.
+        If the file can't be read or holds no mapping.
     """
-    try:
-        values = read_yaml(path)
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file; --config takes a YAML file") from None
-    except IsADirectoryError:
-        raise InputError(f"{path}: is a folder; --config takes a YAML file") from None
+    values = read_yaml(path)
     if values is None:
         return {}
     if not isinstance(values, dict) or not all(isinstance(key, str) for key in values):

@@ -177,25 +177,3 @@ def test_compare_exit_status(invoke, run_files, tmp_path):
 def test_compare_with_an_unknown_model(invoke, run_files, tmp_path):
     arguments = ("compare", run_files[0], "--test", run_files[1], "--models", "M1,M9", "-o", tmp_path / "out")
     assert "M9" in invoke(*arguments, status=2).stderr
-
-
-def test_demo(invoke, tmp_path):
-    out = tmp_path / "demo"
-    result = invoke("demo", "-o", out)
-    assert names(out) == {"x", "y", "z", "index.html", "config.yaml"}
-    for axis in "xyz":
-        assert {"model", "report.json", "report.html", "report.xlsx", "config.yaml"} <= names(out / axis)
-        report = json.loads((out / axis / "report.json").read_text())
-        (judged,) = report["test"]
-        assert judged["axis"] == axis
-        # Do no harm: never worse than the training leg's mean beyond noise.
-        assert judged["after"]["rms"] <= judged["before"]["rms"] + judged["floor"]
-    assert str(out / "index.html") in result.stdout.replace("\n", "")
-    assert "not a fibre-optic gyro" in " ".join(result.stdout.split())
-
-
-def test_demo_configuration_of_an_axis_trains_again(invoke, invoke_json, tmp_path):
-    out = tmp_path / "demo"
-    invoke("demo", "-o", out, "--quiet")
-    again = invoke_json("train", "--config", out / "y" / "config.yaml", "-o", tmp_path / "again")
-    assert again == json.loads((out / "y" / "report.json").read_text())

@@ -1,0 +1,53 @@
+"""``fogml demo``: the main job on the shipped thermal cycle."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from fogml.cli.main import app
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory):
+    """The folder of a demonstration, and what it printed."""
+    out = tmp_path_factory.mktemp("demo") / "results"
+    result = CliRunner().invoke(app, ["demo", "-o", str(out)])
+    assert result.exit_code == 0, result.output
+    return out, result.stdout
+
+
+def names(folder):
+    return {path.name for path in folder.iterdir()}
+
+
+def test_writes_three_axes_as_train_does(demo):
+    out, _ = demo
+    assert names(out) == {"x", "y", "z", "index.html", "config.yaml"}
+    for axis in "xyz":
+        assert names(out / axis) == {"model", "report.json", "report.html", "report.xlsx", "config.yaml"}
+        (judged,) = json.loads((out / axis / "report.json").read_text())["test"]
+        assert (judged["run"], judged["axis"]) == (f"thermal-cycle-3-{axis}", axis)
+
+
+def test_does_no_harm(demo):
+    for axis in "xyz":
+        (judged,) = json.loads((demo[0] / axis / "report.json").read_text())["test"]
+        assert judged["after"]["rms"] <= judged["before"]["rms"] + judged["floor"]
+
+
+def test_says_what_to_open_and_what_the_unit_is(demo):
+    out, printed = demo
+    assert f"Open {out / 'index.html'}" in printed
+    assert "not a fibre-optic gyro" in printed
+    page = (out / "index.html").read_text()
+    for axis in "xyz":
+        assert f"{axis}/report.html" in page
+
+
+def test_an_axis_is_trained_again_from_its_configuration(demo, invoke_json, tmp_path):
+    config = demo[0] / "y" / "config.yaml"
+    again = invoke_json("train", "--config", config, "-o", tmp_path / "again")
+    assert again == json.loads((demo[0] / "y" / "report.json").read_text())
