@@ -165,12 +165,14 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
             settings[key] = _pointed(parse_quantity, f"{source}, key '{key}'", values[key], dimension)
     if "power" in values:
         settings["powered"] = _power(values["power"], source)
-    return Programme(
+    # Under the file's name until all is checked, so that messages state it.
+    programme = Programme(
         steps=_steps(values.get("steps"), source, "step "),
-        name=str(values.get("name", Path(source).stem)),
+        name=source,
         description=str(values.get("description", "")),
         **settings,
     )
+    return programme.named(str(values.get("name", Path(source).stem)))
 
 
 def _power(value: Any, source: str) -> bool:
