@@ -10,11 +10,18 @@ import numpy as np
 
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
+from fogml.models.box import learn_box, limit_atoms
 from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
 from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
-from fogml.models.regressors import fit_regressor, for_features, parameter_count, predict_rows
+from fogml.models.regressors import (
+    fit_regressor,
+    for_features,
+    goes_on_linearly,
+    parameter_count,
+    predict_rows,
+)
 from fogml.models.score import Score
 from fogml.models.table import RunRows, TrainingTable, recorded_s, run_rows
 from fogml.runs.run import FloatArray, Run
@@ -96,13 +103,12 @@ class Trial:
     ) -> tuple[FloatArray, int]:
         features = parse_features(candidate.features)
         atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
-        low, high = atoms[fitted].min(axis=0), atoms[fitted].max(axis=0)
-        names = [atom.text for atom in features.atoms]
-        features.set_box({n: (float(a), float(b)) for n, a, b in zip(names, low, high, strict=True)})
+        learn_box(features, [atoms[fitted]])
         table = replace(self._table.take(fitted), X=features.compose(atoms[fitted]))
         regressor = for_features(regressor_for(candidate, self.seed), features, [atoms[fitted]])
         regressor = fit_regressor(regressor, table)
-        limited, _ = features.limit(atoms[held])
+        full = np.ones(len(held), dtype=np.bool_)
+        limited, _ = limit_atoms(features, atoms[held], full, linear=goes_on_linearly(regressor))
         return predict_rows(regressor, features.compose(limited)), parameter_count(regressor)
 
 

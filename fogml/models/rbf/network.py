@@ -16,6 +16,7 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
 _PIECE = 1 << 13
+_NO_REACH = 1e-9
 _FIXED = 1e150  # on the diagonal of the triangle: as good as infinite, and products stay finite
 
 
@@ -161,7 +162,10 @@ def solve_network(
     factor = condensed.factors[0]
     penalty = np.full(factor.shape[1] - 1, LINEAR_PRECISION)
     penalty[0] = 0.0
-    penalty[1 : 1 + len(centres)] = ridge / condensed.scale[: len(centres)] ** 2
+    # Where no row lies near a centre its column is next to nothing: the centre gets no weight.
+    reach = condensed.scale[: len(centres)]
+    dead = reach < _NO_REACH
+    penalty[1 : 1 + len(centres)] = ridge / np.maximum(reach, _NO_REACH) ** 2
     matrix = np.vstack([factor[:, :-1], np.diag(np.sqrt(penalty))])
     image = np.append(factor[:, -1], np.zeros(len(penalty)))
     solution, *_ = np.linalg.lstsq(matrix, image, rcond=None)
@@ -174,6 +178,7 @@ def solve_network(
     share = np.linalg.lstsq(matrix.T @ matrix, factor[:, :-1].T @ factor[:, :-1], rcond=None)[0]
     freedom = max(1.0, len(target) - float(np.trace(share)))
     slopes = solution[1:] / condensed.scale
+    slopes[: len(centres)][dead] = 0.0
     constant = float(condensed.y_shift + solution[0] - slopes @ condensed.shift)
     linear = slopes[len(centres) :] if linear_part else empty.linear
     network = replace(empty, weights=slopes[: len(centres)], linear=linear, constant=constant)
