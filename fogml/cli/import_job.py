@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
 from typing import ClassVar
 
 from fogml.cli.settings import Settings, absolute
@@ -45,6 +47,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     with whole_folder(settings.out) as folder:
         with terminal.work(f"reading {settings.file}") as work:
             runs = import_recording(settings.file, settings.profile, settings.axis)
+            _check_apart(settings.file, settings.out, [run.name for run in runs])
             for run in runs:
                 work.doing(f"writing {run.name}")
                 write_run(run, folder / f"{run.name}.csv")
@@ -64,3 +67,13 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     rows = [[run.name, str(len(run)), f"{run.span_s:.6g}"] for run in runs]
     terminal.table(f"Written to {settings.out}", ["run", "rows", "span [s]"], rows)
     terminal.result({"schema": "fogml.import/1", "runs": written})
+
+
+def _check_apart(file: str, out: str, names: Sequence[str]) -> None:
+    """Refuse to write a run, with its side file, over the recording that it comes from."""
+    recording = Path(file).resolve()
+    if Path(out).resolve() == recording.parent and recording.stem in names:
+        raise InputError(
+            f"--out {out} is the recording's own folder, and '{recording.stem}.csv' with its side file would "
+            "replace what is there; choose another --out"
+        )

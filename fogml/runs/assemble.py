@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Literal
 
@@ -20,6 +21,8 @@ from fogml.runs.run import Run
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 _REPAIR = "--repair"
+_MOST_NAMES = 20
+_LONGEST_NAME = 40
 
 
 def run_from_table(table: RawTable, path: Path, *, repair: bool, name: str | None) -> Run:
@@ -39,10 +42,8 @@ def run_from_table(table: RawTable, path: Path, *, repair: bool, name: str | Non
             rows = rows[kept]
             columns = {key: values[kept] for key, values in columns.items()}
     if len(rows) < 2:
-        raise InputError(f"{table.file}: {len(rows)} usable sample(s); a run needs at least 2")
-    return Run(
-        name or path.name, columns, _facts(table, path), gyro_unit, (*table.findings, *tuple(findings))
-    )
+        raise too_short(table.file, len(rows))
+    return Run(name or path.name, columns, _facts(table, path), gyro_unit, (*table.findings, *findings))
 
 
 @dataclass
@@ -52,6 +53,7 @@ class Assembler:
     path: Path
     facts: Facts | None = None
     last_time: float = -np.inf
+    samples: int = 0
 
     def block(self, table: RawTable) -> Run:
         """The next block as a run.
@@ -71,9 +73,16 @@ class Assembler:
         _new_times(table, columns, rows, repair=False)
         if len(time):
             self.last_time = float(time[-1])
+            self.samples += len(time)
         if self.facts is None:
             self.facts = _facts(table, self.path)
         return Run(self.path.name, columns, self.facts, gyro_unit, (*table.findings, *findings))
+
+
+def too_short(file: str, samples: int) -> InputError:
+    """What to say of a file with fewer than two samples."""
+    usable = "no usable sample" if samples == 0 else "1 usable sample"
+    return InputError(f"{file}: {usable}; a run needs at least 2")
 
 
 def _internal_columns(
@@ -83,18 +92,19 @@ def _internal_columns(
     columns: dict[str, FloatArray] = {}
     gyro_unit: Literal["deg/h", "count"] = "deg/h"
     unknown = []
-    seen: set[str] = set()
+    seen: dict[str, None] = {}
     for cell in table.cells:
         name, unit = parse_header(cell)
         if name in seen:
             raise InputError(f"{table.file}: column '{name}' is there twice; rename or remove one of them")
-        seen.add(name)
+        seen[name] = None
         if cell not in table.columns:
             continue
         factor, offset = conversion(name, unit, table.file)
         values = table.columns[cell]
         if factor != 1.0 or offset != 0.0:
-            values = values * factor + offset
+            with np.errstate(over="ignore"):  # an infinite value is found below
+                values = values * factor + offset
         columns[name] = values
         if name == "gyro" and unit == "count":
             gyro_unit = "count"
@@ -102,17 +112,23 @@ def _internal_columns(
             unknown.append(name)
     for name in ("time", "gyro"):
         if name not in columns:
-            found = ", ".join(seen) or "none"
+            found = _listed(seen)
             raise InputError(
                 f"{table.file}: no column '{name}'; a run needs time and gyro, e.g. 'time [s]', "
                 f"'gyro [deg/h]'; the header holds {found}"
             )
     notes = []
     if unknown:
-        listed = ", ".join(f"'{name}'" for name in unknown)
-        message = f"kept and not used by models: {listed}"
+        message = f"kept and not used by models: {_listed(unknown)}"
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
     return columns, gyro_unit, notes
+
+
+def _listed(names: Collection[str]) -> str:
+    """Names in one line, however many and long they are."""
+    shown = [f"'{name[:_LONGEST_NAME]}'" for name in islice(names, _MOST_NAMES)]
+    more = [f"{len(names) - len(shown)} more"] if len(names) > len(shown) else []
+    return ", ".join(shown + more) or "nothing"
 
 
 def _finite_rows(
@@ -122,7 +138,9 @@ def _finite_rows(
     bad: NDArray[np.bool_] | None = None
     for name, values in columns.items():
         # The sum is finite unless a value is not, and takes one pass without a mask.
-        if column_spec(name) is None or np.isfinite(values.sum()):
+        with np.errstate(over="ignore", invalid="ignore"):
+            is_sound = np.isfinite(values.sum())
+        if is_sound or column_spec(name) is None:
             continue
         found = ~np.isfinite(values)
         if not found.any():
@@ -147,15 +165,16 @@ def _ordered_rows(
     table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
 ) -> tuple[IndexArray, Finding | None]:
     """Rows in order of time."""
-    steps = np.diff(columns["time"])
-    if not len(steps) or steps.min() >= 0.0:
+    time = columns["time"]
+    back = time[1:] < time[:-1]
+    if not back.any():
         return rows, None
-    first = int(np.argmax(steps < 0.0)) + 1
+    first = int(np.argmax(back)) + 1
     if not repair:
         raise _order_error(table, False, int(rows[first]))
-    count = int((steps < 0.0).sum())
+    count = int(back.sum())
     message = f"time goes back {count} times, first at {table.row_name(int(rows[first]))}; rows were sorted"
-    order = np.argsort(columns["time"], kind="stable")
+    order = np.argsort(time, kind="stable")
     return order, Finding("repaired_order", message, column="time", row=int(rows[first]) + 1, count=count)
 
 
@@ -163,7 +182,8 @@ def _new_times(
     table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
 ) -> tuple[IndexArray, Finding | None]:
     """Rows whose time is not that of the row before."""
-    repeats = np.flatnonzero(np.diff(columns["time"]) == 0.0) + 1
+    time = columns["time"]
+    repeats = np.flatnonzero(time[1:] == time[:-1]) + 1
     if not len(repeats):
         return rows, None
     first = int(rows[repeats[0]])

@@ -75,7 +75,6 @@ def _specs() -> dict[str, ColumnSpec]:
 
 KNOWN = _specs()
 _COIL_SENSOR = re.compile(r"T([1-9]\d*)\Z")
-_HEADER = re.compile(r"\s*(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\]\s*)?\Z")
 # Spellings that loggers and spreadsheets use for the same unit.
 _ALIASES = {
     "°C": "degC",
@@ -88,6 +87,10 @@ _ALIASES = {
     "µT": "uT",
     "μT": "uT",
     "sec": "s",
+    "º": "deg",
+    "ºC": "degC",
+    "º/h": "deg/h",
+    "º/s": "deg/s",
     "counts": "count",
     "1": "0/1",
 }
@@ -116,11 +119,12 @@ def is_temperature(name: str) -> bool:
 
 def parse_header(cell: str) -> tuple[str, str | None]:
     """Split a header cell ``name [unit]`` into its name and its unit (None if absent)."""
-    match = _HEADER.match(cell)
-    if match is None:
-        return cell.strip(), None
-    unit = match["unit"]
-    return match["name"], _ALIASES.get(unit, unit) if unit is not None else None
+    cell = cell.strip()
+    name, bracket, rest = cell.partition("[")
+    if not bracket or not rest.endswith("]") or "[" in rest or "]" in rest[:-1] or "]" in name:
+        return cell, None
+    unit = rest[:-1].strip()
+    return name.strip(), _ALIASES.get(unit, unit)
 
 
 def header(name: str, unit: str | None = None) -> str:

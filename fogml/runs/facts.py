@@ -7,19 +7,35 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from fogml.errors import InputError
 
 EARTH_RATE_DEG_H = 15.041067
+SIDE_SUFFIXES = (".yaml", ".yml")
+_EXAMPLES = {
+    "latitude": "39.9",
+    "input_axis": "up, or input_axis: {heading: 30.0}",
+    "scale_factor": '{value: 1.0, unit: "count per deg/h"}',
+    "powered_on": "0.0",
+    "started": "2026-03-02T08:00:00Z",
+}
+_NAMES = ("unit", "axis", "notes")
 
 
 class ScaleFactor(BaseModel):
     """Nominal K0: gyro [deg/h] = counts / value."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    value: float
+    value: float = Field(allow_inf_nan=False)
     unit: Literal["count per deg/h", "count per deg/s"] = "count per deg/h"
+
+    @field_validator("value")
+    @classmethod
+    def _not_zero(cls, value: float) -> float:
+        if value == 0.0:
+            raise ValueError("a scale factor of 0 can't turn counts into a rate")
+        return value
 
     @property
     def count_per_deg_h(self) -> float:
@@ -31,7 +47,7 @@ class Heading(BaseModel):
     """A horizontal input axis, in degrees clockwise from north."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
-    heading: float
+    heading: float = Field(allow_inf_nan=False)
 
 
 class Facts(BaseModel):
@@ -46,7 +62,7 @@ class Facts(BaseModel):
     latitude: float | None = Field(default=None, ge=-90.0, le=90.0)
     input_axis: Literal["up", "down", "north", "south", "east", "west"] | Heading | None = None
     scale_factor: ScaleFactor | None = None
-    powered_on: float | None = None
+    powered_on: float | None = Field(default=None, allow_inf_nan=False)
     started: datetime | None = None
     notes: str | None = None
 
@@ -89,8 +105,8 @@ def facts_from(values: Any, source: str) -> Facts:
         return Facts()
     if not isinstance(values, dict):
         raise InputError(f"{source}: set-up facts must be 'key: value' lines, found {type(values).__name__}")
-    # YAML reads a serial number such as 0417 as an integer; a serial number is a name.
-    names = {k: str(v) for k, v in values.items() if k in ("unit", "axis") and isinstance(v, int | float)}
+    # A serial number is a name, also where it was stored as a number.
+    names = {k: str(v) for k, v in values.items() if k in _NAMES and isinstance(v, int | float)}
     values = {**values, **names}
     try:
         return Facts.model_validate(values)
@@ -100,16 +116,51 @@ def facts_from(values: Any, source: str) -> Facts:
         if first["type"] == "extra_forbidden":
             known = ", ".join(Facts.model_fields)
             raise InputError(f"{source}: unknown key '{key}'; known keys are {known}") from None
-        raise InputError(f"{source}: key '{key}': {first['msg']} (found {first['input']!r})") from None
+        reason = first["msg"].removeprefix("Value error, ")
+        example = f"; write e.g. {key}: {_EXAMPLES[key]}" if key in _EXAMPLES else ""
+        raise InputError(f"{source}: key '{key}': {reason} (found {first['input']!r}){example}") from None
+
+
+def side_file(run_path: Path) -> Path | None:
+    """The side file beside a run: same stem, ``.yaml`` or else ``.yml``; None if there is none."""
+    sides = (run_path.with_suffix(suffix) for suffix in SIDE_SUFFIXES)
+    return next((side for side in sides if side.is_file()), None)
 
 
 def read_side_file(run_path: Path) -> Facts:
-    """The facts in the side file beside a run (same stem, .yaml or .yml); none if absent."""
-    for suffix in (".yaml", ".yml"):
-        side = run_path.with_suffix(suffix)
-        if side.is_file():
-            return facts_from(read_yaml(side), side.name)
-    return Facts()
+    """The facts in the side file beside a run; none if there is no side file.
+
+    Raises
+    ------
+    InputError
+        If it is not YAML, or states what is no set-up fact or a wrong value.
+    """
+    side = side_file(run_path)
+    if side is None:
+        return Facts()
+    values = read_yaml(side)
+    if isinstance(values, dict):
+        values = {**values, **_names_as_written(side)}
+    return facts_from(values, side.name)
+
+
+def _names_as_written(side: Path) -> dict[str, str]:
+    """Names in a side file letter by letter: YAML makes the number 271 of the serial number 0417."""
+    import yaml
+
+    node = yaml.compose(side.read_text(encoding="utf-8-sig"), Loader=yaml.SafeLoader)
+    names: dict[str, str] = {}
+    seen: set[str] = set()
+    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
+        if str(key.value) in seen:
+            raise InputError(
+                f"{side.name}, line {key.start_mark.line + 1}: key '{key.value}' is there twice; remove one"
+            )
+        seen.add(str(key.value))
+        is_null = value.tag == "tag:yaml.org,2002:null"
+        if key.value in _NAMES and isinstance(value, yaml.ScalarNode) and not is_null:
+            names[key.value] = value.value
+    return names
 
 
 def side_file_text(facts: Facts) -> str:
@@ -130,8 +181,11 @@ def read_yaml(path: Path) -> Any:
     import yaml
 
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        return yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # A ValueError is text that is not UTF-8, or a date or number that there is none of.
         place = getattr(error, "problem_mark", None)
         where = f", line {place.line + 1}" if place is not None else ""
         raise InputError(f"{path.name}{where}: not readable as YAML; correct or remove it") from None

@@ -12,12 +12,19 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.columns import parse_header
-from fogml.runs.facts import facts_from
-from fogml.runs.parquet_files import json_value
-from fogml.runs.raw_table import FACTS_KEY, RawTable, numbered_row
+from fogml.runs.raw_table import (
+    FACTS_KEY,
+    RawTable,
+    axis_of_samples,
+    choose_vectors,
+    facts_from_json,
+    first_line,
+    named_from,
+)
 from fogml.runs.run import Run
 
 
@@ -60,56 +67,64 @@ def hdf5_blocks(path: Path, rows: int | None) -> Iterator[RawTable]:
     h5py = h5py_module()
     try:
         with h5py.File(path, "r") as file:
-            group = file["run"] if "run" in file and isinstance(file["run"], h5py.Group) else file
-            datasets = {
-                _cell(name, item): item for name, item in group.items() if isinstance(item, h5py.Dataset)
-            }
-            count = _length(path.name, datasets)
+            group = file["run"] if isinstance(file.get("run"), h5py.Group) else file
+            found = [
+                (_cell(name, item), item) for name, item in group.items() if isinstance(item, h5py.Dataset)
+            ]
+            if not found:
+                raise InputError(
+                    f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'"
+                )
+            datasets, findings = choose_vectors(path.name, found)
             text = group.attrs.get(FACTS_KEY)
-            facts = None
-            if text is not None:
-                facts = facts_from(json_value(text, path.name), f"{path.name}, facts in the attributes")
+            facts = None if text is None else facts_from_json(text, f"{path.name}, facts in the attributes")
+            cells = tuple(cell for cell, _ in datasets)
+            count = max((max(item.shape) for _, item in datasets), default=0)
             step = rows or max(count, 1)
             for start in range(0, max(count, 1), step):
-                columns = {
-                    cell: np.asarray(item[start : start + step], dtype=np.float64).reshape(-1)
-                    for cell, item in datasets.items()
-                }
-                yield RawTable(path.name, tuple(columns), columns, facts, _named_from(start))
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+                columns = {cell: _samples(item, start, start + step) for cell, item in datasets}
+                yield RawTable(path.name, cells, columns, facts, named_from(start), findings)
+    except InputError:
+        raise
+    except Exception as error:  # h5py raises whatever the damage leads to
         raise InputError(
-            f"{path.name}: damaged, or no HDF5 file of numbers ({reason}); copy or export it again"
+            f"{path.name}: damaged, or no HDF5 file of numbers ({first_line(error)}); copy or export it again"
         ) from None
 
 
-def _named_from(start: int) -> Any:
-    return lambda i: numbered_row(start + i)
+def _samples(dataset: Any, start: int, stop: int) -> NDArray[np.float64]:
+    along = axis_of_samples(dataset.shape)
+    part = tuple(slice(start, stop) if axis == along else 0 for axis in range(dataset.ndim))
+    return np.asarray(dataset[part], dtype=np.float64)
 
 
 def _cell(name: str, dataset: Any) -> str:
     unit = dataset.attrs.get("unit")
     if unit is None:
         return str(name)
-    unit = unit.decode() if isinstance(unit, bytes) else str(unit)
+    unit = unit.decode("utf-8", errors="replace") if isinstance(unit, bytes) else str(unit)
     return f"{parse_header(name)[0]} [{unit}]"
 
 
-def _length(file: str, datasets: dict[str, Any]) -> int:
-    if not datasets:
-        raise InputError(f"{file}: holds no datasets; one per column was expected, e.g. 'time [s]'")
-    sizes = {cell: int(item.size) for cell, item in datasets.items()}
-    if len(set(sizes.values())) > 1:
-        raise InputError(f"{file}: datasets differ in length: {sizes}; one value per sample was expected")
-    return next(iter(sizes.values()))
-
-
 def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
-    """Write a run's columns under their header cells, and its facts, to a new HDF5 file."""
+    """Write a run's columns under their header cells, and its facts, to a new HDF5 file.
+
+    Raises
+    ------
+    InputError
+        If a column's name can't be a dataset's.
+    """
     with h5py_module().File(path, "w") as file:
         for name, cell in cells.items():
             label, unit = parse_header(cell)
-            dataset = file.create_dataset(label, data=run.columns[name], compression="gzip", shuffle=True)
+            if "/" in label or "\0" in label or label in ("", ".", "run"):
+                raise InputError(
+                    f"{path.name}: column '{label}' can't be named so in an HDF5 file; rename it, "
+                    "or write CSV or Parquet"
+                )
+            dataset = file.create_dataset(
+                label, data=run.columns[name], compression="gzip", shuffle=True, fletcher32=True
+            )
             if unit is not None:
                 dataset.attrs["unit"] = unit
         file.attrs[FACTS_KEY] = json.dumps(run.facts.as_dict(), ensure_ascii=False)

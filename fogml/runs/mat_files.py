@@ -12,6 +12,8 @@ struct ``units``. Set-up facts stand as JSON text in ``facts``. In MATLAB::
 from __future__ import annotations
 
 import json
+import re
+import warnings
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,13 +23,14 @@ from fogml.errors import InputError
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
-from fogml.runs.parquet_files import json_value
-from fogml.runs.raw_table import RawTable
+from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, first_line
 from fogml.runs.run import Run
 
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
 _LARGEST_V5_BYTES = 1 << 31
+_RESERVED = ("units", "facts")
+_VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}\Z")
 
 
 def read_mat(path: Path) -> RawTable:
@@ -42,12 +45,16 @@ def read_mat(path: Path) -> RawTable:
         head = file.read(_USER_BLOCK + len(_HDF5_MAGIC))
     is_hdf5 = head.startswith(_HDF5_MAGIC) or head[_USER_BLOCK:].startswith(_HDF5_MAGIC)
     try:
-        variables = _hdf5_variables(path) if is_hdf5 else _v5_variables(path)
+        with warnings.catch_warnings():
+            # SciPy warns of variables that it can't read; those it leaves out are missed below.
+            warnings.simplefilter("ignore")
+            variables = _hdf5_variables(path) if is_hdf5 else _v5_variables(path)
     except InputError:
         raise
     except Exception as error:  # scipy raises whatever the damage leads to
-        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-        raise InputError(f"{path.name}: damaged or no MATLAB file ({reason}); save it again") from None
+        raise InputError(
+            f"{path.name}: damaged or no MATLAB file ({first_line(error)}); save it again"
+        ) from None
     return _raw(path.name, variables)
 
 
@@ -78,33 +85,41 @@ def _raw(file: str, variables: dict[str, Any]) -> RawTable:
     units = held.get("units", variables.get("units", {}))
     if not isinstance(units, dict):
         raise InputError(f"{file}: 'units' must be a struct of texts, e.g. units.time = 's'")
-    columns = {}
+    arrays = []
     for name, value in held.items():
-        if name in ("units", "facts") or isinstance(value, str | dict | list):
-            continue
-        values = np.asarray(value)
-        if values.dtype.kind not in "fiub" or values.size != max(values.shape, default=1):
+        if name in _RESERVED:
             continue
         unit = units.get(name)
-        cell = f"{parse_header(name)[0]} [{str(unit).strip()}]" if unit is not None else name
-        columns[cell] = values.reshape(-1).astype(np.float64)
-    sizes = {cell: len(values) for cell, values in columns.items()}
-    if not columns:
+        cell = name if unit is None else f"{parse_header(name)[0]} [{str(unit).strip()}]"
+        arrays.append((cell, np.asarray(value)))
+    if not arrays:
         raise InputError(f"{file}: holds no numeric vectors; time, gyro and others were expected")
-    if len(set(sizes.values())) > 1:
-        raise InputError(f"{file}: vectors differ in length: {sizes}; one value per sample was expected")
-    facts = held.get("facts", variables.get("facts"))
-    if isinstance(facts, str):
-        facts = json_value(facts, file)
-    stated = facts_from(facts, f"{file}, facts") if facts is not None else None
-    return RawTable(file, tuple(columns), columns, stated)
+    vectors, findings = choose_vectors(file, arrays)
+    columns = {cell: values.reshape(-1).astype(np.float64) for cell, values in vectors}
+    source = f"{file}, facts"
+    stated = held.get("facts", variables.get("facts"))
+    facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
+    cells = tuple(cell for cell, _ in vectors)
+    return RawTable(file, cells, columns, None if stated is None else facts, findings=findings)
 
 
 def write_mat(
     run: Run, cells: dict[str, str], path: Path, version: Literal["5", "7.3"] | None = None
 ) -> None:
-    """Write a run to a new MATLAB file: version 5, or 7.3 where asked or where 5 can't hold it."""
+    """Write a run to a new MATLAB file: version 5, or 7.3 where asked or where 5 can't hold it.
+
+    Raises
+    ------
+    InputError
+        If a column's name can't be a variable's.
+    """
     labels = {name: parse_header(cell) for name, cell in cells.items()}
+    for label, _ in labels.values():
+        if not _VARIABLE.match(label) or label in (*_RESERVED, "run"):
+            raise InputError(
+                f"{path.name}: column '{label}' can't be named so in a MATLAB file; rename it to letters, "
+                "digits and underscores, or write CSV or Parquet"
+            )
     if version is None:
         version = "7.3" if 8 * len(run) >= _LARGEST_V5_BYTES else "5"
     facts = json.dumps(run.facts.as_dict(), ensure_ascii=True)

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
-from fogml.runs.facts import Facts, facts_from
-from fogml.runs.raw_table import FACTS_KEY, RawTable, numbered_row, text_column
+from fogml.runs.facts import Facts
+from fogml.runs.raw_table import (
+    FACTS_KEY,
+    RawTable,
+    facts_from_json,
+    first_line,
+    named_from,
+    text_column,
+)
 
 if TYPE_CHECKING:
     from pyarrow import ChunkedArray, Schema, Table
     from pyarrow.parquet import ParquetFile
+
+_BUFFER_BYTES = 1 << 20
 
 
 def read_parquet(path: Path) -> RawTable:
@@ -28,12 +36,10 @@ def read_parquet(path: Path) -> RawTable:
     InputError
         If the file is damaged, or a column of the run format holds no numbers.
     """
-    import pyarrow as arrow
-
     with _opened(path) as file:
         try:
             return _raw(path.name, file.read(), 0)
-        except (arrow.ArrowException, OSError) as error:
+        except _failures() as error:
             raise _damaged(path, error) from None
 
 
@@ -55,23 +61,37 @@ def parquet_blocks(path: Path, rows: int) -> Iterator[RawTable]:
                 table = arrow.Table.from_batches([batch])
                 yield _raw(path.name, table, start)
                 start += len(batch)
-        except (arrow.ArrowException, OSError) as error:
+        except _failures() as error:
             raise _damaged(path, error) from None
 
 
 def _opened(path: Path) -> ParquetFile:
-    import pyarrow as arrow
     import pyarrow.parquet as parquet
 
     try:
-        return parquet.ParquetFile(path, pre_buffer=False, memory_map=False)
-    except (arrow.ArrowException, OSError) as error:
+        # Without a buffer, streaming would hold a column's whole row group, however large.
+        return parquet.ParquetFile(
+            path,
+            pre_buffer=False,
+            memory_map=False,
+            buffer_size=_BUFFER_BYTES,
+            page_checksum_verification=True,
+        )
+    except _failures() as error:
         raise _damaged(path, error) from None
 
 
 def _damaged(path: Path, error: Exception) -> InputError:
-    reason = str(error).splitlines()[0] if str(error) else type(error).__name__
-    return InputError(f"{path.name}: damaged or no Parquet file ({reason}); copy or export it again")
+    return InputError(
+        f"{path.name}: damaged or no Parquet file ({first_line(error)}); copy or export it again"
+    )
+
+
+def _failures() -> tuple[type[Exception], ...]:
+    import pyarrow as arrow
+
+    # A ValueError is a name that is not UTF-8.
+    return (arrow.ArrowException, OSError, ValueError, MemoryError)
 
 
 def _raw(file: str, table: Table, start: int) -> RawTable:
@@ -91,7 +111,7 @@ def _raw(file: str, table: Table, start: int) -> RawTable:
         tuple(table.column_names),
         columns,
         facts_of_schema(table.schema, file),
-        lambda i: numbered_row(start + i),
+        named_from(start),
         tuple(findings),
     )
 
@@ -101,30 +121,16 @@ def _numbers(values: ChunkedArray) -> NDArray[np.float64] | None:
     import pyarrow.types as types
 
     kind = values.type
-    if not (types.is_floating(kind) or types.is_integer(kind) or types.is_null(kind)):
+    numeric = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
+    if not any(is_kind(kind) for is_kind in numeric):
         return None
     if values.null_count == 0 and types.is_float64(kind) and values.num_chunks == 1:
         return np.asarray(values.chunk(0))
-    return np.asarray(values.cast(arrow.float64()).to_numpy())
+    # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
+    return np.asarray(values.cast(arrow.float64(), safe=False).to_numpy())
 
 
 def facts_of_schema(schema: Schema, file: str) -> Facts | None:
     """Set-up facts in a schema's metadata, or None."""
     text = (schema.metadata or {}).get(FACTS_KEY.encode())
-    if text is None:
-        return None
-    return facts_from(json_value(text, file), f"{file}, facts in the metadata")
-
-
-def json_value(text: str | bytes, file: str) -> Any:
-    """The value of JSON text.
-
-    Raises
-    ------
-    InputError
-        If it is not JSON.
-    """
-    try:
-        return json.loads(text)
-    except ValueError:
-        raise InputError(f"{file}: the set-up facts in it are not JSON; write the file again") from None
+    return None if text is None else facts_from_json(text, f"{file}, facts in the metadata")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+import json
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.runs.facts import Facts
+from fogml.errors import InputError
+from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.facts import Facts, facts_from
 from fogml.runs.findings import Finding
 
 FACTS_KEY = "fogml.facts"
@@ -20,9 +24,91 @@ def numbered_row(index: int) -> str:
     return f"row {index + 1}"
 
 
+def named_from(start: int) -> Callable[[int], str]:
+    """Names rows of a block that begins at the row with index `start`."""
+    return lambda i: numbered_row(start + i)
+
+
 def text_column(name: str) -> Finding:
     """What to say of a column that holds no numbers."""
-    return Finding("text_column", f"column '{name}' holds text and is left out", column=name)
+    return Finding("text_column", f"column '{name}' holds no numbers and is left out", column=name)
+
+
+def facts_from_json(text: str | bytes, source: str) -> Facts:
+    """Set-up facts that a file itself states as JSON.
+
+    Raises
+    ------
+    InputError
+        If it is not JSON, or states what is no set-up fact or a wrong value.
+    """
+    try:
+        values = json.loads(text)
+    except (TypeError, ValueError, RecursionError):
+        raise InputError(f"{source}: the set-up facts are not JSON; write the file again") from None
+    return facts_from(values, source)
+
+
+def first_line(error: BaseException) -> str:
+    """The reason that an exception gives, in one line."""
+    return next(iter(str(error).splitlines()), type(error).__name__)
+
+
+def axis_of_samples(shape: Sequence[int]) -> int | None:
+    """The axis along which an array holds samples, or None where it is no vector."""
+    longest = max(range(len(shape)), key=lambda axis: shape[axis], default=None)
+    if longest is None or any(size != 1 for axis, size in enumerate(shape) if axis != longest):
+        return None
+    return longest
+
+
+def choose_vectors(
+    file: str, arrays: Sequence[tuple[str, Any]]
+) -> tuple[list[tuple[str, Any]], tuple[Finding, ...]]:
+    """The columns among named arrays: numeric vectors as long as ``time``.
+
+    Parameters
+    ----------
+    file
+        Base name, for messages.
+    arrays
+        Header cell and array (anything with `shape` and `dtype`).
+
+    Returns
+    -------
+    columns, findings
+        Header cells with their arrays; what is left out, of no column of the run format.
+
+    Raises
+    ------
+    InputError
+        If a column of the run format is no numeric vector or differs from ``time`` in length.
+    """
+    kept: list[tuple[str, Any]] = []
+    findings = []
+    time = next((array for cell, array in arrays if parse_header(cell)[0] == "time"), None)
+    count = None if time is None else max(time.shape, default=0)
+    for cell, array in arrays:
+        name = parse_header(cell)[0]
+        known = column_spec(name) is not None
+        fault = None
+        if array.dtype.kind not in "fiub" or axis_of_samples(array.shape) is None:
+            shape = " by ".join(str(size) for size in array.shape) or "one value"
+            fault = f"holds {array.dtype} ({shape}), a vector of numbers was expected"
+        elif count is not None and max(array.shape) != count:
+            fault = f"holds {max(array.shape)} samples, 'time' holds {count}"
+        if fault is None:
+            kept.append((cell, array))
+        elif known:
+            raise InputError(f"{file}, column '{name}': {fault}; one number per sample, export it again")
+        else:
+            findings.append(Finding("left_out", f"'{name}' is left out: it {fault}", column=name))
+    return kept, tuple(findings)
+
+
+def no_samples(file: str) -> InputError:
+    """What to say of a file without rows."""
+    return InputError(f"{file}: a header and no samples; rows of numbers were expected below it")
 
 
 @dataclass(frozen=True)
@@ -55,6 +141,10 @@ class RawTable:
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0
+
+    def noting(self, findings: Iterable[Finding]) -> RawTable:
+        """The table with more findings."""
+        return replace(self, findings=(*self.findings, *findings))
 
     def blocks(self, rows: int) -> Iterator[RawTable]:
         """The table cut into blocks of at most `rows` rows, as views."""

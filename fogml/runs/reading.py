@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal
 
 from fogml.errors import InputError
-from fogml.runs.assemble import Assembler, run_from_table
+from fogml.runs.assemble import Assembler, run_from_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.raw_table import RawTable
 from fogml.runs.run import Run
@@ -20,6 +19,10 @@ _FOREIGN = {
     b"PK\x03\x04": "a zip archive or an Excel workbook; save the sheet as CSV",
     b"\x1f\x8b": "compressed by gzip; unpack it first",
     b"\xd0\xcf\x11\xe0": "an old Excel workbook; save the sheet as CSV",
+    b"BZh": "compressed by bzip2; unpack it first",
+    b"\xfd7zXZ": "compressed by xz; unpack it first",
+    b"\x28\xb5\x2f\xfd": "compressed by zstd; unpack it first",
+    b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
     b"%PDF": "a PDF; export the table as CSV",
 }
 
@@ -73,6 +76,8 @@ def read_blocks(path: str | Path, *, block_rows: int = BLOCK_ROWS) -> Iterator[R
     assembler = Assembler(path)
     for table in _table_blocks(path, kind, block_rows):
         yield assembler.block(table)
+    if assembler.samples < 2:
+        raise too_short(path.name, assembler.samples)
 
 
 def file_format(path: Path) -> Format:
@@ -83,17 +88,17 @@ def file_format(path: Path) -> Format:
     InputError
         If it is missing, no file, not readable, empty, or of a known format that holds no run.
     """
-    if not path.exists():
-        raise InputError(f"{path}: no such file")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; name a file")
-    if not os.access(path, os.R_OK):
-        raise InputError(f"{path}: no permission to read it")
     try:
+        if not path.exists():
+            raise InputError(f"{path}: no such file")
+        if path.is_dir():
+            raise InputError(f"{path}: is a folder; name a file")
+        if not path.is_file():
+            raise InputError(f"{path}: is no ordinary file; save the recording to one first")
         with path.open("rb") as file:
             head = file.read(_HEAD_BYTES)
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
+        raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     if not head:
         raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
     if head.startswith(b"PAR1"):

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 from fogml.runs.columns import header
-from fogml.runs.facts import Facts, side_file_text
+from fogml.runs.facts import SIDE_SUFFIXES, Facts, read_side_file, side_file, side_file_text
 from fogml.runs.raw_table import FACTS_KEY
 from fogml.runs.run import Run
 
@@ -30,12 +30,15 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
     """Write a run in the format that the suffix of `path` names; floats keep every digit.
 
     Facts go into a side file of the same stem where there are any, and into the file itself
-    where its format can hold them (Parquet, HDF5, MATLAB).
+    where its format can hold them (Parquet, HDF5, MATLAB). A side file that is there already
+    and states the same facts is left as it is; one that states others is replaced together with
+    the run that it belongs to, and never beside a new one.
 
     Raises
     ------
     InputError
-        If the suffix is not known or the place can't be written.
+        If the suffix is not known, the place can't be written, or a side file of that stem
+        belongs to another run.
     """
     path = Path(path)
     suffix = _checked_suffix(path)
@@ -75,7 +78,7 @@ class BlockWriter:
     Raises
     ------
     InputError
-        If the suffix is another one or the place can't be written.
+        As `write_run`, or if the suffix is another one.
     """
 
     def __init__(self, path: str | Path, facts: Facts | None = None) -> None:
@@ -133,14 +136,21 @@ class BlockWriter:
         if self.path.suffix.lower() == ".parquet":
             import pyarrow.parquet as parquet
 
-            # Byte streams compress recorded floats far better than dictionaries do, and faster.
+            # Byte streams compress recorded floats in less time than writing them plainly takes.
+            # Snappy is read by all other programs; checksums tell damage that reads as a number.
             return parquet.ParquetWriter(
-                self._partial, schema, compression="zstd", use_dictionary=False, use_byte_stream_split=True
+                self._partial,
+                schema,
+                compression="snappy",
+                use_dictionary=False,
+                use_byte_stream_split=True,
+                write_page_checksum=True,
             )
         from pyarrow import csv
 
         plain = not any(mark in name for name in schema.names for mark in ',"\r\n')
-        options = csv.WriteOptions(quoting_style="none" if plain else "needed", batch_size=1 << 16)
+        quoting = "none" if plain else "needed"
+        options = csv.WriteOptions(quoting_style=quoting, quoting_header=quoting, batch_size=1 << 16)
         return csv.CSVWriter(self._partial, schema, write_options=options)
 
     def _append(self, table: Table) -> None:
@@ -152,13 +162,29 @@ class BlockWriter:
 
 @contextmanager
 def _with_side_file(path: Path, facts: Facts) -> Iterator[Path]:
-    """A partial file for `path`, and the side file beside it when that is done."""
+    """A partial file for `path`; the side file, where one is needed, appears just before it."""
+    beside = side_file(path)
     with ExitStack() as stack:
         partial = stack.enter_context(whole_file(path))
-        side = path.with_suffix(".yaml")
-        if facts != Facts():
+        if beside is not None and not _states(path, facts):
+            if not path.exists():
+                raise InputError(
+                    f"{path.name}: beside it would stand {beside.name}, which is there already and does not "
+                    "state the facts of this run; choose another name, or move that file"
+                )
+            stack.enter_context(whole_file(beside)).write_text(side_file_text(facts), encoding="utf-8")
+        elif beside is None and facts != Facts():
+            side = path.with_suffix(SIDE_SUFFIXES[0])
             stack.enter_context(whole_file(side)).write_text(side_file_text(facts), encoding="utf-8")
         yield partial
+
+
+def _states(path: Path, facts: Facts) -> bool:
+    """Whether the side file beside `path` states just these facts."""
+    try:
+        return read_side_file(path) == facts
+    except InputError:
+        return False
 
 
 def _checked_suffix(path: Path) -> str:

@@ -1,0 +1,192 @@
+"""CSV files line by line: slow and exact, to name the place of a fault or to forgive it."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.runs.csv_dialect import CsvDialect, number
+from fogml.runs.findings import Finding
+from fogml.runs.raw_table import RawTable, no_samples, text_column
+
+_CHUNK_ROWS = 1 << 16
+_LONGEST_SHOWN = 40
+
+
+def line_of_row(path: Path, dialect: CsvDialect, row: int) -> int:
+    """Line of a data row, both counted from 1 and 0; blank lines and quoted line ends count as they do."""
+    seen, quoted, line = -1, False, dialect.header_line
+    # Latin-1 decodes any bytes, and keeps line ends and quotation marks as they are.
+    with path.open("r", encoding="latin-1", newline="") as file:
+        for line, text in enumerate(file, start=1):
+            if line <= dialect.header_line:
+                continue
+            seen += not quoted and text not in ("\n", "\r\n", "\r")
+            if seen == row:
+                break
+            quoted ^= text.count('"') % 2 == 1
+    return line
+
+
+@dataclass
+class LineReader:
+    """Reads a CSV file line by line.
+
+    Attributes
+    ----------
+    path, dialect
+        The file.
+    repair
+        Drop rows that can't be read, and count them, instead of raising.
+    dropped
+        How many rows were dropped.
+    first_fault
+        Data row, from 1, and message of the first of them.
+    text_lines
+        Position of a column unknown to the run format to the first line that holds text there.
+    """
+
+    path: Path
+    dialect: CsvDialect
+    repair: bool = False
+    dropped: int = 0
+    first_fault: tuple[int, str] | None = None
+    text_lines: dict[int, int] = field(default_factory=dict)
+
+    def tables(self, rows: int = _CHUNK_ROWS, skip: int = 0) -> Iterator[RawTable]:
+        """Tables of at most `rows` rows, after so many data rows that are skipped.
+
+        Raises
+        ------
+        InputError
+            Naming line and column of the first fault, unless it is repaired.
+        """
+        values: list[list[float]] = []
+        lines: list[int] = []
+        for row, (line, fields) in enumerate(self._records()):
+            if row < skip:
+                continue
+            try:
+                values.append(self._values(fields, line))
+            except _Fault as fault:
+                if not self.repair:
+                    cure = "correct the line, or --repair drops such rows"
+                    raise InputError(f"{self.path.name}, {fault}; {cure}") from None
+                self.first_fault = self.first_fault or (row + 1, str(fault))
+                self.dropped += 1
+                continue
+            lines.append(line)
+            if len(values) == rows:
+                yield self._table(values, lines)
+                values, lines = [], []
+        if values:
+            yield self._table(values, lines)
+
+    def whole(self) -> RawTable:
+        """The whole table, with what was noticed.
+
+        Raises
+        ------
+        InputError
+            As `tables`, or if no row is left.
+        """
+        tables = list(self.tables())
+        if not tables:
+            if self.first_fault is None:
+                raise no_samples(self.path.name)
+            raise InputError(f"{self.path.name}, {self.first_fault[1]}; no row of the file can be read")
+        columns = {cell: np.concatenate([t.columns[cell] for t in tables]) for cell in tables[0].columns}
+        names = [table.row_name for table in tables]
+        lengths = np.cumsum([0, *(len(table) for table in tables)])
+
+        def row_name(i: int) -> str:
+            part = int(np.searchsorted(lengths, i, side="right")) - 1
+            return names[part](int(i - lengths[part]))
+
+        findings = [text_column(self.dialect.name(i)) for i in sorted(self.dialect.text)] + self.findings()
+        return RawTable(
+            self.path.name, self.dialect.cells, columns, row_name=row_name, findings=tuple(findings)
+        )
+
+    def findings(self) -> list[Finding]:
+        """What was noticed so far: rows dropped, text in columns of numbers."""
+        found = [
+            Finding(
+                "text_column",
+                f"column '{self.dialect.name(i)}' holds text, first in line {line}; missing there",
+                column=self.dialect.name(i),
+            )
+            for i, line in sorted(self.text_lines.items())
+        ]
+        if self.first_fault is not None:
+            row, message = self.first_fault
+            message = f"{self.dropped} rows that can't be read dropped, the first: {message}"
+            found.append(Finding("repaired_rows", message, row=row, count=self.dropped))
+        return found
+
+    def _table(self, values: list[list[float]], lines: list[int]) -> RawTable:
+        kept = [i for i in range(len(self.dialect.cells)) if i not in self.dialect.text]
+        table = np.array(values, dtype=np.float64)
+        columns: dict[str, NDArray[np.float64]] = {
+            self.dialect.cells[i]: np.ascontiguousarray(table[:, j]) for j, i in enumerate(kept)
+        }
+        places = np.array(lines)
+        return RawTable(self.path.name, self.dialect.cells, columns, row_name=lambda i: f"line {places[i]}")
+
+    def _records(self) -> Iterator[tuple[int, list[str]]]:
+        """First line and fields of each record; lines of nothing but spaces are none."""
+        dialect = self.dialect
+        with self.path.open("r", encoding=dialect.encoding, errors="replace", newline="") as file:
+            for _ in range(dialect.header_line):
+                file.readline()
+            reader = csv.reader(_without_zero_bytes(file), delimiter=dialect.separator)
+            begin = dialect.header_line + 1
+            try:
+                for fields in reader:
+                    if len(fields) > 1 or (fields and fields[0].strip()):
+                        yield begin, fields
+                    begin = dialect.header_line + reader.line_num + 1
+            except csv.Error as error:
+                raise InputError(
+                    f"{self.path.name}, line {begin}: not readable as CSV ({error}); "
+                    "is a quotation mark not closed there?"
+                ) from None
+
+    def _values(self, fields: Sequence[str], line: int) -> list[float]:
+        dialect = self.dialect
+        width = len(dialect.cells)
+        if len(fields) < width or any(text.strip() for text in fields[width:]):
+            kind = "cut short" if len(fields) < width else "too long"
+            raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind})")
+        values = []
+        for i, text in enumerate(fields[:width]):
+            if i in dialect.text:
+                continue
+            value = number(text, dialect.decimal)
+            if value is None and i in dialect.known:
+                shown = text.strip()[:_LONGEST_SHOWN]
+                mark = "comma" if dialect.decimal == "," else "point"
+                raise _Fault(
+                    f"line {line}, column '{dialect.name(i)}': '{shown}' is not a number "
+                    f"(with a decimal {mark})"
+                )
+            if value is None:
+                self.text_lines.setdefault(i, line)
+                value = np.nan
+            values.append(value)
+        return values
+
+
+class _Fault(Exception):
+    """A row that can't be read."""
+
+
+def _without_zero_bytes(file: Any) -> Iterator[str]:
+    return (line.replace("\x00", "\ufffd") for line in file)
