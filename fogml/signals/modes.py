@@ -20,23 +20,31 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 _CHUNK = 512
+_INVERSE_FACTORIALS = np.array([1.0 / math.factorial(k) for k in range(11)])
+
+
+@njit(cache=True, nogil=True)
+def phi_functions(x: float) -> tuple[float, float, float]:
+    """exp(-x), phi_1 = (1 - exp(-x)) / x and phi_2 = (1 - phi_1) / x, exact to rounding for x >= 0.
+
+    phi_1 is the response of a mode to a constant input of 1 over one step, phi_2 to an input that
+    ramps from 0 to 1, both per step.
+    """
+    if x > 0.05:
+        fall = math.expm1(-x)
+        return 1.0 + fall, -fall / x, (1.0 + fall / x) / x
+    # The closed forms cancel here: phi_2 = 1/2! - x/3! + x^2/4! - ...
+    phi_2 = _INVERSE_FACTORIALS[10]
+    for k in range(9, 1, -1):
+        phi_2 = _INVERSE_FACTORIALS[k] - x * phi_2
+    phi_1 = 1.0 - x * phi_2
+    return 1.0 - x * phi_1, phi_1, phi_2
 
 
 @njit(cache=True, nogil=True)
 def held(rate: float, step: float) -> float:
     """Response after `step` to a constant input of 1: (1 - exp(-rate step)) / rate."""
-    x = rate * step
-    return step if x < 1e-12 else -math.expm1(-x) / rate
-
-
-@njit(cache=True, nogil=True)
-def ramped(rate: float, step: float) -> float:
-    """Response after `step` to an input that goes from 0 to 1: (step - held) / (rate step)."""
-    x = rate * step
-    if x < 1e-3:
-        # The closed form cancels; the next term of the series is below 1e-14.
-        return step * (0.5 - x * (1.0 / 6.0 - x * (1.0 / 24.0 - x * (1.0 / 120.0 - x / 720.0))))
-    return (step - held(rate, step)) / x
+    return step * phi_functions(rate * step)[1]
 
 
 @njit(cache=True, nogil=True)
@@ -137,7 +145,7 @@ def modes_kernel(
     z = np.empty(m)
     _product(to_modes[now], states, z)
     before_t, before = last_time, last_inputs.copy()
-    decay, whole, fade = np.empty(m), np.empty(m), np.empty(m)
+    decay, whole, fade = np.empty(m), np.empty(m), np.zeros(m)
     old, new = np.empty((k, m)), np.empty((k, m))
     modes, source_now = np.empty((m, _CHUNK)), np.empty(_CHUNK)
     step, known = last_step, False
@@ -151,13 +159,13 @@ def modes_kernel(
                 step, known = time[i] - before_t, False
             if not known:
                 for j in range(m):
-                    rate = rates[now, j]
-                    decay[j] = math.exp(-rate * step)
-                    whole[j] = held(rate, step) * source_gains[now, j]
-                    fade[j] = faded(rate, fade_rate, step) * source_gains[now, j]
-                    late = ramped(rate, step)
-                    old[:, j] = gains[now, j] * (held(rate, step) - late)
-                    new[:, j] = gains[now, j] * late
+                    decay[j], phi_1, phi_2 = phi_functions(rates[now, j] * step)
+                    whole[j] = source_gains[now, j] * step * phi_1
+                    if fading != 0.0:
+                        fade[j] = source_gains[now, j] * faded(rates[now, j], fade_rate, step)
+                    for c in range(k):
+                        old[c, j] = gains[now, j, c] * step * (phi_1 - phi_2)
+                        new[c, j] = gains[now, j, c] * step * phi_2
                 known = True
             while window < len(windows) and windows[window, 1] <= before_t:
                 window += 1
