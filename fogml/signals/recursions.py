@@ -1,4 +1,4 @@
-"""Recursions with a memory: first-order lag and play operator, at true times, in one pass.
+"""Recursions with a memory: lag, play operator and sliding windows, at true times, in one pass.
 
 Each kernel takes the state that the samples before left and returns the one that it leaves, so
 that a series may be worked block by block with the same numbers.
@@ -63,3 +63,69 @@ def play_kernel(x: FloatArray, half_width: float, state: float) -> tuple[FloatAr
             s = high
         out[i] = s
     return out, s
+
+
+@njit(cache=True, nogil=True)
+def window_steps_kernel(
+    time: FloatArray, x: FloatArray, window: float, first: int
+) -> tuple[FloatArray, FloatArray]:
+    """Means over the newest window (t - w, t] less those over the window before, of x and of time.
+
+    For the samples from number `first` on; those before are history. Where the window before holds
+    nothing, the newest one is halved; where that can't be, both are 0.
+    """
+    n = len(time)
+    step_x, step_t = np.zeros(n - first), np.zeros(n - first)
+    # Sampling on a regular grid must not fall on either side of a window's edge by rounding.
+    tolerance = 1e-8 * window
+    start, middle, fresh = 0, 0, 0
+    base_x, base_t = 0.0, 0.0
+    new_x, new_t, old_x, old_t = 0.0, 0.0, 0.0, 0.0
+    for i in range(first, n):
+        edge = time[i] - window + tolerance
+        # Sums are taken anew about the latest sample after each window's length: rounding can't
+        # build up, and blocks agree with the whole.
+        anew = i == first or fresh >= max(64, i - start)
+        if anew:
+            fresh = 0
+            base_x, base_t = x[i], time[i]
+            while time[middle] <= edge:
+                middle += 1
+            while time[start] <= edge - window:
+                start += 1
+            new_x, new_t, old_x, old_t = 0.0, 0.0, 0.0, 0.0
+            for j in range(start, middle):
+                old_x += x[j] - base_x
+                old_t += time[j] - base_t
+            for j in range(middle, i + 1):
+                new_x += x[j] - base_x
+                new_t += time[j] - base_t
+        else:
+            fresh += 1
+            new_x += x[i] - base_x
+            new_t += time[i] - base_t
+            while time[middle] <= edge:
+                dx, dt = x[middle] - base_x, time[middle] - base_t
+                new_x -= dx
+                new_t -= dt
+                old_x += dx
+                old_t += dt
+                middle += 1
+            while time[start] <= edge - window:
+                old_x -= x[start] - base_x
+                old_t -= time[start] - base_t
+                start += 1
+        before, newest = middle - start, i + 1 - middle
+        if before > 0:
+            step_x[i - first] = new_x / newest - old_x / before
+            step_t[i - first] = new_t / newest - old_t / before
+        elif newest > 1:
+            half = (start + i + 1) // 2
+            sum_x, sum_t = 0.0, 0.0
+            for j in range(start, half):
+                sum_x += x[j] - base_x
+                sum_t += time[j] - base_t
+            before, newest = half - start, i + 1 - half
+            step_x[i - first] = (new_x - sum_x) / newest - sum_x / before
+            step_t[i - first] = (new_t - sum_t) / newest - sum_t / before
+    return step_x, step_t

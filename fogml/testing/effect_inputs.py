@@ -26,8 +26,9 @@ def standard_inputs() -> dict[str, Inputs]:
     """Inputs by name: a simulated programme, and recordings of several kinds.
 
     ``programme`` has every node and drive, turns, a thermal shock, power-on at the start and a
-    power cycle; ``only T`` is a recording with one sensor and no facts; ``two faces`` one with
-    ``T_in`` and ``T_out``; ``irregular`` has uneven steps and gaps; ``still`` never moves.
+    power cycle; ``horizontal`` is the same with the input axis to the east; ``only T`` is a
+    recording with one sensor and no facts; ``two faces`` one with ``T_in`` and ``T_out``;
+    ``irregular`` has uneven steps and gaps; ``still`` never moves.
     """
     programme = _programme()
     bare = replace(programme, drives={}, facts=Facts(), powered_on_s=-np.inf, power_ons_s=(), earth_deg_h=0.0)
@@ -36,8 +37,10 @@ def standard_inputs() -> dict[str, Inputs]:
     keep = np.sort(rng.permutation(len(programme))[: int(0.8 * len(programme))])
     keep = keep[(keep < 700) | (keep > 760)]
     still = {name: np.full(len(programme), 31.0) for name in nodes}
+    east = programme.facts.model_copy(update={"input_axis": "east"})
     return {
         "programme": programme,
+        "horizontal": replace(programme, facts=east, earth_deg_h=0.0),
         "only T": replace(bare, temperatures={"T": nodes["T"]}, slopes={"T": programme.slopes["T"]}),
         "two faces": replace(bare, temperatures={name: nodes[name] for name in ("T_in", "T_out")}),
         "irregular": rows(programme, keep),
@@ -46,14 +49,15 @@ def standard_inputs() -> dict[str, Inputs]:
 
 
 def _programme() -> Inputs:
-    """25 to -40 to 60 degC and a shock back to 30 degC, about 9 h at 0.1 Hz, turning in the soaks."""
-    points = [(0, 25), (30, 25), (95, -40), (215, -40), (315, 60), (435, 60), (439, 30), (530, 30)]
+    """25 to -40 to 60 degC and a shock to 0 degC, about 9 h at 0.1 Hz, turning in the soaks."""
+    points = [(0, 25), (30, 25), (95, -40), (215, -40), (315, 60), (435, 60), (438, 0), (530, 0)]
     minutes, set_point = np.array(points, dtype=np.float64).T
     time = np.arange(0.0, 60.0 * minutes[-1], SAMPLE_S)
     chamber = np.interp(time / 60.0, minutes, set_point)
     n = len(time)
     nodes = {name: np.ascontiguousarray(values) for name, values in _nodes(time, chamber).items()}
     nodes["T"] = nodes["T_in"]
+    nodes["T_leads"] = 0.5 * (nodes["T_hub"] + nodes["T_electronics"])
     table_rate = np.zeros(n)
     for start, rate in ((60, 10.0), (900, -10.0), (906, 10.0), (2300, 2e-3), (2310, -2e-3), (2400, -100.0)):
         table_rate[start : start + 6] = rate
@@ -70,7 +74,7 @@ def _programme() -> Inputs:
         "B_y": -8.0 + 3.0 * np.cos(2.0 * np.pi * time / 2400.0),
         "B_z": 40.0 + 2.0 * wave**2,
         "shaking": np.abs(wave),
-        "dose": 1.0 + time / 3600.0,
+        "dose": 1.0 + 0.1 * (time / 3600.0) ** 2,
     }
     shaped = 3600.0 * table_rate + 7.5 + 0.02 * (nodes["T"] - 25.0)
     slopes = {"T": 0.02 + 1e-4 * (nodes["T"] - 25.0), "T_in": np.full(n, 0.3), "T_out": np.full(n, -0.3)}
@@ -89,9 +93,9 @@ def _programme() -> Inputs:
 
 
 def _nodes(time: FloatArray, chamber: FloatArray) -> dict[str, FloatArray]:
-    # Half of the usual delays: a shock of the air then still is one for the coil.
+    # A tenth of the usual delays: a shock of the air then still is one for the coil.
     network = standard_network().with_heating(5.0, 8.0, 1200.0)
-    capacities = {name: 0.2 * value for name, value in network.capacities.items()}
+    capacities = {name: 0.1 * value for name, value in network.capacities.items()}
     quick = replace(network, capacities=capacities)
     return quick.temperatures(time, chamber, powered=((0.0, 26400.0), (27000.0, np.inf)))
 
@@ -148,9 +152,8 @@ def scrambled(inputs: Inputs, keep: Collection[str], value: float = np.nan) -> I
         return held if name in keep else (np.nan if np.isnan(value) else held + 100.0 * value)
 
     drives = {name: spoil(column, name) for name, column in inputs.drives.items()}
-    # The angle is the table's, by integration; its own column tells the two apart.
-    if "rate" not in keep and "angle" in keep:
-        drives["angle"] = replace(inputs, memory=Memory(), cache={}).angle_deg
+    # The angle follows from the rate; a column of its own tells the two apart.
+    drives["angle"] = spoil(replace(inputs, memory=Memory(), cache={}).angle_deg, "angle")
     return replace(
         inputs,
         temperatures={name: spoil(column, name) for name, column in inputs.temperatures.items()},

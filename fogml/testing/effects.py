@@ -7,7 +7,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
@@ -77,7 +76,7 @@ def check_effect(effect: Effect | type[Effect]) -> None:
         _check_causality(checked, inputs["programme"])
         _check_blocks(checked, inputs["programme"])
         _check_gap(checked, inputs["programme"])
-        _check_shape(checked, inputs["programme"])
+        _check_shape(checked, inputs)
     _check_amplitude(checked, inputs["programme"])
     _check_registry(checked)
 
@@ -175,7 +174,7 @@ def _check_finite(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
 
 
 def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
-    shape = effect.default_shape()
+    shape = _off_default(effect)
     given = inputs["programme"]
     whole = _signature(effect, given, shape)
     alone = _signature(effect, scrambled(given, keep=effect.needs), shape)
@@ -196,7 +195,7 @@ def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
 
 
 def _check_causality(effect: Effect, inputs: Inputs) -> None:
-    shape = effect.default_shape()
+    shape = _off_default(effect)
     half = len(inputs) // 2 + 7
     whole = _signature(effect, inputs, shape)
     first = _signature(effect, block(inputs, 0, half), shape)
@@ -204,7 +203,7 @@ def _check_causality(effect: Effect, inputs: Inputs) -> None:
 
 
 def _check_blocks(effect: Effect, inputs: Inputs) -> None:
-    shape = effect.default_shape()
+    shape = _off_default(effect)
     memory = Memory()
     edges = [0, *(int(share * len(inputs)) for share in BLOCK_EDGES), len(inputs)]
     pieces = [
@@ -216,7 +215,7 @@ def _check_blocks(effect: Effect, inputs: Inputs) -> None:
 
 def _check_gap(effect: Effect, inputs: Inputs) -> None:
     """Samples that are missing in a soak, where nothing moves, must leave no trace beyond a window."""
-    shape = effect.default_shape()
+    shape = _off_default(effect)
     still, (first, last) = still_stretch(inputs)
     whole = _signature(effect, still, shape)
     cut = _signature(effect, without_rows(still, first, last), shape)
@@ -232,31 +231,44 @@ def _check_gap(effect: Effect, inputs: Inputs) -> None:
     ).max(initial=1e-300), f"{effect.id}: a gap in a ramp makes a spike"
 
 
-def _check_shape(effect: Effect, inputs: Inputs) -> None:
+def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
     for quantity in effect.shape:
-        shape = effect.default_shape()
-        middle = shape[quantity.name]
+        shape = _off_default(effect)
         low, high = quantity.range("tactical")
-        step = 1e-4 * max(abs(middle), 0.1 * (high - low), 1e-6)
-        if middle - step < quantity.limits[0] or middle + step > quantity.limits[1]:
-            middle = float(np.clip(middle, quantity.limits[0] + step, quantity.limits[1] - step))
+        step = 1e-4 * max(abs(shape[quantity.name]), 0.1 * (high - low), 1e-6)
+        least, most = quantity.limits
+        shape[quantity.name] = float(np.clip(shape[quantity.name], least + step, most - step))
+        matters = False
+        for name in ("programme", "horizontal"):
+            coarse = _slope(effect, inputs[name], shape, quantity.name, step)
+            fine = _slope(effect, inputs[name], shape, quantity.name, 0.5 * step)
+            assert np.isfinite(coarse).all(), f"{effect.id}: slope against {quantity.name} is not finite"
+            size, rough = _rms(fine), _rms(coarse - fine)
+            matters = matters or size > 0.0
+            assert rough <= SMOOTHNESS * size, (
+                f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
+            )
+        assert matters, f"{effect.id}: shape parameter {quantity.name} makes no difference"
 
-        def slope(h: float, name: str = quantity.name, at: float = middle, shape: Any = shape) -> FloatArray:
-            above = _signature(effect, inputs, {**shape, name: at + h})
-            below = _signature(effect, inputs, {**shape, name: at - h})
-            return (above - below) / (2.0 * h)
 
-        coarse, fine = slope(step), slope(0.5 * step)
-        assert np.isfinite(coarse).all(), f"{effect.id}: slope against {quantity.name} is not finite"
-        size = float(np.sqrt(np.mean(fine**2)))
-        scale = float(np.abs(_signature(effect, inputs, shape)).max(initial=0.0))
-        assert size * (high - low + abs(middle)) > 1e-9 * scale or size > 0.0, (
-            f"{effect.id}: shape parameter {quantity.name} makes no difference"
-        )
-        rough = float(np.sqrt(np.mean((coarse - fine) ** 2)))
-        assert rough <= SMOOTHNESS * size, (
-            f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
-        )
+def _slope(effect: Effect, inputs: Inputs, shape: Mapping[str, float], name: str, step: float) -> FloatArray:
+    above = _signature(effect, inputs, {**shape, name: shape[name] + step})
+    below = _signature(effect, inputs, {**shape, name: shape[name] - step})
+    return (above - below) / (2.0 * step)
+
+
+def _off_default(effect: Effect) -> dict[str, float]:
+    """Shape parameters a little off their defaults, where zeros and right angles hide nothing."""
+    shape = effect.default_shape()
+    for quantity in effect.shape:
+        low, high = quantity.range("tactical")
+        moved = shape[quantity.name] + 0.13 * (high - low)
+        shape[quantity.name] = float(np.clip(moved, *quantity.limits))
+    return shape
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values * values)))
 
 
 def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
@@ -280,8 +292,8 @@ def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
         step = 1e-6 * effect.amplitude.typical("navigation")
         change = effect.apply(output, _fresh(inputs), step, **shape) - output
         wanted = step * _signature(effect, inputs, shape)
-        slack = 0.02 * float(np.sqrt(np.mean(wanted**2))) + 1e-10 * float(np.abs(output).max())
-        assert float(np.sqrt(np.mean((change - wanted) ** 2))) <= slack, (
+        slack = 0.02 * _rms(wanted) + 1e-10 * float(np.abs(output).max())
+        assert _rms(change - wanted) <= slack, (
             f"{effect.id}: apply is not the amplitude times the signature for a small amplitude"
         )
 
@@ -297,11 +309,11 @@ def _hooks(
     if isinstance(effect, SensorEffect):
         for name in ("T", "T_in", "T_out", "T_electronics"):
             true = inputs.temperatures[name]
-            yield (
-                "sense",
-                lambda a, name=name, true=true: effect.sense(name, true, _fresh(inputs), a, **shape),
-                true,
-            )
+
+            def sensed(a: float, name: str = name, true: FloatArray = true) -> FloatArray:
+                return effect.sense(name, true, _fresh(inputs), a, **shape)
+
+            yield "sense", sensed, true
     if isinstance(effect, LoggerEffect):
         yield "record", lambda a: effect.record(output, _fresh(inputs), a, **shape), output
     if isinstance(effect, ThermalEffect):

@@ -41,8 +41,12 @@ STAND_INS = {
     "T_hub": ("T_in", "T"),
     "T_chamber": ("T_case", "T_out", "T"),
     "T_plate": ("T_chamber", "T_case", "T_out", "T"),
+    "T_leads": (),
 }
-"""The nearest places, nearest first, for one that neither recording nor plant gives."""
+"""The nearest places, nearest first, for one that neither recording nor plant gives.
+
+The names are all those that an effect may ask for; ``T_leads`` are the fibre's ends.
+"""
 
 
 @dataclass(frozen=True, eq=False)

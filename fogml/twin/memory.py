@@ -47,7 +47,7 @@ class Memory:
         takes neighbouring samples. The first sample has rate 0.
         """
         step_x, step_t = self._steps(key, time, x, window_s)
-        return np.divide(60.0 * step_x, step_t, out=np.zeros(len(x)), where=step_t > 0.0)
+        return np.divide(60.0 * step_x, step_t, out=np.zeros(len(step_x)), where=step_t > 0.0)
 
     def difference(self, key: str, time: FloatArray, x: FloatArray, window_s: float) -> FloatArray:
         """Mean of x over the newest `window_s` less that over the window before, shape (n,).
@@ -61,13 +61,21 @@ class Memory:
     ) -> tuple[FloatArray, FloatArray]:
         """Difference of the two windows' means, and of their mean times [s]."""
         old_time, old_x = self._histories.get(key, (np.empty(0), np.empty(0)))
-        all_time, all_x = np.concatenate([old_time, time]), np.concatenate([old_x, x])
-        steps = _neighbours(all_time, all_x) if window_s <= 0.0 else _blocks(all_time, all_x, window_s)
-        past = int(np.searchsorted(all_time, all_time[-1] - 2.0 * window_s)) if len(all_time) else 0
+        if len(time) == 0:
+            return np.empty(0), np.empty(0)
+        all_time = np.concatenate([old_time, time])
+        all_x = np.concatenate([old_x, np.asarray(x, dtype=np.float64)])
+        if window_s > 0.0:
+            from fogml.signals.recursions import window_steps_kernel
+
+            steps = window_steps_kernel(all_time, all_x, window_s, len(old_time))
+        else:
+            steps = _neighbours(all_time, all_x, len(old_time))
+        past = int(np.searchsorted(all_time, all_time[-1] - 2.0 * window_s))
         # One sample more than the windows hold keeps the first rows after a border whole.
         keep = slice(max(0, min(past, len(all_time) - 1) - 1), None)
         self._histories[key] = (all_time[keep].copy(), all_x[keep].copy())
-        return steps[0][len(old_time) :], steps[1][len(old_time) :]
+        return steps
 
     def total(self, key: str, increments: FloatArray) -> FloatArray:
         """Running sum of increments, shape (n,)."""
@@ -78,29 +86,18 @@ class Memory:
 
     def previous(self, key: str, x: FloatArray) -> FloatArray:
         """x one sample earlier; the first sample stands in for the one before it; shape (n,)."""
+        if len(x) == 0:
+            return np.empty(0)
         (before,) = self._states.get(key, (float(x[0]),))
         self._states[key] = (float(x[-1]),)
         return np.concatenate([[before], x[:-1]])
 
+    def first(self, key: str, x: FloatArray) -> float:
+        """The very first sample of x, of all blocks; NaN before there is one."""
+        if len(x) and key not in self._states:
+            self._states[key] = (float(x[0]),)
+        return self._states.get(key, (_NAN,))[0]
 
-def _neighbours(time: FloatArray, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    return np.diff(x, prepend=x[:1]), np.diff(time, prepend=time[:1])
 
-
-def _blocks(time: FloatArray, x: FloatArray, window_s: float) -> tuple[FloatArray, FloatArray]:
-    n = len(time)
-    if n == 0:
-        return np.empty(0), np.empty(0)
-    tolerance = 1e-6 * (float(np.median(np.diff(time[:1000]))) if n > 1 else 1.0)
-    shifted = time - time[0]
-    sum_x = np.concatenate([[0.0], np.cumsum(x - x[0])])
-    sum_t = np.concatenate([[0.0], np.cumsum(shifted)])
-    stop = np.arange(1, n + 1)
-    middle = np.searchsorted(shifted, shifted - window_s + tolerance, side="right")
-    start = np.searchsorted(shifted, shifted - 2.0 * window_s + tolerance, side="right")
-    middle = np.where(middle == start, (start + stop) // 2, middle)
-    told = (stop > middle) & (middle > start)
-    newest, before = np.maximum(stop - middle, 1), np.maximum(middle - start, 1)
-    step_x = (sum_x[stop] - sum_x[middle]) / newest - (sum_x[middle] - sum_x[start]) / before
-    step_t = (sum_t[stop] - sum_t[middle]) / newest - (sum_t[middle] - sum_t[start]) / before
-    return np.where(told, step_x, 0.0), np.where(told, step_t, 0.0)
+def _neighbours(time: FloatArray, x: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
+    return np.diff(x, prepend=x[:1])[first:], np.diff(time, prepend=time[:1])[first:]

@@ -115,12 +115,14 @@ def _modules() -> list[str]:
 
 
 def _built_in(module: str) -> type[Effect]:
-    found = getattr(import_module(f"fogml.twin.effects.{module}"), class_name(module), None)
+    found: type[Effect] | None = getattr(
+        import_module(f"fogml.twin.effects.{module}"), class_name(module), None
+    )
     if found is None or found.id != module:
         raise InputError(
             f"fogml/twin/effects/{module}.py must hold class {class_name(module)} with id '{module}'"
         )
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def _add(declared: Any, origin: str) -> None:

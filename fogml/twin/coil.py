@@ -1,0 +1,182 @@
+"""Thermally induced non-reciprocity of a wound coil: Shupe's integral, windings, layers of fibre.
+
+Light that goes round both ways meets a piece of fibre at different times. Where that piece warms
+at a rate ``Tdot(z)``, the difference reads as a rate of turn
+
+::
+
+    Omega = n / (L D) (dn/dT + n alpha) Int_0^L (2 z - L) Tdot(z) dz
+
+with z the distance along the fibre from one end. Its sign is a convention of direction.
+
+References
+----------
+D. M. Shupe, Applied Optics 19 (1980) 654. N. J. Frigo, SPIE 412 (1983) 268, for windings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+from fogml.twin.optics import DEG_H, REFERENCE_COIL, Coil
+from fogml.twin.plant.network import ThermalNetwork
+
+Winding = Literal["cylinder", "dipole", "quadrupole", "octupole"]
+WINDINGS: tuple[Winding, ...] = get_args(Winding)
+_PER_MINUTE = 1.0 / 60.0
+# Which half of the fibre each layer belongs to, from the innermost outwards, over and over.
+_HALVES = {"dipole": "AB", "quadrupole": "ABBA", "octupole": "ABBABAAB"}
+
+
+def shupe_integral(position: ArrayLike, rate: ArrayLike, coil: Coil = REFERENCE_COIL) -> float:
+    """The rate error [deg/h] of a distribution of temperature rates along the fibre.
+
+    Parameters
+    ----------
+    position
+        Distance z along the fibre [m], increasing from 0 to its length, shape (n,).
+    rate
+        Rate of temperature there [degC/min], linear in between, shape (n,).
+    coil
+        The coil; its length is the last position's.
+    """
+    z = np.asarray(position, dtype=np.float64)
+    slope = np.asarray(rate, dtype=np.float64) * _PER_MINUTE
+    length = float(z[-1] - z[0])
+    lever = 2.0 * (z - z[0]) - length
+    # Exact for rates and levers linear between the positions (Simpson's rule on each piece).
+    middle = 0.25 * (lever[1:] + lever[:-1]) * (slope[1:] + slope[:-1])
+    pieces = (lever[1:] * slope[1:] + lever[:-1] * slope[:-1] + 4.0 * middle) / 6.0
+    factor = coil.index * coil.phase_slope / (length * coil.diameter)
+    return float(factor * np.sum(pieces * np.diff(z)) / DEG_H)
+
+
+def midpoint_sensitivity(coil: Coil = REFERENCE_COIL) -> float:
+    """Rate error per metre of mid-point error and degC/min between coil and leads [deg/h].
+
+    ``2 n (dn/dT + n alpha) / D``: 1.05 for the reference coil.
+    """
+    return 2.0 * coil.index * coil.phase_slope / coil.diameter * _PER_MINUTE / DEG_H
+
+
+def lead_sensitivity(coil: Coil = REFERENCE_COIL) -> float:
+    """Rate error per metre of lead and degC/min of it [deg/h]: half of `midpoint_sensitivity`."""
+    return 0.5 * midpoint_sensitivity(coil)
+
+
+def winding_order(winding: Winding, layers: int = 32) -> NDArray[np.int64]:
+    """Layers in the order in which the fibre passes them, 0 the innermost, shape (layers,).
+
+    A cylinder is wound from one end to the other. The others are wound from the fibre's middle
+    outwards, the halves taking turns: A B (dipole), A B B A (quadrupole), A B B A B A A B (octupole).
+
+    Raises
+    ------
+    InputError
+        For an unknown winding, or a number of layers that is no multiple of its pattern.
+    """
+    if winding not in WINDINGS:
+        raise InputError(f"winding '{winding}' is not known; windings are {', '.join(WINDINGS)}")
+    number = np.arange(layers)
+    if winding == "cylinder":
+        return number
+    pattern = _HALVES[winding]
+    if layers < len(pattern) or layers % len(pattern):
+        raise InputError(f"a {winding} has a multiple of {len(pattern)} layers, not {layers}")
+    first = np.array([half == "A" for half in pattern * (layers // len(pattern))])
+    return np.concatenate([number[first][::-1], number[~first]])
+
+
+def layer_weights(winding: Winding, layers: int = 32, coil: Coil = REFERENCE_COIL) -> FloatArray:
+    """Rate error [deg/h] per degC/min of each layer, innermost first, shape (layers,); adds to 0.
+
+    All layers hold the same length of fibre.
+    """
+    edges = np.linspace(0.0, coil.length, layers + 1)
+    # Integral of 2 z - L over each stretch of fibre.
+    moments = np.diff(edges * edges) - coil.length * np.diff(edges)
+    factor = coil.index * coil.phase_slope / (coil.length * coil.diameter) * _PER_MINUTE / DEG_H
+    weights = np.empty(layers)
+    weights[winding_order(winding, layers)] = factor * moments
+    return weights
+
+
+def radial_sensitivity(winding: Winding, layers: int = 32, coil: Coil = REFERENCE_COIL) -> float:
+    """Rate error per degC/min of T_out - T_in [deg/h], for temperatures linear across the layers."""
+    return float(layer_weights(winding, layers, coil) @ np.linspace(0.0, 1.0, layers))
+
+
+@dataclass(frozen=True)
+class LayeredCoil:
+    """A coil as layers that conduct heat radially from its outer and inner face.
+
+    Attributes
+    ----------
+    winding
+        How the fibre is wound.
+    layers
+        Number of layers; the first and the last one have the faces' temperatures.
+    pitch
+        Distance of neighbouring layers [m].
+    diffusivity
+        Of fibre and adhesive across the layers [m**2/s], 1e-7 to 3e-7.
+    coil
+        Its optics.
+    """
+
+    winding: Winding = "quadrupole"
+    layers: int = 32
+    pitch: float = 0.25e-3
+    diffusivity: float = 2e-7
+    coil: Coil = field(default_factory=Coil)
+
+    def __post_init__(self) -> None:
+        winding_order(self.winding, self.layers)
+        if self.layers < 3 or not (self.pitch > 0.0 and self.diffusivity > 0.0):
+            raise InputError("a layered coil has at least 3 layers, a pitch and a diffusivity above 0")
+
+    @property
+    def settling_s(self) -> float:
+        """Time constant of the slowest change of the profile h**2 / (pi**2 kappa) [s]."""
+        height = self.pitch * (self.layers - 1)
+        return height * height / (np.pi**2 * self.diffusivity)
+
+    @cached_property
+    def network(self) -> ThermalNetwork:
+        """The layers between the faces ``T_in`` and ``T_out`` as a heat network."""
+        inner = [f"layer_{number}" for number in range(2, self.layers)]
+        chain = ["T_in", *inner, "T_out"]
+        conductance = self.diffusivity / self.pitch**2
+        return ThermalNetwork(dict.fromkeys(inner, 1.0), dict.fromkeys(pairwise(chain), conductance))
+
+    def temperatures(self, time: FloatArray, inner: FloatArray, outer: FloatArray) -> FloatArray:
+        """Temperature of each layer [degC], innermost first, shape (n, layers).
+
+        Parameters
+        ----------
+        time
+            Time [s], shape (n,).
+        inner, outer
+            Temperatures of the two faces [degC], shape (n,); linear between the samples.
+        """
+        nodes = self.network.temperatures(time, {"T_in": inner, "T_out": outer})
+        between = [nodes[name] for name in self.network.nodes]
+        return np.column_stack([inner, *between, outer])
+
+    def drift(self, time: FloatArray, inner: FloatArray, outer: FloatArray) -> FloatArray:
+        """Rate error of the winding [deg/h], shape (n,); parameters as in `temperatures`.
+
+        The mean over each step, 0 at the first sample.
+        """
+        weighted = self.temperatures(time, inner, outer) @ layer_weights(self.winding, self.layers, self.coil)
+        drift = np.zeros(len(time))
+        drift[1:] = 60.0 * np.diff(weighted) / np.diff(time)
+        return drift
