@@ -90,14 +90,14 @@ def _reaching(features: Features) -> Features:
     for term in features.terms:
         for atom, power in term.factors:
             highest[atom] = max(highest[atom], power)
-    followed = np.array([highest[atom] == 1 and _is_rate_or_gradient(atom) for atom in features.atoms])
+    followed = np.array([highest[atom] == 1 and is_rate_or_gradient(atom) for atom in features.atoms])
     further = np.where(followed, REACH * box.span, 0.0)
     low, high = (box.low - further).tolist(), (box.high + further).tolist()
     names = [atom.text for atom in features.atoms]
     return Features(features.text).set_box(dict(zip(names, zip(low, high), strict=True)))
 
 
-def _is_rate_or_gradient(atom: Atom) -> bool:
+def is_rate_or_gradient(atom: Atom) -> bool:
     """Whether an atom is a temperature's change in time, or its difference between sensors."""
     weights = [coefficient for _, coefficient in atom.signal.parts]
     between = abs(sum(weights)) <= 1e-9 * sum(abs(weight) for weight in weights)

@@ -10,6 +10,7 @@ from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.network import Network, Solution, solve_network
 
 FloatArray = NDArray[np.float64]
@@ -101,7 +102,8 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
                 setattr(other, name, value)
         shape = self.network_
         other.ridge_ = self.ridge_ * len(target) / self.rows_
-        other._solve(inputs, target, shape.columns, shape.centres, shape.widths)
+        edge = Edge.of(inputs, shape.edge.columns)
+        other._solve(inputs, target, shape.columns, shape.centres, shape.widths, edge)
         return other
 
     def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -111,6 +113,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
             "parameters": {name: _plain(value) for name, value in self.get_params().items()},
             "fitted": {name: _plain(getattr(self, name)) for name in self._saved()},
             "columns": self.network_.columns.tolist(),
+            "edge_columns": self.network_.edge.columns.tolist(),
         }
         return values, self.network_.arrays(self.weights_dtype_)
 
@@ -120,8 +123,10 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         regressor = cls(**values["parameters"])
         for name in cls._saved():
             setattr(regressor, name, values["fitted"][name])
-        columns = np.array(values["columns"], dtype=np.intp)
-        regressor.network_ = Network.from_arrays(columns, arrays)
+        columns, edge_columns = (
+            np.array(values[name], dtype=np.intp) for name in ("columns", "edge_columns")
+        )
+        regressor.network_ = Network.from_arrays(columns, edge_columns, arrays)
         if len(regressor.network_.linear) != regressor.n_features_in_:
             raise ValueError("arrays of the network do not match its number of inputs")
         regressor.solution_ = None
@@ -148,6 +153,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         columns: NDArray[np.intp],
         centres: FloatArray,
         widths: FloatArray,
+        edge: Edge | None = None,
         averaged: tuple[FloatArray, FloatArray] | None = None,
     ) -> None:
         """Solve for the output weights with ``ridge_``, and keep the network, in float32 where harmless.
@@ -156,7 +162,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         smaller there by the root of the number of rows behind each.
         """
         ridge = self.ridge_
-        solution = solve_network(inputs, target, columns, centres, widths, ridge, self._linear_part)
+        solution = solve_network(inputs, target, columns, centres, widths, ridge, self._linear_part, edge)
         rows, means = (inputs, target) if averaged is None else averaged
         values = solution.network(rows, self.threads)
         slow = float(np.sqrt(np.mean((means - values) ** 2) * len(target) / len(means)))

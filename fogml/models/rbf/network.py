@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.objective import LINEAR_PRECISION
 from fogml.models.tall_least_squares import Part, condense
@@ -24,6 +25,8 @@ _FIXED = 1e150  # on the diagonal of the triangle: as good as infinite, and prod
 class Network:
     """``constant + linear . x + sum_j weights_j exp(-|(x - centres_j) / widths_j|^2)``.
 
+    Beyond `edge` it goes on linearly, along its slope at the edge.
+
     Attributes
     ----------
     columns
@@ -32,6 +35,8 @@ class Network:
         Shape (j, d), in the inputs' units.
     weights, linear, constant
         Output weights, shapes (j,) and (k,), and the constant, in the target's unit.
+    edge
+        Range of the inputs that hold a rate.
     """
 
     columns: IndexArray
@@ -40,9 +45,28 @@ class Network:
     weights: FloatArray
     linear: FloatArray
     constant: float
+    edge: Edge = field(default_factory=Edge.none)
 
     def __call__(self, inputs: FloatArray, threads: int | None = None, single: bool = False) -> FloatArray:
         """Value at rows, shape (n,)."""
+        values = self._inside(inputs, threads, single)
+        beyond = self.edge.crossed(inputs)
+        for start in range(0, len(beyond), _PIECE):
+            rows = beyond[start : start + _PIECE]
+            drawn = self.edge.drawn_in(inputs[rows])
+            slope = self._slope(drawn, inputs[rows] - drawn, threads)
+            values[rows] = self._inside(drawn, threads, single) + slope
+        return values
+
+    def _slope(self, inputs: FloatArray, steps: FloatArray, threads: int | None) -> FloatArray:
+        """Derivative at rows along steps, both of shape (n, k); shape (n,)."""
+        seen, moved = inputs[:, self.columns], steps[:, self.columns]
+        inverse = 1.0 / self.widths**2
+        basis = basis_functions(inputs, self.columns, self.centres, self.widths, threads).T
+        along = (moved * seen) @ inverse.T - moved @ (self.centres * inverse).T
+        return np.asarray(steps @ self.linear - 2.0 * (basis * along) @ self.weights)
+
+    def _inside(self, inputs: FloatArray, threads: int | None, single: bool) -> FloatArray:
         return evaluate_network(
             inputs,
             self.columns,
@@ -69,6 +93,7 @@ class Network:
             _single(self.weights),
             _single(self.linear),
             float(np.float32(self.constant)),
+            self.edge,
         )
 
     def arrays(self, dtype: str) -> dict[str, NDArray[Any]]:
@@ -79,19 +104,31 @@ class Network:
             "widths": self.widths.astype(kind),
             "weights": self.weights.astype(kind),
             "linear": np.append(self.linear, self.constant).astype(kind),
+            **self.edge.arrays(),
         }
 
     @classmethod
-    def from_arrays(cls, columns: IndexArray, arrays: dict[str, NDArray[Any]]) -> Network:
-        """The network that `arrays` gave."""
+    def from_arrays(
+        cls, columns: IndexArray, edge_columns: IndexArray, arrays: dict[str, NDArray[Any]]
+    ) -> Network:
+        """The network that `arrays` gave.
+
+        Raises
+        ------
+        ValueError
+            If the arrays do not match each other.
+        """
         values = {name: np.asarray(array, dtype=np.float64) for name, array in arrays.items()}
         linear = values["linear"]
         count, dimensions = len(values["weights"]), len(columns)
         if values["centres"].shape != (count, dimensions) or values["widths"].shape != (count, dimensions):
             raise ValueError("arrays of the network do not match")
-        return cls(
-            columns, values["centres"], values["widths"], values["weights"], linear[:-1], float(linear[-1])
-        )
+        edge = Edge.none()
+        if len(edge_columns):
+            low, high = values["edge"]
+            edge = Edge(edge_columns, low, high)
+        shape = columns, values["centres"], values["widths"]
+        return cls(*shape, values["weights"], linear[:-1], float(linear[-1]), edge)
 
 
 @dataclass(frozen=True)
@@ -137,6 +174,7 @@ def solve_network(
     widths: FloatArray,
     ridge: float,
     linear_part: bool = True,
+    edge: Edge | None = None,
 ) -> Solution:
     """Output weights by least squares with a ridge, over all rows, by QR in float64.
 
@@ -151,9 +189,11 @@ def solve_network(
         Penalty on the square of each output weight, in squared units of the rows' target.
     linear_part
         Whether there is a linear part beside the constant.
+    edge
+        As in `Network`; by default none.
     """
     blank = np.zeros(len(centres)), np.zeros(inputs.shape[1]), 0.0
-    empty = Network(columns, _single(centres), _single(widths), *blank)
+    empty = Network(columns, _single(centres), _single(widths), *blank, edge or Edge.none())
 
     def built(rows: slice) -> FloatArray:
         return _columns(empty, inputs[rows], 1, linear_part)

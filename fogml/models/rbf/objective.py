@@ -52,8 +52,9 @@ class Objective:
 
         -log p = n/2 log(S) + 1/2 log det A - j/2 log ridge,   S = min_w |y - Phi w|^2 + w'Lw
 
-    up to constants (MacKay, Neural Computation 4 (1992) 415). Without evidence only the first term
-    is left, plain variable projection, and the ridge is not to be learned.
+    up to constants (MacKay, Neural Computation 4 (1992) 415). n is the number of rows that count as
+    independent, `share` of all: what is left of neighbouring rows is often alike. Without evidence
+    only the first term is left, plain variable projection, and the ridge is not to be learned.
 
     Parameters
     ----------
@@ -67,6 +68,11 @@ class Objective:
         Where torch computes, and in ``float64`` or ``float32``.
     evidence
         Whether the value is the evidence, rather than the misfit.
+
+    Attributes
+    ----------
+    share
+        Share of the rows that count as independent, 1 unless set.
     """
 
     def __init__(
@@ -90,6 +96,7 @@ class Objective:
 
         self._tensor = tensor
         self._evidence = evidence
+        self.share = 1.0
         # Beyond this the exponential is as good as zero; further down it would turn denormal.
         self._floor = -60.0 if dtype == "float64" else -40.0
         self.rows, self.dimensions = inputs.shape
@@ -137,18 +144,19 @@ class Objective:
         design, factor, weights, least = solved
         own = weights[:count]
         misfit = torch.addmv(self._target, design, weights, alpha=-1.0)
-        value = 0.5 * self.rows * np.log(least)
+        rows = self.share * self.rows
+        value = 0.5 * rows * np.log(least)
         by_ridge = 0.0
         # d value / d design = design A^-1 - (n / S) misfit weights', network columns only.
         if self._evidence:
             inverse = torch.cholesky_inverse(factor)
             value += float(factor.diagonal().log().sum()) - 0.5 * count * shape.log_ridge
             trace = float(inverse.diagonal()[:count].sum())
-            by_ridge = 0.5 * (ridge * (self.rows / least * float(own @ own) + trace) - count)
+            by_ridge = 0.5 * (ridge * (rows / least * float(own @ own) + trace) - count)
             slope = torch.mm(design, inverse[:, :count])
-            slope.addr_(misfit, own, alpha=-self.rows / least)
+            slope.addr_(misfit, own, alpha=-rows / least)
         else:
-            slope = torch.outer(misfit, own).mul_(-self.rows / least)
+            slope = torch.outer(misfit, own).mul_(-rows / least)
         slope.mul_(design[:, :count])
         sums = torch.mm(slope.T, self._moments).double().cpu().numpy()
         square, first, zeroth = np.split(sums, [self.dimensions, 2 * self.dimensions], axis=1)
@@ -163,6 +171,13 @@ class Objective:
         if solved is None:
             return np.zeros(len(shape.centres) + self._linear_columns)
         return np.asarray(solved[2].double().cpu().numpy())
+
+    def residuals(self, shape: Shape) -> FloatArray:
+        """What the solved network leaves of the target, shape (n,)."""
+        torch = self._torch
+        weights = self._tensor(self.weights(shape))
+        left = torch.addmv(self._target, self._design(shape), weights, alpha=-1.0)
+        return np.asarray(left.double().cpu().numpy())
 
     def mean_square(self, shape: Shape, weights: FloatArray) -> float:
         """Mean squared misfit for output weights of one's own, shape (j + p,)."""

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.features.atoms import DEAD_BAND, RATE_UNIT_S
+from fogml.models.box import is_rate_or_gradient
 
 if TYPE_CHECKING:
     from fogml.features.atoms import Atom
@@ -23,23 +24,25 @@ FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
 RATES_THAT_TELL = 3
-"""Distinct rates at one temperature from which their form can be told; standing still counts as one."""
-_SAME = 0.1
+"""Distinct rates at one temperature from which a network may tell how the drift bends with the rate."""
+_SAME = 0.15
 # Rates closer than this share of the fastest are one.
-_SHARE = 0.05
-# Share of the rows that a rate must hold; fewer are passing from one rate to another.
+_SHARE = 0.1
+# Share of the temperature travelled that a rate must hold; less is passing from one rate to another.
 _BINS = 10
-_FEWEST_IN_BIN = 0.01
 
 
 def distinct_rates(rates: ArrayLike, temperature: ArrayLike | None = None) -> int:
-    """Number of distinct rates of temperature, up and down counting as one, standing still as another.
+    """Number of distinct rates at which the temperature moves; up and down at one rate count once.
 
-    A rate counts where at least 5 % of the rows lie within a tenth of the fastest rate, or within
-    the dead band of the direction, of each other. Chambers pass between rates gradually, near the
-    turning points; with temperatures given, rates are counted at each tenth of their span and the
-    median is returned, which is what matters to a function of both: a run up and down at one rate
-    holds one at most temperatures, and two where it soaks too.
+    Rates are one where they differ by less than 15 % of the fastest, or than the dead band of the
+    direction. Each is weighed by the temperature travelled at it, so that a fast ramp counts as
+    much as a slow one over the same span, and counts from 10 % on. Standing still does not count.
+
+    With temperatures given, rates are counted in each tenth of their span and the median is
+    returned. That is what matters to a function of both: chambers change from rate to rate
+    gradually near the turning points, and a programme that crosses one half at one rate and the
+    other half at another tells no more than one rate anywhere.
 
     Parameters
     ----------
@@ -49,30 +52,30 @@ def distinct_rates(rates: ArrayLike, temperature: ArrayLike | None = None) -> in
         Temperatures at the same samples [degC], shape (n,); by default rates are counted over all.
     """
     speed = np.abs(np.asarray(rates, dtype=np.float64))
+    moving = speed > DEAD_BAND
+    speed = speed[moving]
     if speed.size == 0:
         return 0
     width = max(_SAME * float(np.quantile(speed, 0.98)), DEAD_BAND)
     if temperature is None:
-        return _clusters(np.sort(speed), width)
-    degrees = np.asarray(temperature, dtype=np.float64)
-    low, high = np.quantile(degrees, [0.01, 0.99])
-    if high <= low:
-        return _clusters(np.sort(speed), width)
-    label = np.floor((degrees - low) / (high - low) * _BINS).astype(np.intp)
-    fewest = _FEWEST_IN_BIN * len(speed)
-    inside = [speed[label == number] for number in range(_BINS)]
-    counts = [_clusters(np.sort(values), width) for values in inside if len(values) > fewest]
-    return int(np.median(counts)) if counts else _clusters(np.sort(speed), width)
+        return _clusters(speed, width)
+    degrees = np.asarray(temperature, dtype=np.float64)[moving]
+    low, high = float(degrees.min()), float(degrees.max())
+    part = np.floor((degrees - low) / ((high - low) or 1.0) * _BINS).clip(0, _BINS - 1)
+    counts = [_clusters(speed[part == number], width) for number in range(_BINS) if np.any(part == number)]
+    return int(np.median(counts))
 
 
 def _clusters(speed: FloatArray, width: float) -> int:
-    """Number of clusters in sorted values, the densest interval of `width` taken away in turn."""
-    fewest = max(1.0, _SHARE * len(speed))
+    """Number of clusters, the interval of `width` with the largest sum being taken away in turn."""
+    speed = np.sort(speed)
+    least = _SHARE * float(speed.sum())
     count = 0
     while len(speed):
-        held = np.searchsorted(speed, speed + width, side="right") - np.arange(len(speed))
+        sums = np.concatenate([[0.0], np.cumsum(speed)])
+        held = sums[np.searchsorted(speed, speed + width, side="right")] - sums[:-1]
         start = int(np.argmax(held))
-        if held[start] < fewest:
+        if held[start] < least:
             break
         count += 1
         near = (speed > speed[start] - width / 2) & (speed < speed[start] + 1.5 * width)
@@ -80,10 +83,10 @@ def _clusters(speed: FloatArray, width: float) -> int:
     return count
 
 
-def rate_columns(features: Features) -> IndexArray:
-    """Columns of the features that hold a rate, a difference in time or a direction."""
-    moving = [any(atom.operator != "value" for atom in term.atoms) for term in features.terms]
-    return np.flatnonzero(moving)
+def followed_columns(features: Features) -> IndexArray:
+    """Columns of the features that grow with the rate: of a rate, or a difference between sensors."""
+    grows = [any(is_rate_or_gradient(atom) for atom in term.atoms) for term in features.terms]
+    return np.flatnonzero(grows)
 
 
 def training_rates(features: Features, atom_values: FloatArray) -> int | None:
@@ -113,18 +116,19 @@ def restrained_inputs(features: Features, atom_values: FloatArray) -> IndexArray
 
     Returns
     -------
-    Indices of the columns; all of them where there are enough rates, else those without a rate.
+    Indices of the columns; all of them where there are enough rates, else those of the first
+    temperature alone: the others differ from it by the rate.
     """
-    every = np.arange(len(features))
     rates = training_rates(features, atom_values)
     if rates is None or rates >= RATES_THAT_TELL:
-        return every
-    return np.setdiff1d(every, rate_columns(features))
+        return np.arange(len(features))
+    level = next((atom for atom in features.atoms if _is_level(atom)), None)
+    return np.flatnonzero([set(term.atoms) == {level} for term in features.terms])
 
 
 def _is_level(atom: Atom) -> bool:
     """Whether an atom is a temperature rather than a difference of two."""
-    return atom.operator == "value" and "-" not in atom.text
+    return atom.operator == "value" and not is_rate_or_gradient(atom)
 
 
 def _per_minute(atom: Atom, values: FloatArray) -> float:

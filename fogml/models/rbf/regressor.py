@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.blocks import average_in_blocks
 from fogml.models.rbf.fitted import NetworkRegressor
-from fogml.models.rbf.rates import RATES_THAT_TELL, rate_columns, restrained_inputs, training_rates
+from fogml.models.rbf.rates import RATES_THAT_TELL, followed_columns, restrained_inputs, training_rates
 from fogml.models.rbf.search import Frame, Search, SearchSettings
 from fogml.models.rbf.tuning import TuningSettings
 
@@ -28,8 +29,8 @@ SIZES = (16, 32, 64)
 class RBFRegressor(NetworkRegressor):
     """RBF network with own width per centre and input, and a linear part beside it.
 
-    ``y = w0 + a . x + sum_j w_j exp(-|(x - c_j) / s_j|^2)``, the division input by input. Beyond
-    the training rows only the linear part is left.
+    ``y = w0 + a . x + sum_j w_j exp(-|(x - c_j) / s_j|^2)``, the division input by input. Far
+    beyond the training rows only the linear part is left.
 
     Rows are taken to be in order of time. Centres and widths are tuned on averages of blocks of
     time, by L-BFGS on the log evidence with the output weights solved exactly at every step
@@ -56,7 +57,8 @@ class RBFRegressor(NetworkRegressor):
         Indices of the inputs that the network sees; the others enter the linear part only. None: all.
     wide_inputs
         Indices of the inputs that hold a rate, in which the target bends little: widths along them
-        also start e^3 times wider. None: starts are tried input by input.
+        also start e^3 times wider, and beyond the training rows the network goes on linearly along
+        its slope there. None: starts are tried input by input.
     average_rows
         Rows are averaged in blocks down to about this number for tuning.
     width_prior
@@ -72,6 +74,9 @@ class RBFRegressor(NetworkRegressor):
     ----------
     sizes_tried_ : dict
         Objective, less is better, by number of centres.
+    independent_share_ : float
+        Share of the averaged rows that counted as independent: one over the integrated
+        autocorrelation of what the smallest network left.
 
     Further attributes are those of `NetworkRegressor`.
     """
@@ -121,7 +126,7 @@ class RBFRegressor(NetworkRegressor):
         """
         parameters = self.get_params()
         if self.wide_inputs is None:
-            parameters["wide_inputs"] = rate_columns(features).tolist()
+            parameters["wide_inputs"] = followed_columns(features).tolist()
         told: list[str] = []
         if self.network_inputs is None:
             seen = restrained_inputs(features, atom_values)
@@ -131,9 +136,10 @@ class RBFRegressor(NetworkRegressor):
                 network = ", ".join(names[i] for i in seen) or "no input"
                 linear = ", ".join(name for i, name in enumerate(names) if i not in seen)
                 told.append(
-                    f"the training runs hold {training_rates(features, atom_values)} distinct rates of "
-                    f"temperature, {RATES_THAT_TELL} tell how the drift bends with the rate: the network "
-                    f"is of {network} alone, {linear} enter linearly"
+                    "distinct rates of temperature in the training runs: "
+                    f"{training_rates(features, atom_values)}, where {RATES_THAT_TELL} are needed to tell "
+                    f"how the drift bends with the rate. So the network is of {network} alone, and "
+                    f"{linear} linear beside it"
                 )
         regressor = RBFRegressor(**parameters)
         regressor._told = told
@@ -163,6 +169,7 @@ class RBFRegressor(NetworkRegressor):
         frame = Frame.of(inputs, target)
         found = Search(rows, frame, seen, self._settings()).run()
         self.sizes_tried_ = {str(size): value for size, value in found.tried.items()}
+        self.independent_share_ = found.share
         self.ridge_ = float(np.exp(found.shape.log_ridge)) * rows.per_row
         self._solve(
             inputs,
@@ -170,6 +177,7 @@ class RBFRegressor(NetworkRegressor):
             seen,
             frame.shift[seen] + frame.scale[seen] * found.shape.centres,
             frame.scale[seen] * np.exp(found.shape.log_widths),
+            self._edge(inputs, seen),
             (rows.inputs, rows.target),
         )
         self.notes_ = list(getattr(self, "_told", ()))
@@ -181,10 +189,9 @@ class RBFRegressor(NetworkRegressor):
 
     @property
     def linear_beyond(self) -> bool:
-        """Whether rates and differences in time enter linearly, so that the network follows them further."""
+        """Whether the network goes on linearly in rates beyond its training rows."""
         check_is_fitted(self)
-        seen = self.network_.columns
-        return len(seen) == 0 or (self.wide_inputs is not None and not np.isin(seen, self.wide_inputs).any())
+        return self.wide_inputs is not None or len(self.network_.columns) == 0
 
     def describe(self) -> dict[str, Any]:
         """What reports say of the network."""
@@ -194,6 +201,7 @@ class RBFRegressor(NetworkRegressor):
             "network_inputs": self.network_.columns.tolist(),
             "objective": self.objective,
             "sizes_tried": self.sizes_tried_,
+            "independent_share": self.independent_share_,
             "ridge": self.ridge_,
             "noise_std": self.noise_std_,
             "weights_dtype": self.weights_dtype_,
@@ -202,7 +210,7 @@ class RBFRegressor(NetworkRegressor):
 
     @classmethod
     def _saved(cls) -> tuple[str, ...]:
-        return (*super()._saved(), "sizes_tried_")
+        return (*super()._saved(), "sizes_tried_", "independent_share_")
 
     def _seen(self, width: int) -> NDArray[np.intp]:
         """Indices of the network's inputs."""
@@ -212,6 +220,11 @@ class RBFRegressor(NetworkRegressor):
         if seen.size and (seen[0] < 0 or seen[-1] >= width):
             raise InputError(f"network_inputs {list(self.network_inputs)}: there are inputs 0 to {width - 1}")
         return seen
+
+    def _edge(self, inputs: FloatArray, seen: NDArray[np.intp]) -> Edge:
+        """The trained range of the rates; none where the network sees none of them, being linear there."""
+        wide = np.array([] if self.wide_inputs is None else self.wide_inputs, dtype=np.intp)
+        return Edge.of(inputs, wide) if np.isin(seen, wide).any() else Edge.none()
 
     def _settings(self) -> SearchSettings:
         if isinstance(self.centres, str):

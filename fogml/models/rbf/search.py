@@ -26,6 +26,7 @@ _START_ROWS = 1500
 _START_STEPS = 30
 _ROUNDING = 1e-9  # of the target's standard deviation
 _VALIDATION_RIDGE = 1e-6
+_NEARLY_INDEPENDENT = 0.7  # a greater share of independent rows changes nothing
 
 
 @dataclass(frozen=True)
@@ -64,10 +65,12 @@ class SearchSettings:
 
 @dataclass(frozen=True)
 class Found:
-    """The shape kept, and the objective for each size tried (less is better)."""
+    """The shape kept, the objective for each size tried (less is better), and the share of rows
+    that counted as independent."""
 
     shape: Shape
     tried: dict[int, float]
+    share: float
 
 
 class Search:
@@ -91,6 +94,8 @@ class Search:
         self._linear = np.column_stack([inputs, np.ones(len(inputs))])
         self._inputs = np.ascontiguousarray(inputs[:, seen])
         self._target = (rows.target - frame.target_shift) / frame.target_scale
+        self._in_time = rows.in_time
+        self._share = 1.0
         wide = settings.wide_inputs
         self._wide = None if wide is None else np.isin(seen, np.asarray(wide, dtype=np.intp))
 
@@ -100,20 +105,24 @@ class Search:
         most = len(np.unique(self._inputs, axis=0)) // _ROWS_PER_CENTRE
         sizes = sorted({min(size, most) for size in self.settings.sizes} - {0})
         if dimensions == 0 or not sizes or self._linear_suffices():
-            return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0})
-        tried: dict[int, float] = {}
-        best: Shape | None = None
+            return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0}, 1.0)
         with one_blas_thread(), _torch_threads(self.settings.threads or 1):
             widths, log_ridge = self._start(sizes[0])
-            for size in sizes:
+            first = self._tuned(sizes[0], widths, log_ridge)
+            if self._in_time and self.settings.evidence:
+                self._share = independent_share(self._objective_of_all().residuals(first[1]))
+                if self._share < _NEARLY_INDEPENDENT:
+                    first = self._tuned(sizes[0], widths, log_ridge)
+            best = first[1]
+            tried = {sizes[0]: first[0]}
+            for size in sizes[1:]:
                 value, shape = self._tuned(size, widths, log_ridge)
-                if best is None or value < min(tried.values()):
-                    best = shape
+                better = value < min(tried.values())
                 tried[size] = value
-                if value > min(tried.values()):
+                if not better:
                     break
-        assert best is not None
-        return Found(best, tried)
+                best = shape
+        return Found(best, tried, self._share)
 
     def _linear_suffices(self) -> bool:
         """Whether the linear part leaves nothing but rounding."""
@@ -161,6 +170,7 @@ class Search:
         fitted, held = held_out_rows(len(self._target), everything=settings.evidence)
         inputs, linear, target = self._inputs[fitted], self._linear[fitted], self._target[fitted]
         objective = self._objective(inputs, linear, target, evidence=settings.evidence)
+        objective.share = self._share
         if settings.centre_choice == "ols":
             centres = ols_centres(inputs, linear, target, np.exp(log_widths), count)
         else:
@@ -178,11 +188,32 @@ class Search:
             return watch.error, watch.best
         return value, shape
 
+    def _objective_of_all(self) -> Objective:
+        return self._objective(self._inputs, self._linear, self._target, evidence=True)
+
     def _objective(
         self, inputs: FloatArray, linear: FloatArray, target: FloatArray, evidence: bool
     ) -> Objective:
         place = {"device": self.settings.device, "dtype": self.settings.dtype}
         return Objective(inputs, linear, target, evidence=evidence, **place)
+
+
+def independent_share(residuals: FloatArray) -> float:
+    """Share of residuals in order of time that count as independent.
+
+    One over the integrated autocorrelation, ``1 + 2 sum_k rho_k``, summed while pairs of
+    neighbouring terms stay positive (Geyer, Statistical Science 7 (1992) 473).
+    """
+    count = len(residuals)
+    centred = residuals - residuals.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
+    covariance = np.fft.irfft(power)[:count]
+    if not covariance[0] > 0.0:
+        return 1.0
+    correlation = covariance / covariance[0]
+    pairs = correlation[: count // 2 * 2].reshape(-1, 2).sum(axis=1)
+    positive = int(np.argmin(np.append(pairs, -1.0) > 0.0))
+    return float(min(1.0, 1.0 / max(1.0, 2.0 * pairs[:positive].sum() - 1.0)))
 
 
 @contextmanager
