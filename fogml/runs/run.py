@@ -17,11 +17,10 @@ from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number, is_temperature
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
+from fogml.signals.clock import Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-GAP_FACTOR = 3.0
-"""A gap is an interval longer than this many median sample intervals."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,12 +143,11 @@ class Run:
         """
         if name in self.columns and is_temperature(name):
             return self.columns[name]
-        if name == "T":
-            for stand_in in ("T_in", "T1"):
-                if stand_in in self.columns:
-                    return self.temperature("T_in")
-        if name in ("T_in", "T_out"):
-            parity = 1 if name == "T_in" else 0
+        stand_in = "T_in" if name == "T" else name
+        if stand_in in self.columns and is_temperature(stand_in):
+            return self.columns[stand_in]
+        if stand_in in ("T_in", "T_out"):
+            parity = 1 if stand_in == "T_in" else 0
             numbers = {c: coil_sensor_number(c) for c in self.columns}
             sensors = [c for c, number in numbers.items() if number is not None and number % 2 == parity]
             if sensors:
@@ -164,14 +162,19 @@ class Run:
         return means[sensors]
 
     @cached_property
+    def clock(self) -> Clock:
+        """The sample times as the window operators take them."""
+        return Clock(self.time)
+
+    @cached_property
     def sample_s(self) -> float:
         """Median sample interval [s]; 0 for a run of one sample."""
-        return float(np.median(np.diff(self.time))) if len(self) > 1 else 0.0
+        return self.clock.sample_s
 
     @cached_property
     def gap_starts(self) -> NDArray[np.intp]:
         """Indices of the samples that follow a gap longer than 3 median sample intervals."""
-        return np.flatnonzero(np.diff(self.time) > GAP_FACTOR * self.sample_s) + 1
+        return gap_starts(self.time, self.sample_s)
 
     @cached_property
     def stretches(self) -> tuple[slice, ...]:

@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.signals.clock import GAP_SHARE, Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
-GAP_FACTOR = 3.0
-"""An interval longer than this many median sample intervals is a gap."""
 _ROUNDING = 1e-6
 """Share of a sample interval by which a window's edge gives way to rounded times."""
 
@@ -104,9 +103,8 @@ def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[In
     kept = time[first:]
     if len(kept) == 0:
         return none, none
-    intervals = np.diff(kept)
-    sample_s = float(np.median(intervals)) if len(intervals) else 0.0
-    cuts = np.flatnonzero(intervals > max(GAP_FACTOR * sample_s, window_s / 4)) + 1
+    sample_s = Clock(kept).sample_s
+    cuts = gap_starts(kept, sample_s, GAP_SHARE * window_s)
     edges = np.concatenate(([0], cuts, [len(kept)]))
     if start is None:
         origin: FloatArray | float = np.repeat(kept[edges[:-1]], np.diff(edges))

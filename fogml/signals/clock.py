@@ -83,6 +83,21 @@ class Clock:
         return interval
 
 
+def gap_starts(time: FloatArray, sample_s: float, longest_s: float = 0.0) -> NDArray[np.intp]:
+    """Indices of the samples that follow a gap longer than `longest_s`.
+
+    Parameters
+    ----------
+    time
+        Sample times [s], shape (n,).
+    sample_s
+        Nominal sample interval [s]; an interval is a gap if longer than three of them.
+    longest_s
+        Longest interval [s] that counts as none.
+    """
+    return np.flatnonzero(np.diff(time) > max(GAP_INTERVALS * sample_s, longest_s)) + 1
+
+
 def longest_gap_s(window_s: float, sample_s: float) -> float:
     """Longest interval [s] that a window of `window_s` may span."""
     return max(GAP_SHARE * window_s, GAP_INTERVALS * sample_s)
