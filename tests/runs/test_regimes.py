@@ -274,4 +274,4 @@ def test_any_staircase_is_covered_and_told(levels, soak, rate, sample_s, seed):
     assert segments[-1][2] == len(run)
     assert all(a[2] == b[1] and a[0] != b[0] for a, b in pairwise(segments))
     assert {name for name, *_ in segments} <= set(Regimes.names)
-    check(run, truth, 1.5 + 2 * sample_s / 60 + 0.3 / rate)
+    check(run, truth, 1.5 + 4 * sample_s / 60 + 0.3 / rate)
