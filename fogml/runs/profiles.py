@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
@@ -40,7 +41,8 @@ def import_recording(
     -------
     list of Run
         One for each leg and axis, named ``STEM[-LEG][-AXIS]``, in the internal units of the run
-        format. Time begins at 0 in each; every row left out is counted in the findings.
+        format. Time begins at 0 in each; every row left out is counted in the findings, which also
+        hold what `check_run` noticed.
 
     Raises
     ------
@@ -104,7 +106,8 @@ def runs_from_table(
             _check_clock(columns["time"], table.rows[part], file)
             run_facts = _facts(profile, this_axis, facts)
             runs.append(Run(name, columns, run_facts, findings=(*table.findings, *findings)))
-    return [_with_unit(run, profile) for run in runs]
+    runs = [_with_unit(run, profile) for run in runs]
+    return [run.with_findings(check_run(run)) for run in runs]
 
 
 def _check_axis(profile: ImportProfile, axis: str | None) -> None:
