@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import csv
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.raw_table import wanted_cells
 
 SEPARATORS = (",", ";", "\t")
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
@@ -38,6 +39,8 @@ class CsvDialect:
         Empty fields that each line has beyond the header's, from separators at its end.
     text
         Positions of columns unknown to the run format that hold text.
+    unwanted
+        Positions of other columns that are not read.
     """
 
     separator: str
@@ -47,11 +50,22 @@ class CsvDialect:
     cells: tuple[str, ...]
     blanks: int = 0
     text: frozenset[int] = frozenset()
+    unwanted: frozenset[int] = frozenset()
+
+    @cached_property
+    def read(self) -> tuple[int, ...]:
+        """Positions of the columns that are read."""
+        return tuple(i for i in range(len(self.cells)) if i not in self.text | self.unwanted)
 
     @cached_property
     def known(self) -> frozenset[int]:
         """Positions of the columns of the run format."""
         return frozenset(i for i, cell in enumerate(self.cells) if column_spec(parse_header(cell)[0]))
+
+    def only(self, columns: Collection[str] | None) -> CsvDialect:
+        """The dialect for reading time, gyro and these columns; all of them for None."""
+        wanted = wanted_cells(self.cells, columns)
+        return replace(self, unwanted=frozenset(i for i, c in enumerate(self.cells) if c not in wanted))
 
     def name(self, i: int) -> str:
         """Name of the column at a position."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
+from fogml.runs.csv_end import cut_error, cut_line, note_of_end
 from fogml.runs.csv_lines import LineReader, line_of_row
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
@@ -41,14 +41,25 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
         # Arrow is fast and strict; line by line tells where the fault is, or forgives it.
-        return LineReader(path, dialect, repair).whole().noting(_unfinished(path))
-    if table.num_rows == 0:
-        raise no_samples(path.name)
-    return _raw(path, dialect, table, 0).noting(_unfinished(path))
+        whole = LineReader(path, dialect, repair).whole()
+    else:
+        if table.num_rows == 0:
+            raise no_samples(path.name)
+        whole = _raw(path, dialect, table, 0)
+    cut = cut_line(path, dialect)
+    if cut is None:
+        return whole.noting(note_of_end(path))
+    if not repair:
+        raise cut_error(path, cut)
+    message = f"the last row, cut off in the middle of a number, dropped: {whole.row_name(len(whole) - 1)}"
+    note = Finding("repaired_rows", message, row=len(whole))
+    return next(whole.blocks(max(len(whole) - 1, 1))).noting([note])
 
 
-def csv_blocks(path: Path, rows: int) -> Iterator[RawTable]:
+def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) -> Iterator[RawTable]:
     """The table of a CSV file in blocks of rows; no repair.
+
+    Only time, gyro and `columns` are read where these are given.
 
     Raises
     ------
@@ -58,14 +69,16 @@ def csv_blocks(path: Path, rows: int) -> Iterator[RawTable]:
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
-    dialect = csv_dialect(path)
+    dialect = csv_dialect(path).only(columns)
+    if (cut := cut_line(path, dialect)) is not None:
+        raise cut_error(path, cut)
     start = 0
     try:
         with arrow_csv.open_csv(path, **_options(dialect, _STREAM_BYTES)) as reader:
             for table in _regrouped(reader, rows):
                 raw = _raw(path, dialect, table, start)
                 start += table.num_rows
-                yield raw if start > table.num_rows else raw.noting(_unfinished(path))
+                yield raw if start > table.num_rows else raw.noting(note_of_end(path))
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
@@ -102,7 +115,7 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
 
     width = len(dialect.cells)
     names = [str(i) for i in range(width + dialect.blanks)]
-    kinds = {str(i): arrow.float64() for i in range(width) if i not in dialect.text}
+    kinds = {str(i): arrow.float64() for i in dialect.read}
     # Anything in the empty fields at a line's end is a fault, which no column takes.
     blanks = dict.fromkeys(names[width:], arrow.null())
     spellings = {spelling for word in MISSING for spelling in (word, word.upper(), word.capitalize())}
@@ -123,8 +136,7 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
 
 
 def _raw(path: Path, dialect: CsvDialect, table: Table, start: int) -> RawTable:
-    kept = [i for i in range(len(dialect.cells)) if i not in dialect.text]
-    columns = {dialect.cells[i]: np.asarray(table.column(str(i)).to_numpy()) for i in kept}
+    columns = {dialect.cells[i]: np.asarray(table.column(str(i)).to_numpy()) for i in dialect.read}
     return RawTable(
         path.name,
         dialect.cells,
@@ -132,16 +144,6 @@ def _raw(path: Path, dialect: CsvDialect, table: Table, start: int) -> RawTable:
         row_name=lambda i: f"line {line_of_row(path, dialect, start + i)}",
         findings=tuple(text_column(dialect.name(i)) for i in sorted(dialect.text)),
     )
-
-
-def _unfinished(path: Path) -> list[Finding]:
-    """A note where the last line has no end: a recording cut there reads as a shorter number."""
-    with path.open("rb") as file:
-        file.seek(-1, os.SEEK_END)
-        if file.read(1) in b"\r\n":
-            return []
-    message = "the last line has no line end; if the recording was cut there, its last value may be cut too"
-    return [Finding("unfinished_line", message)]
 
 
 def _unreadable(path: Path, error: OSError) -> InputError:

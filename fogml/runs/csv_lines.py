@@ -132,10 +132,9 @@ class LineReader:
         return found
 
     def _table(self, values: list[list[float]], lines: list[int]) -> RawTable:
-        kept = [i for i in range(len(self.dialect.cells)) if i not in self.dialect.text]
         table = np.array(values, dtype=np.float64)
         columns: dict[str, NDArray[np.float64]] = {
-            self.dialect.cells[i]: np.ascontiguousarray(table[:, j]) for j, i in enumerate(kept)
+            self.dialect.cells[i]: np.ascontiguousarray(table[:, j]) for j, i in enumerate(self.dialect.read)
         }
         places = np.array(lines)
         return RawTable(self.path.name, self.dialect.cells, columns, row_name=lambda i: f"line {places[i]}")
@@ -166,9 +165,8 @@ class LineReader:
             kind = "cut short" if len(fields) < width else "too long"
             raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind})")
         values = []
-        for i, text in enumerate(fields[:width]):
-            if i in dialect.text:
-                continue
+        for i in dialect.read:
+            text = fields[i]
             value = number(text, dialect.decimal)
             if value is None and i in dialect.known:
                 shown = text.strip()[:_LONGEST_SHOWN]

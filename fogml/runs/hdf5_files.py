@@ -1,13 +1,17 @@
 """HDF5 files: one dataset per column, at the root or in a group ``run``.
 
-A dataset is named ``name [unit]``, or ``name`` with an attribute ``unit``. Set-up facts stand as JSON
-in the attribute ``fogml.facts`` of the same group.
+A dataset is named ``name [unit]``, or ``name`` with an attribute ``unit``. Set-up facts are attributes of
+the same group: JSON in ``fogml.facts``, as `write_run` puts them, or one attribute per fact. With h5py::
+
+    with h5py.File("run.h5", "w") as file:
+        file["time [s]"], file["gyro [deg/h]"], file["T_in [degC]"] = time, gyro, temperature
+        file.attrs["unit"], file.attrs["axis"], file.attrs["latitude"] = "FOG-0417", "x", 39.9
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -21,9 +25,10 @@ from fogml.runs.raw_table import (
     RawTable,
     axis_of_samples,
     choose_vectors,
-    facts_from_json,
+    embedded_facts,
     first_line,
     named_from,
+    wanted_cells,
 )
 from fogml.runs.run import Run
 
@@ -56,8 +61,10 @@ def read_hdf5(path: Path) -> RawTable:
     return next(hdf5_blocks(path, None))
 
 
-def hdf5_blocks(path: Path, rows: int | None) -> Iterator[RawTable]:
+def hdf5_blocks(path: Path, rows: int | None, columns: Collection[str] | None = None) -> Iterator[RawTable]:
     """The table of an HDF5 file in blocks of `rows` rows; all at once for None.
+
+    Only time, gyro and `columns` are read where these are given.
 
     Raises
     ------
@@ -76,8 +83,10 @@ def hdf5_blocks(path: Path, rows: int | None) -> Iterator[RawTable]:
                     f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'"
                 )
             datasets, findings = choose_vectors(path.name, found)
-            text = group.attrs.get(FACTS_KEY)
-            facts = None if text is None else facts_from_json(text, f"{path.name}, facts in the attributes")
+            stated = {key: _plain(value) for key, value in group.attrs.items()}
+            facts = embedded_facts(stated, f"{path.name}, facts in the attributes")
+            wanted = wanted_cells((cell for cell, _ in datasets), columns)
+            datasets = [(cell, item) for cell, item in datasets if cell in wanted]
             cells = tuple(cell for cell, _ in datasets)
             count = max((max(item.shape) for _, item in datasets), default=0)
             step = rows or max(count, 1)
@@ -96,6 +105,13 @@ def _samples(dataset: Any, start: int, stop: int) -> NDArray[np.float64]:
     along = axis_of_samples(dataset.shape)
     part = tuple(slice(start, stop) if axis == along else 0 for axis in range(dataset.ndim))
     return np.asarray(dataset[part], dtype=np.float64)
+
+
+def _plain(value: Any) -> Any:
+    """An attribute of one value as Python's own type, None for an array."""
+    if isinstance(value, str | bytes):
+        return value
+    return value.item() if getattr(value, "size", 0) == 1 else None
 
 
 def _cell(name: str, dataset: Any) -> str:

@@ -1,8 +1,11 @@
-"""Parquet files: columns named ``name [unit]``, set-up facts as JSON in the schema metadata."""
+"""Parquet files: columns named ``name [unit]``, set-up facts in the schema metadata.
+
+Facts stand there as JSON under ``fogml.facts``, as `write_run` puts them, or one key per fact.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,12 +16,12 @@ from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import Facts
 from fogml.runs.raw_table import (
-    FACTS_KEY,
     RawTable,
-    facts_from_json,
+    embedded_facts,
     first_line,
     named_from,
     text_column,
+    wanted_cells,
 )
 
 if TYPE_CHECKING:
@@ -43,8 +46,10 @@ def read_parquet(path: Path) -> RawTable:
             raise _damaged(path, error) from None
 
 
-def parquet_blocks(path: Path, rows: int) -> Iterator[RawTable]:
+def parquet_blocks(path: Path, rows: int, columns: Collection[str] | None = None) -> Iterator[RawTable]:
     """The table of a Parquet file in blocks of at most `rows` rows, in bounded memory.
+
+    Only time, gyro and `columns` are read where these are given.
 
     Raises
     ------
@@ -57,7 +62,8 @@ def parquet_blocks(path: Path, rows: int) -> Iterator[RawTable]:
     # Buffering ahead would hold whole row groups of every column: memory grows with the file.
     with _opened(path) as file:
         try:
-            for batch in file.iter_batches(batch_size=rows):
+            wanted = wanted_cells(file.schema_arrow.names, columns)
+            for batch in file.iter_batches(batch_size=rows, columns=wanted):
                 table = arrow.Table.from_batches([batch])
                 yield _raw(path.name, table, start)
                 start += len(batch)
@@ -132,5 +138,5 @@ def _numbers(values: ChunkedArray) -> NDArray[np.float64] | None:
 
 def facts_of_schema(schema: Schema, file: str) -> Facts | None:
     """Set-up facts in a schema's metadata, or None."""
-    text = (schema.metadata or {}).get(FACTS_KEY.encode())
-    return None if text is None else facts_from_json(text, f"{file}, facts in the metadata")
+    metadata = {key.decode("utf-8", errors="replace"): text for key, text in (schema.metadata or {}).items()}
+    return embedded_facts(metadata, f"{file}, facts in the metadata")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -47,6 +47,42 @@ def facts_from_json(text: str | bytes, source: str) -> Facts:
     except (TypeError, ValueError, RecursionError):
         raise InputError(f"{source}: the set-up facts are not JSON; write the file again") from None
     return facts_from(values, source)
+
+
+def embedded_facts(values: Mapping[str, Any], source: str) -> Facts | None:
+    """Set-up facts among a file's metadata: JSON under `FACTS_KEY`, else one key per fact.
+
+    Keys that are no facts belong to others and are left alone. `scale_factor` and a heading
+    stand as JSON text.
+
+    Raises
+    ------
+    InputError
+        If a fact's value is not accepted.
+    """
+    if FACTS_KEY in values:
+        return facts_from_json(values[FACTS_KEY], source)
+    stated: dict[str, Any] = {}
+    for key in Facts.model_fields:
+        value = values.get(key)
+        if isinstance(value, bytes):
+            value = value.decode("utf-8", errors="replace")
+        if isinstance(value, str) and value.lstrip().startswith("{"):
+            try:
+                value = json.loads(value)
+            except ValueError:
+                raise InputError(f"{source}, key '{key}': not readable as JSON: {value[:80]}") from None
+        if value is not None:
+            stated[key] = value
+    return facts_from(stated, source) if stated else None
+
+
+def wanted_cells(cells: Iterable[str], names: Collection[str] | None) -> list[str]:
+    """The header cells of time, gyro and the columns `names`; all of them for None."""
+    if names is None:
+        return list(cells)
+    wanted = {"time", "gyro", *names}
+    return [cell for cell in cells if parse_header(cell)[0] in wanted]
 
 
 def first_line(error: BaseException) -> str:

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 from fogml.errors import InputError
 from fogml.runs.assemble import Assembler, run_from_table, too_short
 from fogml.runs.checks import check_run
-from fogml.runs.raw_table import RawTable
+from fogml.runs.columns import parse_header
+from fogml.runs.raw_table import RawTable, wanted_cells
 from fogml.runs.run import Run
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
 BLOCK_ROWS = 1_000_000
 _HEAD_BYTES = 1024
+_LABELS: dict[Format, str] = {"csv": "CSV", "parquet": "Parquet", "hdf5": "HDF5", "mat": "MATLAB"}
+_SUFFIXES: dict[str, Format] = {
+    ".csv": "csv",
+    ".tsv": "csv",
+    ".parquet": "parquet",
+    ".pq": "parquet",
+    ".h5": "hdf5",
+    ".hdf5": "hdf5",
+    ".mat": "mat",
+}
 _FOREIGN = {
     b"PK\x03\x04": "a zip archive or an Excel workbook; save the sheet as CSV",
     b"\x1f\x8b": "compressed by gzip; unpack it first",
@@ -28,7 +40,7 @@ _FOREIGN = {
 
 
 def read_run(path: str | Path, *, repair: bool = False, name: str | None = None) -> Run:
-    """Read a run from CSV, Parquet, HDF5 or MATLAB, told apart by content.
+    """Read a run from CSV, Parquet, HDF5 or MATLAB, told by content and suffix.
 
     Set-up facts come from the side file of the same stem, else from the file itself.
 
@@ -58,23 +70,45 @@ def read_run(path: str | Path, *, repair: bool = False, name: str | None = None)
     return run.with_findings(check_run(run))
 
 
-def read_blocks(path: str | Path, *, block_rows: int = BLOCK_ROWS) -> Iterator[Run]:
+def read_blocks(
+    path: str | Path, *, columns: Collection[str] | None = None, block_rows: int = BLOCK_ROWS
+) -> Iterator[Run]:
     """Read a run in blocks of at most `block_rows` rows, in bounded memory.
 
     Blocks share name and facts. Order of time is checked across their borders. MATLAB files are
     read whole and then cut.
 
+    Parameters
+    ----------
+    path
+        The file.
+    columns
+        Names of the columns to read beside time and gyro; all by default. Faults of others are
+        not met.
+    block_rows
+        Most rows of a block.
+
+    Yields
+    ------
+    Run
+        The next rows.
+
     Raises
     ------
     InputError
-        As `read_run`; a fault in a later block is met when that block is asked for.
+        As `read_run`, and if a column of `columns` is not there; a fault in a later block is met
+        when that block is asked for.
     """
     path = Path(path)
     kind = file_format(path)
     if block_rows < 1:
         raise InputError(f"{block_rows} rows a block: at least 1 is needed")
     assembler = Assembler(path)
-    for table in _table_blocks(path, kind, block_rows):
+    for table in _table_blocks(path, kind, block_rows, columns):
+        held = [parse_header(cell)[0] for cell in table.columns]
+        missing = [column for column in columns or () if column not in held]
+        if missing:
+            raise InputError(f"{path.name}: no column '{missing[0]}' of numbers; it holds {', '.join(held)}")
         yield assembler.block(table)
     if assembler.samples < 2:
         raise too_short(path.name, assembler.samples)
@@ -86,8 +120,24 @@ def file_format(path: Path) -> Format:
     Raises
     ------
     InputError
-        If it is missing, no file, not readable, empty, or of a known format that holds no run.
+        If it is missing, no file, not readable, empty, of a known format that holds no run, or
+        of another format than its suffix says.
     """
+    kind = _format_of_content(path)
+    stated = _SUFFIXES.get(path.suffix.lower(), kind)
+    if stated == kind:
+        return kind
+    if kind == "csv":
+        label = _LABELS[stated]
+        raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
+    right = next(suffix for suffix, of_suffix in _SUFFIXES.items() if of_suffix == kind)
+    raise InputError(
+        f"{path.name}: is a {_LABELS[kind]} file by its content, and named as {_LABELS[stated]}; rename it to "
+        f"'{path.stem}{right}'"
+    )
+
+
+def _format_of_content(path: Path) -> Format:
     try:
         if not path.exists():
             raise InputError(f"{path}: no such file")
@@ -110,15 +160,6 @@ def file_format(path: Path) -> Format:
     for magic, what in _FOREIGN.items():
         if head.startswith(magic):
             raise InputError(f"{path.name}: is {what}")
-    by_suffix: dict[str, tuple[Format, str]] = {
-        ".parquet": ("parquet", "Parquet"),
-        ".h5": ("hdf5", "HDF5"),
-        ".hdf5": ("hdf5", "HDF5"),
-        ".mat": ("mat", "MATLAB"),
-    }
-    if path.suffix.lower() in by_suffix:
-        label = by_suffix[path.suffix.lower()][1]
-        raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
     return "csv"
 
 
@@ -141,18 +182,20 @@ def _read_table(path: Path, kind: Format, repair: bool) -> RawTable:
     return read_mat(path)
 
 
-def _table_blocks(path: Path, kind: Format, rows: int) -> Iterator[RawTable]:
+def _table_blocks(path: Path, kind: Format, rows: int, columns: Collection[str] | None) -> Iterator[RawTable]:
     if kind == "csv":
         from fogml.runs.csv_files import csv_blocks
 
-        yield from csv_blocks(path, rows)
+        yield from csv_blocks(path, rows, columns)
     elif kind == "parquet":
         from fogml.runs.parquet_files import parquet_blocks
 
-        yield from parquet_blocks(path, rows)
+        yield from parquet_blocks(path, rows, columns)
     elif kind == "hdf5":
         from fogml.runs.hdf5_files import hdf5_blocks
 
-        yield from hdf5_blocks(path, rows)
+        yield from hdf5_blocks(path, rows, columns)
     else:
-        yield from _read_table(path, kind, repair=False).blocks(rows)
+        table = _read_table(path, kind, repair=False)
+        wanted = wanted_cells(table.columns, columns)
+        yield from replace(table, columns={cell: table.columns[cell] for cell in wanted}).blocks(rows)
