@@ -289,10 +289,10 @@ def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
     if isinstance(effect, LoopEffect):
         output = inputs.output
         assert output is not None
-        step = 1e-6 * effect.amplitude.typical("navigation")
+        step = 1e-3 * effect.amplitude.typical("navigation")
         change = effect.apply(output, _fresh(inputs), step, **shape) - output
         wanted = step * _signature(effect, inputs, shape)
-        slack = 0.02 * _rms(wanted) + 1e-10 * float(np.abs(output).max())
+        slack = 0.02 * _rms(wanted) + 1e-14 * float(np.abs(output).max())
         assert _rms(change - wanted) <= slack, (
             f"{effect.id}: apply is not the amplitude times the signature for a small amplitude"
         )

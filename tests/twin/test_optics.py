@@ -1,0 +1,90 @@
+"""Optics of the reference coil against the catalogue's worked numbers and plain derivations."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from fogml.errors import InputError
+from fogml.twin.optics import (
+    REFERENCE_COIL,
+    Coil,
+    Receiver,
+    phase_noise_to_walk,
+    polarization_period,
+    relative_intensity_noise,
+)
+
+
+def test_worked_numbers_of_the_reference_coil() -> None:
+    coil = REFERENCE_COIL
+    assert coil.sagnac_s == pytest.approx(1.352, abs=5e-4)
+    assert 1e6 * coil.phase_per_deg_h == pytest.approx(6.56, abs=5e-3)
+    assert 1e6 * coil.transit_s == pytest.approx(4.845, abs=5e-4)
+    assert 1e-3 * coil.proper_frequency_hz == pytest.approx(103.2, abs=0.05)
+    assert coil.fringe_offset_deg_s == pytest.approx(266.0, abs=0.5)
+    assert math.radians(coil.fringe_offset_deg_s) == pytest.approx(4.65, abs=5e-3)
+    assert 1e6 * coil.proper_frequency_slope == pytest.approx(7.0, abs=0.5)
+
+
+def test_reset_rate() -> None:
+    assert REFERENCE_COIL.reset_rate_hz(7.5) == pytest.approx(1.6, abs=0.05)
+    assert REFERENCE_COIL.reset_rate_hz(36000.0) == pytest.approx(7750.0, abs=5.0)
+
+
+def test_reset_rate_is_the_ramp_that_cancels_the_sagnac_phase() -> None:
+    coil, rate_deg_h = Coil(length=2300.0, diameter=0.07), 1234.0
+    # A serrodyne of slope s gives a phase difference s * transit; one reset takes 2 pi of the ramp.
+    slope = coil.phase_per_deg_h * rate_deg_h / coil.transit_s
+    assert coil.reset_rate_hz(rate_deg_h) == pytest.approx(slope / (2.0 * math.pi), rel=1e-12)
+
+
+def test_sagnac_constant_from_path_difference() -> None:
+    coil = Coil(length=500.0, diameter=0.2, wavelength=1310e-9)
+    turns = coil.length / (math.pi * coil.diameter)
+    area = turns * math.pi * (0.5 * coil.diameter) ** 2
+    seconds = 4.0 * area / 299792458.0**2  # time between the two arrivals for 1 rad/s
+    light = 2.0 * math.pi * 299792458.0 / coil.wavelength
+    assert coil.sagnac_s == pytest.approx(light * seconds, rel=1e-12)
+
+
+def test_polarisation_period() -> None:
+    assert polarization_period(1.0) == pytest.approx(3.1, abs=0.05)
+    assert polarization_period(0.3) == pytest.approx(10.3, abs=0.05)
+    assert polarization_period(1.0, birefringence_slope=-5e-7) == polarization_period(1.0)
+
+
+@pytest.mark.parametrize(("depth", "walk"), [(0.5, 1.65e-3), (0.75, 7.2e-4), (0.875, 4.6e-4)])
+def test_angle_random_walk_of_photon_noise(depth: float, walk: float) -> None:
+    found = Receiver().angle_random_walk(REFERENCE_COIL, 20e-6, depth * math.pi)
+    assert found == pytest.approx(walk, rel=0.015)
+
+
+def test_excess_noise() -> None:
+    assert 10.0 * math.log10(relative_intensity_noise(10e-9)) == pytest.approx(-121.0, abs=0.1)
+
+
+def test_how_each_noise_follows_the_power() -> None:
+    depth = 0.75 * math.pi
+    broad = Receiver(line_width=1e3)  # no excess noise
+
+    def walk(receiver: Receiver, power: float) -> float:
+        return receiver.angle_random_walk(REFERENCE_COIL, power, depth)
+
+    assert walk(Receiver(), 1e-2) == pytest.approx(walk(Receiver(), 2e-2), rel=0.01)  # excess
+    cold = Receiver(line_width=1e3, resistance=1e15)
+    assert walk(cold, 1e-5) == pytest.approx(math.sqrt(2.0) * walk(cold, 2e-5), rel=1e-6)  # shot
+    assert walk(broad, 1e-9) == pytest.approx(2.0 * walk(broad, 2e-9), rel=0.01)  # thermal
+
+
+def test_walk_of_a_phase_density() -> None:
+    # One-sided 2 x (K_S rad)**2/Hz is 1 (rad/s)**2/Hz two-sided: 1 rad/sqrt(s), 60 x 57.3 deg/sqrt(h).
+    density = 2.0 * REFERENCE_COIL.sagnac_s**2
+    assert phase_noise_to_walk(density, REFERENCE_COIL) == pytest.approx(60.0 * math.degrees(1.0))
+
+
+@pytest.mark.parametrize("fault", [{"length": 0.0}, {"diameter": -1.0}, {"index": math.nan}])
+def test_unphysical_coils_are_refused(fault: dict[str, float]) -> None:
+    with pytest.raises(InputError, match=f"coil: {next(iter(fault))} is"):
+        Coil(**fault)

@@ -1,0 +1,234 @@
+"""The catalogue's index: built-in effects, effects by hand, effects of other packages."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import fogml.twin.effects
+from fogml.errors import InputError
+from fogml.twin import registry
+from fogml.twin.effect import BiasEffect
+from fogml.twin.effects.ageing import Ageing
+from fogml.twin.effects.shupe_pure import ShupePure
+
+OUTSIDE = Path(__file__).parent / "outside_package"
+# The head of the catalogue: what a diagnosis offers unless told otherwise, noise terms aside.
+CANDIDATES = [
+    "warmup_bias",
+    "shupe_pure",
+    "shupe_mohr",
+    "temperature_rate_product",
+    "thermal_hysteresis",
+    "stress_relaxation",
+    "hidden_thermal_node",
+    "glass_transition",
+    "polarization_nonreciprocity",
+    "bias_polynomial",
+    "ageing",
+    "chamber_pickup",
+    "magnetic",
+    "source_wavelength",
+    "halfwave_voltage",
+    "sf_nonlinearity",
+    "sf_asymmetry",
+    "sf_hysteresis",
+    "deadband",
+    "sensor_lag",
+    "sensor_quantisation",
+    "sensor_placement",
+    "logger_skew",
+    "mount_tilt",
+    "earth_rate",
+    "input_axis_misalignment",
+    "table_rate_error",
+    "moisture",
+    "supply_ripple",
+    "pigtail_shupe",
+    "azimuthal_gradient",
+    "thermal_shock",
+    "electronic_crosstalk",
+    "turn_on_bias",
+    "vibration_rectification",
+    "coil_expansion",
+]
+
+
+class Borrowed(ShupePure):
+    id = "borrowed"
+    code = "Z9"
+
+
+@pytest.fixture
+def borrowed() -> Iterator[type[Borrowed]]:
+    registry.register(Borrowed)
+    yield Borrowed
+    if "borrowed" in registry.effects():
+        registry.unregister("borrowed")
+
+
+def test_each_module_of_the_catalogue_is_one_effect() -> None:
+    folder = Path(fogml.twin.effects.__path__[0])
+    modules = {path.stem for path in folder.glob("[a-z]*.py")}
+    assert modules <= set(registry.effects())
+
+
+def test_order_is_that_of_the_letter_codes() -> None:
+    ids = list(registry.effects())
+    wanted = ["shupe_pure", "shupe_mohr", "thermal_hysteresis", "thermal_shock", "bias_polynomial", "ageing"]
+    assert sorted(wanted, key=ids.index) == wanted  # B1 B3 B8 B10 C1 C10
+
+
+def test_bias_effects_offered_to_a_diagnosis_are_those_of_the_catalogues_head() -> None:
+    bias = {id for id, held in registry.effects().items() if held.code[0] in "BC" and held.code[1:].isdigit()}
+    offered = {id for id in bias if registry.effect(id).candidate}
+    assert offered == bias & set(CANDIDATES)
+    assert len(bias) == 24
+
+
+def test_codes_name_one_effect_each() -> None:
+    codes = [held.code for id, held in registry.effects().items() if held.code[0] in "BC"]
+    assert len(set(codes)) == len(codes)
+
+
+def test_effects_are_found_by_id() -> None:
+    assert isinstance(registry.effect("ageing"), Ageing)
+
+
+@pytest.mark.parametrize(
+    ("asked", "named"),
+    [("shupe_pur", "shupe_pure"), ("hysteresis", "thermal_hysteresis"), ("aging", "ageing")],
+)
+def test_an_unknown_id_names_near_ones(asked: str, named: str) -> None:
+    with pytest.raises(InputError, match=f"no effect '{asked}'; did you mean .*'{named}'"):
+        registry.effect(asked)
+
+
+def test_an_id_like_no_other_says_where_to_look() -> None:
+    with pytest.raises(InputError, match="no effect 'qqqq'; `fogml effects` lists them"):
+        registry.effect("qqqq")
+
+
+def test_the_returned_catalogue_is_a_copy() -> None:
+    registry.effects().clear()
+    assert "ageing" in registry.effects()
+
+
+def test_register_and_unregister(borrowed: type[Borrowed]) -> None:
+    assert isinstance(registry.effect("borrowed"), Borrowed)
+    with pytest.raises(InputError, match="'borrowed' already"):
+        registry.register(Borrowed())
+    registry.unregister("borrowed")
+    with pytest.raises(InputError, match="no effect 'borrowed'"):
+        registry.unregister("borrowed")
+
+
+def test_register_decorates() -> None:
+    class Passing(ShupePure):
+        id = "passing"
+
+    try:
+        assert registry.register(Passing) is Passing
+    finally:
+        registry.unregister("passing")
+
+
+class Abstract(BiasEffect):
+    id = "abstract"
+
+
+class Incomplete(BiasEffect):
+    id = "incomplete"
+
+    def signature(self, inputs, **shape):  # type: ignore[no-untyped-def]
+        return inputs.time
+
+
+class Misnamed(ShupePure):
+    id = "Bad-Id"
+
+
+class Misplaced(ShupePure):
+    id = "misplaced"
+    stage = "nowhere"  # type: ignore[assignment]
+
+
+class Unmeasured(ShupePure):
+    id = "unmeasured"
+    amplitude = 3.0  # type: ignore[assignment]
+
+
+@pytest.mark.parametrize(
+    ("declared", "message"),
+    [
+        (Abstract, "Abstract does not define signature"),
+        (Incomplete, "Incomplete does not state 'code'"),
+        (Misnamed, "id 'Bad-Id' must be lower-case words"),
+        (Misplaced, "in stage 'nowhere'; stages are thermal"),
+        (Unmeasured, "amplitude of effect 'unmeasured' must be a Quantity"),
+        (dict, "is no effect"),
+    ],
+)
+def test_what_is_no_whole_effect_is_refused(declared: type, message: str) -> None:
+    before = set(registry.effects())
+    with pytest.raises(InputError, match=message):
+        registry.register(declared)
+    assert set(registry.effects()) == before
+
+
+def install(folder: Path, entry_points: str) -> Path:
+    """Put the outside package on a path as an installer would, with these entry points."""
+    project = tomllib.loads((OUTSIDE / "pyproject.toml").read_text())["project"]
+    info = folder / f"{project['name'].replace('-', '_')}-{project['version']}.dist-info"
+    info.mkdir()
+    metadata = f"Metadata-Version: 2.1\nName: {project['name']}\nVersion: {project['version']}\n"
+    (info / "METADATA").write_text(metadata)
+    (info / "entry_points.txt").write_text(entry_points)
+    return folder
+
+
+def in_new_process(path: Path, code: str) -> str:
+    search = os.pathsep.join([str(path), str(OUTSIDE / "src"), *filter(None, sys.path)])
+    answer = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, env={**os.environ, "PYTHONPATH": search}
+    )
+    assert answer.returncode == 0, answer.stderr
+    return answer.stdout.strip()
+
+
+def test_an_outside_package_adds_an_effect_that_keeps_the_contract(tmp_path: Path) -> None:
+    points = tomllib.loads((OUTSIDE / "pyproject.toml").read_text())["project"]["entry-points"]
+    text = "".join(
+        f"[{group}]\n" + "".join(f"{name} = {value}\n" for name, value in entries.items())
+        for group, entries in points.items()
+    )
+    code = (
+        "from fogml.testing import check_effect; from fogml.twin.registry import effect, effects\n"
+        "check_effect(effect('stray_light')); print(list(effects())[-1], 'ageing' in effects())"
+    )
+    assert in_new_process(install(tmp_path, text), code) == "stray_light True"
+
+
+@pytest.mark.parametrize(
+    ("point", "message"),
+    [
+        ("stray_light = fogml_stray_light:Nothing", "'stray_light' of fogml-stray-light in group"),
+        ("ageing = fogml.twin.effects.ageing:Ageing", "there is an effect 'ageing' already"),
+        ("floats = fogml.runs.run:FloatArray", "is no effect"),
+    ],
+)
+def test_a_faulty_outside_effect_is_named(tmp_path: Path, point: str, message: str) -> None:
+    code = (
+        "from fogml.errors import InputError; from fogml.twin.registry import effects\n"
+        "for attempt in range(2):\n"
+        "    try: effects()\n"
+        "    except InputError as error: print(error)\n"
+    )
+    said = in_new_process(install(tmp_path, f"[fogml.effects]\n{point}\n"), code).splitlines()
+    assert len(said) == 2 and all(message in line for line in said)
