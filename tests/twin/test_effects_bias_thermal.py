@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -12,18 +16,14 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import nominal_columns
 from fogml.twin.registry import effect
 
+Node = Callable[[FloatArray], FloatArray]
 
-def inputs(
-    minutes: FloatArray | float, sample_s: float = 1.0, rate_window_s: float = 0.0, **nodes: object
-) -> Inputs:
+
+def inputs(minutes: float, sample_s: float = 1.0, rate_window_s: float = 0.0, **nodes: Node) -> Inputs:
     """Inputs whose nodes are given as functions of time [s]."""
-    time = np.arange(0.0, 60.0 * float(minutes), sample_s)
-    temperatures = {
-        name: np.broadcast_to(rule(time), time.shape).astype(float) for name, rule in nodes.items()
-    }  # type: ignore[operator]
-    return Inputs(
-        time=time, temperatures=temperatures, table_rate=np.zeros(len(time)), rate_window_s=rate_window_s
-    )
+    time = np.arange(0.0, 60.0 * minutes, sample_s)
+    temperatures = {name: node(time) for name, node in nodes.items()}
+    return Inputs(time, temperatures, np.zeros(len(time)), rate_window_s=rate_window_s)
 
 
 def response(id: str, given_inputs: Inputs, **shape: float) -> FloatArray:
@@ -31,7 +31,7 @@ def response(id: str, given_inputs: Inputs, **shape: float) -> FloatArray:
     return declared.response(given_inputs, **{**declared.default_shape(), **shape})
 
 
-def behind(lag_s: float, start_s: float = 0.0, stop_s: float = 1e9, rate: float = 1.0):  # type: ignore[no-untyped-def]
+def behind(lag_s: float, start_s: float = 0.0, stop_s: float = 1e9, rate: float = 1.0) -> Node:
     """A node that is a first-order lag behind a ramp between two times, in closed form."""
 
     def ramp(t: FloatArray) -> FloatArray:
@@ -87,12 +87,11 @@ class TestShupe:
         nodes = {"T_out": behind(120.0), "T_in": behind(240.0)}
         still = inputs(20, **nodes)
         pure = response("shupe_pure", still.afresh())
-        turned = Inputs(still.time, still.temperatures, still.table_rate, drives={"angle": np.full(1200, 200.0)},
-                        rate_window_s=0.0)  # fmt: skip
+        turned = replace(still.afresh(), drives={"angle": np.full(1200, 200.0)})
         assert response("azimuthal_gradient", turned, phase=20.0) == pytest.approx(-pure)
         assert np.abs(response("azimuthal_gradient", turned, phase=110.0)).max() < 1e-12
         table = np.where(still.time < 180.0, 1.0, 0.0)  # 180 deg in three minutes
-        spun = Inputs(still.time, still.temperatures, table, rate_window_s=0.0)
+        spun = replace(still.afresh(), table_rate=table)
         half = response("azimuthal_gradient", spun, phase=0.0)
         assert half[300:] == pytest.approx(np.cos(np.radians(179.0)) * pure[300:])
 
@@ -129,15 +128,15 @@ def play(x: FloatArray, half_width: float) -> FloatArray:
     return np.array(out)
 
 
+def swing(period_min: float) -> Node:
+    return lambda t: 25.0 + 50.0 * np.sin(2.0 * np.pi * t / 60.0 / period_min)
+
+
 class TestHysteresis:
     def test_branches_are_two_amplitudes_apart_at_any_rate(self) -> None:
         for rate in (0.2, 5.0):
             period = 4.0 * 50.0 / rate
-            given = inputs(
-                2.0 * period,
-                60.0 * period / 4000.0,
-                T=lambda t, p=period: 25.0 + 50.0 * np.sin(2.0 * np.pi * t / 60.0 / p),
-            )
+            given = inputs(2.0 * period, 60.0 * period / 4000.0, T=swing(period))
             found = response("thermal_hysteresis", given, half_width=9.0)
             u = given.u()
             rising = np.gradient(u) > 0.0
@@ -156,7 +155,7 @@ class TestHysteresis:
 
     def test_minor_loops_close(self) -> None:
         legs = [25.0, 60.0, 0.0, 60.0, 0.0]
-        x = np.concatenate([np.linspace(a, b, 500) for a, b in zip(legs, legs[1:])])
+        x = np.concatenate([np.linspace(a, b, 500) for a, b in pairwise(legs)])
         given = Inputs(np.arange(len(x), dtype=float), {"T": x}, np.zeros(len(x)))
         found = response("thermal_hysteresis", given, half_width=12.0)
         assert found[999] == pytest.approx(found[1999]) and found[499] == pytest.approx(found[1499])
