@@ -20,6 +20,9 @@ MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
 """What stands for a missing value, in lower case."""
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")
+_SEARCH_BYTES = 1 << 24
+_MARK = re.compile(rb"\d[.,]\d")
+_DECIMAL_POINT = re.compile(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*\Z")
 _DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*\Z")
 
 
@@ -100,8 +103,7 @@ def csv_dialect(path: Path) -> CsvDialect:
     separator = max(SEPARATORS, key=lambda s: _outside_quotes(lines[first]).count(s))
     cells = _cells(_fields(lines[first], separator))
     rows = [_fields(line, separator) for line in lines[first + 1 :] if line.strip()]
-    comma = any(_DECIMAL_COMMA.match(field) for row in rows for field in row)
-    dialect = CsvDialect(separator, "," if comma else ".", encoding, first + 1, cells)
+    dialect = CsvDialect(separator, _decimal_mark(path, rows, separator), encoding, first + 1, cells)
     _check_header(path.name, dialect)
     text = {
         i
@@ -129,6 +131,21 @@ def number(field: str, decimal: str) -> float | None:
         return float(field)
     except ValueError:
         return None
+
+
+def _decimal_mark(path: Path, rows: Sequence[Sequence[str]], separator: str) -> str:
+    """The mark in the first rows; in the rest of the file, where those hold whole numbers only."""
+    fields = [field for row in rows for field in row]
+    if any(_DECIMAL_COMMA.match(field) for field in fields):
+        return ","
+    if separator == "," or any(_DECIMAL_POINT.match(field) for field in fields):
+        return "."
+    with path.open("rb") as file:
+        file.seek(_HEAD_BYTES)
+        while part := file.read(_SEARCH_BYTES):
+            if found := _MARK.search(part):
+                return found[0][1:2].decode("ascii")
+    return "."
 
 
 def _encoding(head: bytes, cut: bool) -> str:

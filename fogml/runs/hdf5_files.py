@@ -6,6 +6,8 @@ the same group: JSON in ``fogml.facts``, as `write_run` puts them, or one attrib
     with h5py.File("run.h5", "w") as file:
         file["time [s]"], file["gyro [deg/h]"], file["T_in [degC]"] = time, gyro, temperature
         file.attrs["unit"], file.attrs["axis"], file.attrs["latitude"] = "FOG-0417", "x", 39.9
+
+HDF5 makes a group ``gyro [deg`` of that name with a dataset ``h]`` in it; it is read as it was meant.
 """
 
 from __future__ import annotations
@@ -75,9 +77,7 @@ def hdf5_blocks(path: Path, rows: int | None, columns: Collection[str] | None = 
     try:
         with h5py.File(path, "r") as file:
             group = file["run"] if isinstance(file.get("run"), h5py.Group) else file
-            found = [
-                (_cell(name, item), item) for name, item in group.items() if isinstance(item, h5py.Dataset)
-            ]
+            found = [(_cell(name, item), item) for name, item in _datasets(group)]
             if not found:
                 raise InputError(
                     f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'"
@@ -107,6 +107,19 @@ def _samples(dataset: Any, start: int, stop: int) -> NDArray[np.float64]:
     return np.asarray(dataset[part], dtype=np.float64)
 
 
+def _datasets(group: Any, above: str = "") -> list[tuple[str, Any]]:
+    """Datasets of a group by name, also where the unit holds a slash."""
+    h5py = h5py_module()
+    found: list[tuple[str, Any]] = []
+    for name, item in group.items():
+        full = above + name
+        if isinstance(item, h5py.Dataset):
+            found.append((full, item))
+        elif isinstance(item, h5py.Group) and "[" in full:
+            found += _datasets(item, full + "/")
+    return found
+
+
 def _plain(value: Any) -> Any:
     """An attribute of one value as Python's own type, None for an array."""
     if isinstance(value, str | bytes):
@@ -130,7 +143,7 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
     InputError
         If a column's name can't be a dataset's.
     """
-    with h5py_module().File(path, "w") as file:
+    with h5py_module().File(path, "w", track_order=True) as file:
         for name, cell in cells.items():
             label, unit = parse_header(cell)
             if "/" in label or "\0" in label or label in ("", ".", "run"):

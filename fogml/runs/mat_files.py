@@ -130,7 +130,7 @@ def write_mat(
         vectors: dict[str, Any] = {label: run.columns[name][:, None] for name, (label, _) in labels.items()}
         savemat(path, {**vectors, "units": units, "facts": facts}, long_field_names=True, do_compression=True)
         return
-    with h5py_module().File(path, "w", userblock_size=_USER_BLOCK) as file:
+    with h5py_module().File(path, "w", userblock_size=_USER_BLOCK, track_order=True) as file:
         for name, (label, _) in labels.items():
             dataset = file.create_dataset(label, data=run.columns[name][None, :], compression="gzip")
             dataset.attrs["MATLAB_class"] = np.bytes_("double")

@@ -132,8 +132,8 @@ def file_format(path: Path) -> Format:
         raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
     right = next(suffix for suffix, of_suffix in _SUFFIXES.items() if of_suffix == kind)
     raise InputError(
-        f"{path.name}: is a {_LABELS[kind]} file by its content, and named as {_LABELS[stated]}; rename it to "
-        f"'{path.stem}{right}'"
+        f"{path.name}: is a {_LABELS[kind]} file by its content, and named as {_LABELS[stated]}; "
+        f"rename it to '{path.stem}{right}'"
     )
 
 
