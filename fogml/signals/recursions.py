@@ -72,7 +72,8 @@ def window_steps_kernel(
     """Means over the newest window (t - w, t] less those over the window before, of x and of time.
 
     For the samples from number `first` on; those before are history. Where the window before holds
-    nothing, the newest one is halved; where that can't be, both are 0.
+    nothing, the newest one is halved; where that holds one sample alone, after a gap of two windows
+    or more, the steps are those from the sample before. The very first sample has steps 0.
     """
     n = len(time)
     step_x, step_t = np.zeros(n - first), np.zeros(n - first)
@@ -128,4 +129,7 @@ def window_steps_kernel(
             before, newest = half - start, i + 1 - half
             step_x[i - first] = (new_x - sum_x) / newest - sum_x / before
             step_t[i - first] = (new_t - sum_t) / newest - sum_t / before
+        elif i > 0:
+            step_x[i - first] = x[i] - x[i - 1]
+            step_t[i - first] = time[i] - time[i - 1]
     return step_x, step_t

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -12,6 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
+from fogml.testing.effect_declarations import check_declaration, check_priors, check_values
 from fogml.testing.effect_inputs import (
     BLOCK_EDGES,
     SCRAMBLED,
@@ -23,8 +22,6 @@ from fogml.testing.effect_inputs import (
 )
 from fogml.twin import registry
 from fogml.twin.effect import (
-    SET_UP,
-    STAGES,
     Effect,
     LoggerEffect,
     LoopEffect,
@@ -33,15 +30,16 @@ from fogml.twin.effect import (
     SensorEffect,
     ThermalEffect,
 )
-from fogml.twin.inputs import REST, STAND_INS, Inputs
+from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.quantities import GRADES
 
 AGREEMENT = 1e-9
 """Greatest difference between two ways to the same value, relative to the values' size."""
+BLOCK_AGREEMENT = 1e-12
+"""The same for block by block against the whole."""
 SMOOTHNESS = 0.05
 """Greatest relative change of a slope against a shape parameter when the step is halved."""
-_WORD = re.compile(r"[a-z]{2,}(_[a-z]{2,})*\Z")
 
 
 def check_effect(effect: Effect | type[Effect]) -> None:
@@ -67,9 +65,9 @@ def check_effect(effect: Effect | type[Effect]) -> None:
     """
     checked: Effect = effect() if isinstance(effect, type) else effect
     inputs = standard_inputs()
-    _check_declaration(checked)
-    _check_priors(checked)
-    _check_values(checked, inputs)
+    check_declaration(checked)
+    check_priors(checked)
+    check_values(checked)
     _check_finite(checked, inputs)
     if not isinstance(checked, NoiseEffect):
         _check_needs(checked, inputs)
@@ -79,76 +77,6 @@ def check_effect(effect: Effect | type[Effect]) -> None:
         _check_shape(checked, inputs)
     _check_amplitude(checked, inputs["programme"])
     _check_registry(checked)
-
-
-def _check_declaration(effect: Effect) -> None:
-    name = type(effect).__name__
-    for attribute in ("id", "code", "title", "stage", "amplitude"):
-        assert hasattr(effect, attribute), f"{name} does not state '{attribute}'"
-    assert name == registry.class_name(effect.id), (
-        f"the class of '{effect.id}' is to be called {registry.class_name(effect.id)}, not {name}"
-    )
-    assert effect.title.strip() and effect.code.strip(), f"{name}: title or letter code is empty"
-    assert effect.stage in STAGES, f"{name}: stage '{effect.stage}' is none of {', '.join(STAGES)}"
-    text = type(effect).__doc__ or ""
-    assert "=" in text and "::" in text, f"{name}: the docstring states no equation after '::'"
-    assert re.search(r"\bSources?:", text), f"{name}: the docstring has no line 'Source:'"
-    assert effect.sources and all(source.strip() for source in effect.sources), f"{name} states no sources"
-    assert effect.shows.strip(), f"{name} does not say where it shows"
-    for other, what in effect.confused_with.items():
-        assert other != effect.id and what.strip(), f"{name}: confused_with '{other}' says nothing"
-    known = {*STAND_INS, *REST, *SET_UP}
-    assert set(effect.needs) <= known, f"{name} needs {sorted(set(effect.needs) - known)}, which no input has"
-    assert len(set(effect.needs)) == len(effect.needs), f"{name}: needs repeat"
-    assert effect.id not in effect.conflicts, f"{name} conflicts with itself"
-    assert effect.amplitude.name == "amplitude", f"{name}: the amplitude's key is 'amplitude'"
-    names = [quantity.name for quantity in effect.shape]
-    assert len(set(names)) == len(names) and "amplitude" not in names, f"{name}: shape names repeat: {names}"
-    for quantity in names:
-        assert _WORD.match(quantity), f"{name}: shape parameter '{quantity}' must be whole lower-case words"
-
-
-def _check_priors(effect: Effect) -> None:
-    rng = np.random.default_rng(0)
-    for quantity in (effect.amplitude, *effect.shape):
-        owner = f"{effect.id}: {quantity.name}"
-        assert quantity.unit.strip(), f"{owner} has no unit; a pure number has unit '1'"
-        low, high = quantity.limits
-        assert low < high, f"{owner}: limits {quantity.limits} hold nothing"
-        for grade in GRADES:
-            least, most = quantity.range(grade)
-            assert math.isfinite(least) and math.isfinite(most) and least <= most, (
-                f"{owner}: {grade} range {least:g} to {most:g}"
-            )
-            assert low <= least and most <= high, f"{owner}: the {grade} range passes the limits"
-            assert not quantity.signed or least >= 0.0, f"{owner}: a signed quantity's range is of its size"
-            assert not quantity.signed or low == -high, f"{owner}: limits of a signed quantity are lopsided"
-            assert quantity.check(quantity.typical(grade), owner) == quantity.typical(grade)
-            drawn = np.array([quantity.draw(rng, grade) for _ in range(400)])
-            assert np.isfinite(drawn).all() and drawn.min() >= low and drawn.max() <= high, (
-                f"{owner}: its prior leaves the limits"
-            )
-            size = np.abs(drawn) if quantity.signed else drawn
-            slack = 1e-9 * max(abs(least), abs(most))
-            inside = np.mean((size >= least - slack) & (size <= most + slack))
-            assert inside >= 0.8, f"{owner}: only {inside:.0%} of its {grade} prior lie in the range"
-    most_n, most_t = effect.amplitude.navigation[1], effect.amplitude.tactical[1]
-    assert most_n <= most_t, f"{effect.id}: a navigation gyro is to have no more of it than a tactical one"
-
-
-def _check_values(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
-    stated = {"amplitude": effect.amplitude.typical(), **effect.default_shape()}
-    amplitude, shape = effect.checked({"amplitude": stated["amplitude"]})
-    assert amplitude == stated["amplitude"] and shape == effect.default_shape(), (
-        "values that are not stated do not take their defaults"
-    )
-    for values in ({**stated, "nonsense": 1.0}, {**stated, "amplitude": math.nan}, effect.default_shape()):
-        try:
-            effect.checked(values)
-        except InputError as error:
-            assert effect.id in str(error), f"the message does not name the effect: {error}"
-        else:
-            raise AssertionError(f"{effect.id} accepts {values}")
 
 
 def _check_finite(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
@@ -210,7 +138,8 @@ def _check_blocks(effect: Effect, inputs: Inputs) -> None:
         effect.signature(block(inputs, start, stop, memory), **shape) for start, stop in pairwise(edges)
     ]
     whole = _signature(effect, inputs, shape)
-    _same(whole, np.concatenate(pieces), f"{effect.id}: block by block and the whole run")
+    what = f"{effect.id}: block by block and the whole run"
+    _same(whole, np.concatenate(pieces), what, agreement=BLOCK_AGREEMENT)
 
 
 def _check_gap(effect: Effect, inputs: Inputs) -> None:
@@ -281,7 +210,7 @@ def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
         wanted = 1e-6 * inputs.input_rate_deg_h * _signature(effect, inputs, shape)
         _same(wanted, response, f"{effect.id}: response is not the input rate times the ppm")
     for name, apply, untouched in _hooks(effect, inputs, shape):
-        _same(untouched, apply(0.0), f"{effect.id}: {name} with amplitude 0 changes something", exact=True)
+        _same(untouched, apply(0.0), f"{effect.id}: {name} with amplitude 0 changes something", agreement=0.0)
         changed = apply(effect.amplitude.typical())
         assert changed.shape == untouched.shape and np.isfinite(changed).all(), (
             f"{effect.id}: {name} gives a wrong shape or values that are not finite"
@@ -377,9 +306,8 @@ def _columns(inputs: Inputs) -> dict[str, FloatArray]:
     return columns
 
 
-def _same(wanted: FloatArray, found: FloatArray, what: str, *, exact: bool = False) -> None:
+def _same(wanted: FloatArray, found: FloatArray, what: str, *, agreement: float = AGREEMENT) -> None:
     assert wanted.shape == found.shape, f"{what}: shapes {wanted.shape} and {found.shape}"
     size = float(np.abs(wanted).max(initial=0.0))
     worst = float(np.abs(wanted - found).max(initial=0.0))
-    slack = 0.0 if exact else AGREEMENT * size
-    assert worst <= slack, f"{what}: they differ by {worst:.2g}, size {size:.2g}"
+    assert worst <= agreement * size, f"{what}: they differ by {worst:.2g}, size {size:.2g}"

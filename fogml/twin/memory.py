@@ -44,7 +44,8 @@ class Memory:
         """Rate of x per minute, shape (n,).
 
         The difference of `difference` over the distance of the two mean times. A window of 0 s
-        takes neighbouring samples. The first sample has rate 0.
+        takes neighbouring samples, and so does the first sample after a gap of two windows. The
+        very first sample has rate 0.
         """
         step_x, step_t = self._steps(key, time, x, window_s)
         return np.divide(60.0 * step_x, step_t, out=np.zeros(len(step_x)), where=step_t > 0.0)
@@ -52,9 +53,11 @@ class Memory:
     def difference(self, key: str, time: FloatArray, x: FloatArray, window_s: float) -> FloatArray:
         """Mean of x over the newest `window_s` less that over the window before, shape (n,).
 
-        Windows cut by the start take what there is, halved; the first sample has difference 0.
+        Windows cut by the start, or by a gap of two windows, take what there is, halved; the first
+        sample then has difference 0.
         """
-        return self._steps(key, time, x, window_s)[0]
+        step_x, step_t = self._steps(key, time, x, window_s)
+        return np.where(step_t < 1.999999 * window_s, step_x, 0.0) if window_s > 0.0 else step_x
 
     def _steps(
         self, key: str, time: FloatArray, x: FloatArray, window_s: float
