@@ -18,7 +18,8 @@ from fogml.runs.raw_table import RawTable, no_samples, text_column
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
-_STREAM_BYTES = 1 << 24
+_STREAM_BYTES = 1 << 20
+"""Arrow reads tens of these ahead, so that larger ones would hold whole files."""
 
 
 def read_csv(path: Path, *, repair: bool) -> RawTable:
