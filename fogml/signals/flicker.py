@@ -85,7 +85,5 @@ class Flicker:
         """The next `count` samples, shape (count,)."""
         white = self.rng.standard_normal(count)
         white *= self.coefficient
-        self._last = float(
-            flicker_kernel(white, self._decay, self._weight, self._states, self._last, _BLEND)
-        )
+        self._last = float(flicker_kernel(white, self._decay, self._weight, self._states, self._last, _BLEND))
         return white

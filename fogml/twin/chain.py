@@ -1,0 +1,211 @@
+"""The gyro's chain: rig, bias, scale factor, loop, read-out.
+
+::
+
+    w_ia = 3600 rate + earth + sum of rig effects
+    out  = (1 + 1e-6 s) w_ia + b,     s, b: nominal plus scale factor and bias effects
+    out  = read-out effects of loop effects of out
+
+in the order of the catalogue. Noise is added to that, then comes the logger.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import (
+    BiasEffect,
+    Effect,
+    LoggerEffect,
+    LoopEffect,
+    ReadoutEffect,
+    RigEffect,
+    ScaleFactorEffect,
+    SensorEffect,
+    ThermalEffect,
+)
+from fogml.twin.inputs import Inputs
+from fogml.twin.memory import Memory
+from fogml.twin.nominal import bias_deg_h, scale_factor_ppm, temperature_slopes
+from fogml.twin.twin import EffectSetting, Twin
+
+Signature = Callable[[Effect, EffectSetting, Inputs], FloatArray]
+"""Gives the signature of an effect on inputs; a replay keeps those that it has."""
+_AXES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
+
+
+@dataclass(frozen=True, eq=False)
+class ChainOutput:
+    """What the chain gives over n samples.
+
+    Attributes
+    ----------
+    output
+        The gyro's output before noise and logger [deg/h], shape (n,).
+    contributions
+        Part of the output that each effect makes up [deg/h], each of shape (n,), and ``nominal``
+        for the rest; they add to `output`. Empty unless asked for.
+    """
+
+    output: FloatArray
+    contributions: Mapping[str, FloatArray]
+
+
+def plain_signature(declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
+    """The signature, worked out on the spot."""
+    return declared.signature(inputs, **setting.shape)
+
+
+def through_chain(
+    twin: Twin,
+    inputs: Inputs,
+    nominal_inputs: Inputs,
+    *,
+    signature: Signature = plain_signature,
+    contributions: bool = False,
+    trusting: bool = False,
+) -> ChainOutput:
+    """The gyro's output for inputs, whole or block by block with the same memory.
+
+    Parameters
+    ----------
+    twin
+        The twin.
+    inputs
+        What effects read.
+    nominal_inputs
+        What the nominal gyro reads: the same, or recorded temperatures alone.
+    signature
+        Where signatures come from.
+    contributions
+        Whether to keep each effect's part.
+    trusting
+        Whether the temperatures are measured ones: what sensors falsify or don't show is then added
+        to first order.
+    """
+    parts: dict[str, FloatArray] = {}
+    rate = inputs.input_rate_deg_h + heading_change(inputs)
+    scale = 1.0 + 1e-6 * scale_factor_ppm(nominal_inputs, twin.nominal)
+    bias = bias_deg_h(nominal_inputs, twin.nominal)
+    if contributions:
+        parts["nominal"] = scale * rate + bias
+    rig: dict[str, FloatArray] = {}
+    table_rate = rate
+    for declared, setting in twin.on:
+        if isinstance(declared, RigEffect):
+            rig[declared.id] = setting.amplitude * signature(declared, setting, inputs)
+            rate = rate + rig[declared.id]
+        elif isinstance(declared, ScaleFactorEffect):
+            ppm = setting.amplitude * signature(declared, setting, inputs)
+            scale += 1e-6 * ppm
+            if contributions:
+                parts[declared.id] = 1e-6 * ppm * table_rate
+        elif isinstance(declared, BiasEffect) or (isinstance(declared, ThermalEffect) and hidden(declared)):
+            added = setting.amplitude * signature(declared, setting, inputs)
+            bias += added
+            if contributions:
+                parts[declared.id] = added
+    if contributions:
+        parts |= {id: scale * added for id, added in rig.items()}
+    output = scale * rate
+    output += bias
+    if trusting:
+        output += _unseen(twin, inputs, nominal_inputs, signature)
+    for kind in (LoopEffect, ReadoutEffect):
+        for declared, setting in twin.on:
+            if isinstance(declared, LoopEffect) and isinstance(declared, ReadoutEffect) == (
+                kind is ReadoutEffect
+            ):
+                before = output
+                output = declared.apply(output, inputs, setting.amplitude, **setting.shape)
+                if contributions:
+                    parts[declared.id] = output - before
+    return ChainOutput(output, parts)
+
+
+def hidden(declared: ThermalEffect) -> bool:
+    """Whether a thermal effect acts on the bias by itself, and not by way of the plant's nodes."""
+    kind = type(declared)
+    return (
+        kind.change_chamber is ThermalEffect.change_chamber
+        and kind.change_plant is ThermalEffect.change_plant
+    )
+
+
+def _unseen(twin: Twin, inputs: Inputs, nominal_inputs: Inputs, signature: Signature) -> FloatArray:
+    """What sensors falsify, and what the plant does that they don't show [deg/h], to first order."""
+    total = np.zeros(len(inputs))
+    slopes: Mapping[str, FloatArray] | None = None
+    for declared, setting in twin.on:
+        if isinstance(declared, SensorEffect) or (
+            isinstance(declared, ThermalEffect) and not hidden(declared)
+        ):
+            if slopes is None:
+                slopes = temperature_slopes(nominal_inputs, twin.nominal)
+            given = replace(inputs, slopes=slopes)
+            total += setting.amplitude * signature(declared, setting, given)
+    return total
+
+
+def sensor_shares(twin: Twin, inputs: Inputs) -> dict[str, FloatArray]:
+    """What a replay that trusts the sensors lacks for each sensor effect [deg/h], to first order."""
+    found = twin.stage(SensorEffect)
+    if not found:
+        return {}
+    given = replace(inputs, slopes=temperature_slopes(inputs, twin.nominal))
+    return {d.id: s.amplitude * d.signature(given, **s.shape) for d, s in found}
+
+
+def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> FloatArray:
+    """The output as it is recorded [deg/h], shape (n,)."""
+    for declared, setting in twin.on:
+        if isinstance(declared, LoggerEffect):
+            output = declared.record(output, inputs.with_output(output), setting.amplitude, **setting.shape)
+    return output
+
+
+def sensed(
+    twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: np.random.Generator
+) -> FloatArray:
+    """What the sensor behind column `name` records [degC] at a place with `temperature`, shape (n,)."""
+    for declared, setting in twin.on:
+        if isinstance(declared, SensorEffect):
+            temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
+    errors = twin.sensors.of(name)
+    if errors.lag > 0.0:
+        temperature = inputs.memory.lag(f"sensor {name}", inputs.time, temperature, errors.lag)
+    if errors.noise > 0.0:
+        temperature = temperature + errors.noise * rng.standard_normal(len(temperature))
+    if errors.resolution > 0.0:
+        temperature = errors.resolution * np.rint(temperature / errors.resolution)
+    return temperature
+
+
+def heading_of(facts: Facts, angle: FloatArray) -> FloatArray | None:
+    """Heading of a horizontal input axis [deg clockwise from north] on a table turned by `angle` [deg].
+
+    None where the axis is not horizontal. A table angle counts counter-clockwise.
+    """
+    axis = facts.input_axis
+    if axis is None or axis in ("up", "down"):
+        return None
+    return (axis.heading if isinstance(axis, Heading) else _AXES[axis]) - angle
+
+
+def heading_change(inputs: Inputs) -> FloatArray | float:
+    """Change of Earth rate with the heading [deg/h], shape (n,), where one is given; else 0."""
+    if "heading" not in inputs.drives or inputs.facts.latitude is None:
+        return 0.0
+    horizontal = EARTH_RATE_DEG_H * np.cos(np.radians(inputs.facts.latitude))
+    projected = horizontal * np.cos(np.radians(inputs.drives["heading"]))
+    return np.asarray(projected - inputs.earth_deg_h)
+
+
+def fresh(inputs: Inputs) -> Inputs:
+    """The same samples with no memory of others and nothing worked out yet."""
+    return replace(inputs, memory=Memory(), cache={})

@@ -1,0 +1,237 @@
+"""Replay: a run's inputs through a twin, or the difference that one effect makes."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.columns import coil_sensor_number
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.chain import heading_of, hidden, logged, through_chain
+from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
+from fogml.twin.inputs import REST, STAND_INS, Inputs
+from fogml.twin.plant.estimate import estimate_nodes, recorded_power
+from fogml.twin.plant.power import PowerWindows
+from fogml.twin.truth import Truth
+from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
+
+_CACHE_BYTES = 256_000_000
+
+
+def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None = None) -> FloatArray:
+    """What the twin's gyro would have put out without noise, for what a run recorded.
+
+    Parameters
+    ----------
+    twin
+        The twin.
+    run
+        Its temperatures, table rate, drives and set-up facts are the inputs. Nodes that it lacks and
+        an effect asks for follow from those that it has by the twin's plant.
+    only
+        Id of an effect: the difference that it makes, in place of the whole output.
+    truth
+        The truth of a simulated run, whose nodes and drives then take the place of the recorded.
+
+    Returns
+    -------
+    FloatArray
+        Output [deg/h], shape (n,).
+
+    Raises
+    ------
+    InputError
+        If a temperature is missing, the truth is another run's, or `only` is not on.
+
+    Notes
+    -----
+    Signatures are kept with the run: a second replay with one effect changed works out that one
+    alone.
+    """
+    held = _replayers.setdefault(run, {})
+    replayer = held.get(id(truth))
+    if replayer is None or replayer.truth is not truth:
+        replayer = held[id(truth)] = Replayer(run, truth)
+    return replayer.output(twin) if only is None else replayer.difference(twin, only)
+
+
+def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
+    """What a run recorded, as inputs, and when the unit was on."""
+    windows = _power_windows(run)
+    temperatures = {
+        name: run.columns[name] for name in run.temperature_columns if coil_sensor_number(name) is None
+    }
+    for name in ("T_in", "T_out"):
+        if name not in temperatures and any(map(coil_sensor_number, run.temperature_columns)):
+            try:
+                temperatures[name] = run.temperature(name)
+            except InputError:
+                continue
+    drives = {name: run.columns[name] for name in (*REST, "angle") if name in run.columns}
+    heading = heading_of(run.facts, drives["angle"]) if "angle" in drives else None
+    # A table that turns about the input axis does not change its heading.
+    if heading is not None and not run.rate.any():
+        drives["heading"] = heading
+    inputs = Inputs(
+        time=run.time,
+        temperatures=temperatures,
+        table_rate=run.rate,
+        earth_deg_h=run.facts.earth_rate_deg_h or 0.0,
+        facts=run.facts,
+        powered_on_s=windows[0][0] if windows else -math.inf,
+        power_ons_s=tuple(on for on, _ in windows[1:]),
+        drives=drives,
+        rate_window_s=RATE_WINDOW_S,
+    )
+    return inputs, windows
+
+
+def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
+    """The true inputs behind a simulated run."""
+    truth.check_fits(run.time, run.name)
+    ons = _power_ons(truth.time, truth.time_on)
+    return Inputs(
+        time=truth.time,
+        temperatures=truth.nodes,
+        table_rate=truth.table_rate,
+        earth_deg_h=run.facts.earth_rate_deg_h or 0.0,
+        facts=run.facts,
+        powered_on_s=ons[0],
+        power_ons_s=tuple(ons[1:]),
+        drives=truth.drives,
+        rate_window_s=RATE_WINDOW_S,
+    )
+
+
+@dataclass
+class _Given:
+    """Inputs for effects and for the nominal gyro, and what tells them from others of the same run."""
+
+    key: Hashable
+    inputs: Inputs
+    nominal: Inputs
+
+
+class Replayer:
+    """Replays of one run; what several replays share is worked out once.
+
+    Parameters
+    ----------
+    run
+        The run.
+    truth
+        Its truth, where that is to be replayed.
+    """
+
+    def __init__(self, run: Run, truth: Truth | None = None) -> None:
+        self.truth = truth
+        if truth is None:
+            self._recorded, self._windows = inputs_of_run(run)
+        else:
+            self._recorded, self._windows = inputs_of_truth(truth, run), ()
+        self._given: dict[Hashable, _Given] = {}
+        self._signatures: OrderedDict[Hashable, FloatArray] = OrderedDict()
+
+    def output(self, twin: Twin) -> FloatArray:
+        """Noise-free output [deg/h], shape (n,)."""
+        given = self._inputs(twin)
+
+        def signature(declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
+            # What depends on the nominal gyro's slopes changes with its constants.
+            slopes = twin.nominal if isinstance(declared, SensorEffect | ThermalEffect) else None
+            key = (given.key, declared, setting.key, slopes)
+            return self._kept(key, declared, setting, inputs)
+
+        chain = through_chain(
+            twin,
+            given.inputs.afresh(),
+            given.nominal.afresh(),
+            signature=signature,
+            trusting=self.truth is None,
+        )
+        return logged(twin, chain.output, given.inputs.afresh())
+
+    def difference(self, twin: Twin, id: str) -> FloatArray:
+        """What an effect changes in the output [deg/h], shape (n,).
+
+        Raises
+        ------
+        InputError
+            If it is not on, or acts by way of nodes or sensors, which a truth holds fixed.
+        """
+        without = twin.without_effect(id)
+        if self.truth is not None:
+            acting = [d for d, _ in twin.on if d.id == id]
+            if isinstance(acting[0], SensorEffect) or (
+                isinstance(acting[0], ThermalEffect) and not hidden(acting[0])
+            ):
+                if id in self.truth.contributions:
+                    return self.truth.contributions[id]
+                raise InputError(
+                    f"effect '{id}' acts by way of the temperatures, which the truth holds fixed; "
+                    "replay the recorded columns"
+                )
+        return self.output(twin) - self.output(without)
+
+    def _kept(self, key: Hashable, declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
+        if key in self._signatures:
+            self._signatures.move_to_end(key)
+            return self._signatures[key]
+        found = declared.signature(inputs.afresh(), **setting.shape)
+        room = _CACHE_BYTES // max(found.nbytes, 1)
+        if room:
+            while len(self._signatures) >= room:
+                self._signatures.popitem(last=False)
+            self._signatures[key] = found
+        return found
+
+    def _inputs(self, twin: Twin) -> _Given:
+        """Inputs for a twin: recorded, or with the nodes that its effects ask for besides."""
+        recorded = self._recorded
+        needed = {need for declared, _ in twin.on for need in declared.needs if need in STAND_INS}
+        missing = needed - set(recorded.temperatures) - ({"T"} if recorded.place("T") else set())
+        if self.truth is not None or not missing or not recorded.temperatures:
+            return self._given.setdefault("recorded", _Given("recorded", recorded, recorded))
+        changes = tuple((d, s.amplitude, s.key) for d, s in twin.stage(ThermalEffect))
+        key = (twin.plant, changes)
+        if key not in self._given:
+            nodes = estimate_nodes(
+                twin.network,
+                recorded.time,
+                recorded.temperatures,
+                powered=self._windows,
+                fan=recorded.drives.get("fan"),
+                table_rate=recorded.table_rate,
+            )
+            inputs = replace(recorded.afresh(), temperatures={**nodes, **recorded.temperatures}, cache={})
+            # Bounded: a fit may try many plants.
+            if len(self._given) > 8:
+                self._given = {k: v for k, v in self._given.items() if k == "recorded"}
+            self._given[key] = _Given(key, inputs, recorded)
+        return self._given[key]
+
+
+_replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()
+
+
+def _power_windows(run: Run) -> PowerWindows:
+    """When the unit was on: from the column ``time_on`` of a simulated run, else as recorded."""
+    if "time_on" in run.columns and len(run):
+        ons = _power_ons(run.time, run.columns["time_on"])
+        starts = np.searchsorted(run.time, ons[1:])
+        offs = [*run.time[starts - 1].tolist(), math.inf]
+        return tuple(zip(ons, offs))
+    powered = recorded_power(run)
+    return powered if powered else ((-math.inf, math.inf),)
+
+
+def _power_ons(time: FloatArray, time_on: FloatArray) -> list[float]:
+    """Times of power-on [s] from the time since."""
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(time_on) < 0.0) + 1])
+    return (time[starts] - time_on[starts]).tolist()

@@ -1,0 +1,254 @@
+"""Simulation: a programme and a twin give a run, and the truth behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.columns import KNOWN, coil_sensor_number, header, is_temperature
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.chain import ChainOutput
+from fogml.twin.programme import Programme, load_programme
+from fogml.twin.truth import Truth
+from fogml.twin.twin import Twin
+from fogml.twin.world import Samples, World
+
+DEFAULT_COLUMNS = (
+    "T_in",
+    "T_out",
+    "T_case",
+    "T_electronics",
+    "T_chamber",
+    "rate",
+    "angle",
+    "power",
+    "supply",
+    "humidity",
+    "compressor",
+    "heater",
+    "fan",
+)
+"""What is recorded beside time and gyro unless told otherwise."""
+DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
+BLOCK_ROWS = 1 << 16
+
+
+@dataclass(frozen=True, eq=False)
+class Simulation:
+    """A simulated run, and the truth behind it where that was asked for."""
+
+    run: Run
+    truth: Truth | None = None
+
+
+def simulate(
+    programme: Programme | str | Mapping[str, Any] | Sequence[Any],
+    twin: Twin | str | Path,
+    *,
+    sample_s: float = 1.0,
+    seed: int = 0,
+    columns: Sequence[str] | None = None,
+    facts: Facts | None = None,
+    truth: bool = False,
+) -> Simulation:
+    """Run a twin through a programme.
+
+    Parameters
+    ----------
+    programme
+        A programme, the name or file of one, or its steps.
+    twin
+        A twin, or the name or file of one.
+    sample_s
+        Sample interval [s].
+    seed
+        Of noise and sensors; the same seed gives the same run.
+    columns
+        What to record beside time and gyro, by the run format's names; `DEFAULT_COLUMNS` if None.
+    facts
+        Set-up facts; latitude 39.9 deg and the input axis up if None. The unit is the twin's name
+        unless stated, power-on is the programme's.
+    truth
+        Whether to keep every node and every effect's contribution.
+
+    Returns
+    -------
+    Simulation
+        Samples in which the unit is off are not recorded, as it gives no output then.
+
+    Raises
+    ------
+    InputError
+        If something can't be recorded, or the unit is never on.
+    """
+    world = _world(programme, twin, sample_s, seed, columns, facts, truth)
+    length = len(world.timeline)
+    kept: dict[str, FloatArray] = {}
+    kept_truth: dict[str, FloatArray] = {}
+    rows = 0
+    for recorded, true in _blocks(world):
+        count = len(recorded["time"])
+        for target, block in ((kept, recorded), (kept_truth, true.columns() if true else {})):
+            for name, values in block.items():
+                whole = target.setdefault(name, np.empty(length) if count < length else values)
+                if whole is not values:
+                    whole[rows : rows + count] = values
+        rows += count
+    if not rows:
+        raise _never_on(world)
+    run = Run(world.twin.name, {name: values[:rows] for name, values in kept.items()}, world.facts)
+    if not truth:
+        return Simulation(run)
+    from fogml.twin.truth import truth_from_columns
+
+    return Simulation(run, truth_from_columns({cell: values[:rows] for cell, values in kept_truth.items()}))
+
+
+def simulate_to_file(
+    programme: Programme | str | Mapping[str, Any] | Sequence[Any],
+    twin: Twin | str | Path,
+    path: str | Path,
+    *,
+    sample_s: float = 1.0,
+    seed: int = 0,
+    columns: Sequence[str] | None = None,
+    facts: Facts | None = None,
+    truth_path: str | Path | None = None,
+    progress: Any = None,
+) -> int:
+    """Run a twin through a programme into a file, block by block in bounded memory.
+
+    Parameters
+    ----------
+    programme, twin, sample_s, seed, columns, facts
+        As for `simulate`, which gives the same numbers.
+    path
+        The run, ``.csv`` or ``.parquet``.
+    truth_path
+        Where the truth of every node and effect goes, if anywhere; ``.csv`` or ``.parquet``.
+    progress
+        Called with the number of samples after each block, if given.
+
+    Returns
+    -------
+    int
+        How many samples were recorded.
+
+    Raises
+    ------
+    InputError
+        As `simulate`, or if a file can't be written.
+    """
+    from concurrent.futures import ThreadPoolExecutor
+
+    from fogml.runs.writing import BlockWriter
+
+    world = _world(programme, twin, sample_s, seed, columns, facts, truth_path is not None)
+    rows = 0
+    with ExitStack() as stack:
+        writer = stack.enter_context(BlockWriter(path, world.facts))
+        truth_writer = None
+        if truth_path is not None:
+            truth_writer = stack.enter_context(BlockWriter(truth_path))
+        # Writing takes as long as the rest: a block is written beside the next one's work.
+        beside = stack.enter_context(ThreadPoolExecutor(max_workers=1))
+        pending = None
+        for recorded, true in _blocks(world):
+            if pending is not None:
+                pending.result()
+            if len(recorded["time"]):
+                pending = beside.submit(_write, writer, truth_writer, recorded, true)
+                rows += len(recorded["time"])
+            if progress is not None:
+                progress(min(BLOCK_ROWS, len(world.timeline)))
+        if pending is not None:
+            pending.result()
+        if not rows:
+            raise _never_on(world)
+    return rows
+
+
+def _write(writer: Any, truth_writer: Any, recorded: Mapping[str, FloatArray], true: Truth | None) -> None:
+    writer.write({header(name, _units(name)): values for name, values in recorded.items()})
+    if truth_writer is not None and true is not None:
+        truth_writer.write(true.columns())
+
+
+def _units(name: str) -> str | None:
+    return "s" if name == "time_on" else None
+
+
+def _never_on(world: World) -> InputError:
+    return InputError(f"{world.timeline.programme.name}: the unit is never on; add a step with 'power on'")
+
+
+def _world(
+    programme: Any,
+    twin: Twin | str | Path,
+    sample_s: float,
+    seed: int,
+    columns: Sequence[str] | None,
+    facts: Facts | None,
+    truth: bool,
+) -> World:
+    if not isinstance(programme, Programme):
+        programme = load_programme(programme)
+    if not isinstance(twin, Twin):
+        from fogml.twin.twin_file import load_twin
+
+        twin = load_twin(twin)
+    facts = DEFAULT_FACTS if facts is None else facts
+    stated = facts.model_copy(update={"unit": facts.unit or twin.name})
+    names = tuple(DEFAULT_COLUMNS if columns is None else columns)
+    for name in names:
+        if name in ("time", "gyro") or (name not in KNOWN and coil_sensor_number(name) is None):
+            known = [key for key in KNOWN if key not in ("time", "gyro")]
+            raise InputError(
+                f"columns: '{name}' can't be recorded; known are {', '.join(known)} and coil sensors T1, T2 ..."
+            )
+    if len(set(names)) < len(names):
+        raise InputError("columns: one is named twice")
+    return World(programme, twin, sample_s, seed, names, stated, truth)
+
+
+def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
+    """Recorded columns, and the truth, block by block."""
+    for samples in world.samples(BLOCK_ROWS):
+        chain = world.output(samples)
+        yield _recorded(world, samples, chain)
+
+
+def _recorded(
+    world: World, samples: Samples, chain: ChainOutput
+) -> tuple[dict[str, FloatArray], Truth | None]:
+    inputs = samples.inputs
+    recorded = {"time": inputs.time, "gyro": world.logged(samples, chain.output + samples.noise)}
+    for name in world.columns:
+        if is_temperature(name):
+            recorded[name] = world.sensed(name, samples)
+        elif name == "rate":
+            recorded[name] = inputs.table_rate
+        else:
+            recorded[name] = inputs.drives[name]
+    if world.power_cycles:
+        recorded["time_on"] = inputs.time_on_s
+    if not world.truth:
+        return recorded, None
+    free = world.noise_free(samples, chain.output)
+    return recorded, Truth(
+        inputs.time,
+        inputs.temperatures,
+        inputs.table_rate,
+        inputs.drives,
+        inputs.time_on_s,
+        free,
+        samples.noise,
+        {**chain.contributions, **world.other_contributions(samples, chain.output, free)},
+    )

@@ -1,0 +1,126 @@
+"""What a simulated run really was: every node, what moved it, and what each effect made of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.columns import header, parse_header
+from fogml.runs.run import FloatArray
+
+_PART = "contribution of "
+_DRIVE_UNITS = {"heading": "deg", "shaking": "1", "dose": "Gy"}
+
+
+@dataclass(frozen=True, eq=False)
+class Truth:
+    """The truth of a simulation at each recorded sample; all columns of shape (n,).
+
+    Attributes
+    ----------
+    time
+        Time [s].
+    nodes
+        Temperature of every node of the plant [degC].
+    table_rate
+        Table rate about the input axis [deg/s].
+    drives
+        What else acts on the unit, by the run format's names and in its units.
+    time_on
+        Time since the latest power-on [s]; infinite where that was long before.
+    noise_free
+        The output without noise, as logged [deg/h].
+    noise
+        The noise before the logger [deg/h].
+    contributions
+        What each effect makes of the output [deg/h], and ``nominal`` for the nominal gyro. Effects
+        from rig to read-out and ``nominal`` add to the output before the logger. A thermal effect's
+        is the difference that it makes by way of the nodes, a sensor effect's what a replay lacks
+        that trusts the sensors, a logger effect's what it changes. Empty unless asked for.
+    """
+
+    time: FloatArray
+    nodes: Mapping[str, FloatArray]
+    table_rate: FloatArray
+    drives: Mapping[str, FloatArray]
+    time_on: FloatArray
+    noise_free: FloatArray
+    noise: FloatArray
+    contributions: Mapping[str, FloatArray] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def columns(self) -> dict[str, FloatArray]:
+        """Header cell to values, as in a truth file."""
+        columns = {"time [s]": self.time, "rate [deg/s]": self.table_rate, "time_on [s]": self.time_on}
+        columns |= {f"{name} [degC]": values for name, values in self.nodes.items()}
+        columns |= {header(name, _DRIVE_UNITS.get(name)): values for name, values in self.drives.items()}
+        columns |= {"noise_free [deg/h]": self.noise_free, "noise [deg/h]": self.noise}
+        return columns | {f"{_PART}{id} [deg/h]": values for id, values in self.contributions.items()}
+
+    def check_fits(self, time: FloatArray, name: str) -> None:
+        """Check that this is the truth of a recording with these times.
+
+        Raises
+        ------
+        InputError
+            If it is not.
+        """
+        if len(time) != len(self.time) or not np.allclose(time, self.time, rtol=0.0, atol=1e-6):
+            raise InputError(
+                f"{name}: its {len(time)} times are not those of the truth, which has {len(self.time)}; "
+                "give the truth that was written together with this run"
+            )
+
+
+def truth_from_columns(columns: Mapping[str, FloatArray], source: str = "truth") -> Truth:
+    """The truth from the columns of its file.
+
+    Raises
+    ------
+    InputError
+        If a column is missing.
+    """
+    named = {parse_header(cell)[0]: np.asarray(values, np.float64) for cell, values in columns.items()}
+    for name in ("time", "rate", "time_on", "noise_free", "noise"):
+        if name not in named:
+            raise InputError(
+                f"{source}: no column '{name}'; a file that `fogml simulate --truth` wrote is needed"
+            )
+    parts = {name.removeprefix(_PART): named.pop(name) for name in list(named) if name.startswith(_PART)}
+    time, rate, on = (named.pop(name) for name in ("time", "rate", "time_on"))
+    free, noise = named.pop("noise_free"), named.pop("noise")
+    nodes = {name: values for name, values in named.items() if name.startswith("T_")}
+    drives = {name: values for name, values in named.items() if name not in nodes}
+    return Truth(time, nodes, rate, drives, on, free, noise, parts)
+
+
+def read_truth(path: str | Path) -> Truth:
+    """The truth in a Parquet or CSV file.
+
+    Raises
+    ------
+    InputError
+        If it can't be read or is none.
+    """
+    import pyarrow as arrow
+
+    path = Path(path)
+    try:
+        if path.suffix.lower() == ".parquet":
+            from pyarrow import parquet
+
+            table = parquet.read_table(path)
+        else:
+            from pyarrow import csv
+
+            table = csv.read_csv(path)
+        columns = {name: table.column(name).to_numpy() for name in table.column_names}
+    except (OSError, arrow.ArrowException) as error:
+        raise InputError(f"{path}: no truth can be read from it ({str(error).splitlines()[0]})") from None
+    return truth_from_columns(columns, path.name)

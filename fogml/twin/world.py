@@ -1,0 +1,263 @@
+"""The world of a simulation: chamber, plant, surroundings, gyro and sensors on one clock, block by block."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.twin.chain import ChainOutput, heading_of, logged, sensed, sensor_shares, through_chain
+from fogml.twin.effect import LoggerEffect, NoiseEffect, ThermalEffect
+from fogml.twin.inputs import REST, Inputs
+from fogml.twin.memory import Memory
+from fogml.twin.noise import NoiseSource, stream
+from fogml.twin.plant.network import AIR, PlantState
+from fogml.twin.programme import Programme
+from fogml.twin.timeline import TimelineBlock, timeline
+from fogml.twin.twin import RATE_WINDOW_S, Twin
+
+_ALL_DRIVES = (
+    "angle",
+    "power",
+    "supply",
+    "humidity",
+    "vibration",
+    "compressor",
+    "heater",
+    "fan",
+    "B_x",
+    "B_y",
+    "B_z",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Recorded samples of a block: what acts on the gyro, and the noise that comes on top [deg/h].
+
+    `without` holds, for each thermal effect, the inputs as they would be without it.
+    """
+
+    inputs: Inputs
+    noise: FloatArray
+    without: dict[str, Inputs]
+
+
+class _Branch:
+    """Plant and chain of one twin, with what they remember."""
+
+    def __init__(self, twin: Twin) -> None:
+        self.twin = twin
+        self.network = twin.network
+        self.state = PlantState()
+        self.chamber_memory, self.memory = Memory(), Memory()
+
+    def nodes(
+        self, block: TimelineBlock, drives: dict[str, FloatArray], rate: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Temperature of every node at all samples of the block, on or off."""
+        chamber = block.set_point
+        for declared, setting in self.twin.stage(ThermalEffect):
+            assert isinstance(declared, ThermalEffect)
+            inputs = Inputs(block.time, {AIR: chamber}, rate, drives=drives, memory=self.chamber_memory)
+            chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
+        return self.network.temperatures(
+            block.time,
+            chamber,
+            powered=block.timeline.power_windows,
+            fan=block.fan,
+            table_rate=rate,
+            state=self.state,
+        )
+
+
+class World:
+    """Everything that a simulation remembers from block to block.
+
+    Parameters
+    ----------
+    programme, twin, sample_s, seed
+        What is simulated.
+    columns
+        What is recorded beside time and gyro.
+    facts
+        Set-up facts; power-on is added.
+    truth
+        Whether contributions are asked for.
+    """
+
+    def __init__(
+        self,
+        programme: Programme,
+        twin: Twin,
+        sample_s: float,
+        seed: int,
+        columns: tuple[str, ...],
+        facts: Facts,
+        truth: bool,
+    ) -> None:
+        self.timeline = timeline(programme, sample_s)
+        self.twin, self.columns, self.truth = twin, columns, truth
+        ons = [on for on, _ in self.timeline.power_windows]
+        self._power_ons = ons or [math.inf]
+        first = self._power_ons[0]
+        self.facts = facts.model_copy(update={"powered_on": first if math.isfinite(first) else None})
+        self._main = _Branch(twin)
+        self._without = {}
+        if truth:
+            thermal = [declared.id for declared, _ in twin.stage(ThermalEffect)]
+            self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
+        self._drives = self._needed_drives()
+        self._noise = NoiseSource(twin.noise, seed, sample_s)
+        self._extra_noise = [
+            (declared, setting, stream(seed, f"effect {declared.id}"))
+            for declared, setting in twin.stage(NoiseEffect)
+        ]
+        self._sensor_rng = {name: stream(seed, f"sensor {name}") for name in columns}
+        self._sensor_memory, self._share_memory = Memory(), Memory()
+        self._log_memory, self._free_memory = Memory(), Memory()
+        self._check_sensors()
+
+    @property
+    def power_cycles(self) -> bool:
+        """Whether the unit is switched on more than once."""
+        return len(self._power_ons) > 1
+
+    def samples(self, block_rows: int) -> Iterator[Samples]:
+        """What acts on the gyro at all samples in which it is on, block by block."""
+        for block in self.timeline.blocks(block_rows):
+            yield self._samples(block)
+
+    def output(self, samples: Samples) -> ChainOutput:
+        """The chain's output for the next block."""
+        return through_chain(self.twin, samples.inputs, samples.inputs, contributions=self.truth)
+
+    def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
+        """The output as recorded."""
+        return logged(self.twin, output, replace(samples.inputs, memory=self._log_memory))
+
+    def noise_free(self, samples: Samples, output: FloatArray) -> FloatArray:
+        """The output as it would be recorded without noise."""
+        return logged(self.twin, output, replace(samples.inputs, memory=self._free_memory))
+
+    def sensed(self, name: str, samples: Samples) -> FloatArray:
+        """What the sensor behind a temperature column records."""
+        inputs = replace(samples.inputs, memory=self._sensor_memory)
+        place = self.twin.sensors.place(name)
+        if len(place) == 1:
+            temperature = inputs.temperature(next(iter(place)))
+        else:
+            temperature = sum(
+                (weight * inputs.temperature(node) for node, weight in place.items()), np.zeros(len(inputs))
+            )
+        return sensed(self.twin, name, temperature, inputs, self._sensor_rng[name])
+
+    def other_contributions(
+        self, samples: Samples, output: FloatArray, noise_free: FloatArray
+    ) -> dict[str, FloatArray]:
+        """Contributions of the effects before and after the chain [deg/h]."""
+        parts: dict[str, FloatArray] = {}
+        for id, inputs in samples.without.items():
+            parts[id] = output - through_chain(self._without[id].twin, inputs, inputs).output
+        parts |= sensor_shares(
+            self.twin, replace(samples.inputs, memory=self._share_memory).with_output(output)
+        )
+        loggers = self.twin.stage(LoggerEffect)
+        if loggers:
+            # One logger is the rule; what several change together is told of the first.
+            parts |= {declared.id: np.zeros(len(output)) for declared, _ in loggers}
+            parts[loggers[0][0].id] = noise_free - output
+        return parts
+
+    def _samples(self, block: TimelineBlock) -> Samples:
+        facts = self.facts
+        angle = block.angle + block.yaw
+        heading = heading_of(facts, angle)
+        rate = block.table_rate if heading is None else np.zeros(len(block))
+        rate = -rate if facts.input_axis == "down" else rate
+        drives = self._block_drives(block, angle, heading)
+        noise = self._noise.block(len(block))
+        for declared, setting, rng in self._extra_noise:
+            assert isinstance(declared, NoiseEffect)
+            noise += declared.draw(
+                rng, len(block), self.timeline.sample_s, setting.amplitude, **setting.shape
+            )
+        on = block.powered > 0.0
+        rows = slice(None) if on.all() else on
+        drives_on = {name: values[rows] for name, values in drives.items()}
+
+        def inputs(branch: _Branch) -> Inputs:
+            nodes = branch.nodes(block, drives, rate)
+            return Inputs(
+                time=block.time[rows],
+                temperatures={name: values[rows] for name, values in nodes.items()},
+                table_rate=rate[rows],
+                earth_deg_h=facts.earth_rate_deg_h or 0.0,
+                facts=facts,
+                powered_on_s=self._power_ons[0],
+                power_ons_s=tuple(self._power_ons[1:]),
+                drives=drives_on,
+                rate_window_s=RATE_WINDOW_S,
+                memory=branch.memory,
+            )
+
+        without = {id: inputs(branch) for id, branch in self._without.items()}
+        return Samples(inputs(self._main), noise[rows], without)
+
+    def _needed_drives(self) -> set[str]:
+        """Drives that are recorded, or that an effect reads; all of them for the truth."""
+        if self.truth:
+            return set(_ALL_DRIVES)
+        needed = {need for declared, _ in self.twin.on for need in declared.needs}
+        return needed | set(self.columns)
+
+    def _block_drives(
+        self, block: TimelineBlock, angle: FloatArray, heading: FloatArray | None
+    ) -> dict[str, FloatArray]:
+        outside, needed = self.twin.surroundings, self._drives
+        drives = {"angle": angle, "fan": block.fan}
+        if heading is not None:
+            drives["heading"] = heading
+        if needed & {"compressor", "vibration"}:
+            drives["compressor"] = block.compressor
+        if "vibration" in needed:
+            shaken = outside.compressor_vibration * drives["compressor"]
+            drives["vibration"] = outside.vibration + shaken
+        if "heater" in needed:
+            drives["heater"] = block.heater
+        if "humidity" in needed:
+            drives["humidity"] = block.humidity
+        if "supply" in needed:
+            drives["supply"] = np.full(len(block), outside.supply)
+        if "power" in needed:
+            drives["power"] = self._main.network.heating.power(block.time, self.timeline.power_windows)
+        if needed & {"B_x", "B_y", "B_z"}:
+            drives |= self._field(angle, heading)
+        return drives
+
+    def _field(self, angle: FloatArray, heading: FloatArray | None) -> dict[str, FloatArray]:
+        """Earth's field in the gyro frame [uT]: z along the input axis, x up where that is horizontal."""
+        north, up = self.twin.surroundings.horizontal_field, self.twin.surroundings.vertical_field
+        turned = np.radians(angle if heading is None else heading)
+        along, across = north * np.cos(turned), -north * np.sin(turned)
+        level = np.full(len(angle), -up if self.facts.input_axis == "down" else up)
+        if heading is None:
+            return {"B_x": along, "B_y": across, "B_z": level}
+        return {"B_x": level, "B_y": across, "B_z": along}
+
+    def _check_sensors(self) -> None:
+        known = {*self._main.network.names, "T"}
+        for name in self.columns:
+            if name in REST or name in ("rate", "angle"):
+                continue
+            for node in self.twin.sensors.place(name):
+                if node not in known:
+                    raise InputError(
+                        f"columns: '{name}' reads '{node}', which the plant does not have; "
+                        f"it has {', '.join(sorted(known))}"
+                    )
