@@ -157,7 +157,7 @@ def _finite_rows(
         return rows, None
     first = int(np.argmax(bad))
     count = int(bad.sum())
-    message = f"{count} rows with missing or infinite values dropped, the first: {table.row_name(first)}"
+    message = f"rows dropped for missing or infinite values: {count}, the first: {table.row_name(first)}"
     return np.flatnonzero(~bad), Finding("repaired_rows", message, row=first + 1, count=count)
 
 
@@ -173,7 +173,7 @@ def _ordered_rows(
     if not repair:
         raise _order_error(table, False, int(rows[first]))
     count = int(back.sum())
-    message = f"time goes back {count} times, first at {table.row_name(int(rows[first]))}; rows were sorted"
+    message = f"rows sorted, as time goes back: {count} times, first at {table.row_name(int(rows[first]))}"
     order = np.argsort(time, kind="stable")
     return order, Finding("repaired_order", message, column="time", row=int(rows[first]) + 1, count=count)
 
@@ -189,7 +189,7 @@ def _new_times(
     first = int(rows[repeats[0]])
     if not repair:
         raise _order_error(table, True, first)
-    message = f"{len(repeats)} rows that repeat a time dropped, the first: {table.row_name(first)}"
+    message = f"rows dropped that repeat a time: {len(repeats)}, the first: {table.row_name(first)}"
     kept = np.delete(np.arange(len(rows), dtype=np.intp), repeats)
     return kept, Finding("repaired_repeats", message, column="time", row=first + 1, count=len(repeats))
 

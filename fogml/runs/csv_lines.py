@@ -127,7 +127,7 @@ class LineReader:
         ]
         if self.first_fault is not None:
             row, message = self.first_fault
-            message = f"{self.dropped} rows that can't be read dropped, the first: {message}"
+            message = f"rows dropped that can't be read: {self.dropped}, the first: {message}"
             found.append(Finding("repaired_rows", message, row=row, count=self.dropped))
         return found
 
