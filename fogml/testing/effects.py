@@ -168,7 +168,7 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
         least, most = quantity.limits
         shape[quantity.name] = float(np.clip(shape[quantity.name], least + step, most - step))
         matters = False
-        for name in ("programme", "horizontal"):
+        for name in ("programme", "horizontal", "only T"):
             coarse = _slope(effect, inputs[name], shape, quantity.name, step)
             fine = _slope(effect, inputs[name], shape, quantity.name, 0.5 * step)
             assert np.isfinite(coarse).all(), f"{effect.id}: slope against {quantity.name} is not finite"
