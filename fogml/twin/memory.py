@@ -95,6 +95,24 @@ class Memory:
         self._states[key] = (float(x[-1]),)
         return np.concatenate([[before], x[:-1]])
 
+    def least(self, key: str, x: FloatArray) -> FloatArray:
+        """Smallest x so far, shape (n,)."""
+        (before,) = self._states.get(key, (float("inf"),))
+        out = np.minimum(before, np.minimum.accumulate(x))
+        self._states[key] = (float(out[-1]) if len(out) else before,)
+        return np.asarray(out)
+
+    def recent(
+        self, key: str, time: FloatArray, x: FloatArray, span_s: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """Time and x of these samples and of those before them, back to `span_s` and one sample more."""
+        old_time, old_x = self._histories.get(key, (np.empty(0), np.empty(0)))
+        all_time, all_x = np.concatenate([old_time, time]), np.concatenate([old_x, x])
+        if len(all_time):
+            past = int(np.searchsorted(all_time, all_time[-1] - span_s)) - 1
+            self._histories[key] = (all_time[max(past, 0) :].copy(), all_x[max(past, 0) :].copy())
+        return all_time, all_x
+
     def first(self, key: str, x: FloatArray) -> float:
         """The very first sample of x, of all blocks; NaN before there is one."""
         if len(x) and key not in self._states:
