@@ -74,7 +74,7 @@ def candidates_for(runs: Sequence[Run], rates_told: bool) -> list[Candidate]:
     if len(sensors) >= _MANY_SENSORS:
         texts |= {", ".join(form.format(name) for name in sensors) for form in _EACH_SENSOR}
     linear = [STANDARD, *(Candidate(text) for text in sorted(texts - {STANDARD.features}))]
-    networks = ["T", "T, dT, T*dT", *([f"T, dT, T*dT, {gradient[-1]}"] if faces else [])]
+    networks = ["T", *(", ".join(part for part in ("T, dT, T*dT", extra) if part) for extra in gradient)]
     return [*linear, *(Candidate(text, network=True) for text in networks)]
 
 
