@@ -1,0 +1,42 @@
+"""Paste the experiments' tables into the README: ``python -m experiments.update_readme``."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from fogml.outputs import whole_file
+
+ROOT = Path(__file__).parents[1]
+SECTIONS = {
+    "thermal-cycle": ("thermal_cycle/results.md", "## rms (bias included)"),
+    "thermal-cycle-stability": ("thermal_cycle/results.md", "## Bias stability"),
+    "thermal-cycle-both": ("thermal_cycle/results.md", "and `up`, judged on `last down`"),
+    "known-floor": ("known_floor/results.md", "# Residual over a known floor"),
+    "default-rates": ("default_rates/results.md", "# The default at other ramp rates"),
+}
+
+
+def table_after(text: str, heading: str) -> str:
+    """The first Markdown table below a line that contains `heading`."""
+    below = text[text.index(heading) :]
+    table = re.search(r"(?:^\|.*\n)+", below, flags=re.MULTILINE)
+    if table is None:
+        raise ValueError(f"no table below '{heading}'")
+    return table[0]
+
+
+def main() -> None:
+    """Replace what stands between the markers of each section."""
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    for name, (page, heading) in SECTIONS.items():
+        table = table_after((ROOT / "experiments" / page).read_text(encoding="utf-8"), heading)
+        begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
+        start, stop = readme.index(begin) + len(begin), readme.index(end)
+        readme = readme[:start] + table + readme[stop:]
+    with whole_file(ROOT / "README.md") as partial:
+        partial.write_text(readme, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
