@@ -13,20 +13,24 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import BoolArray, FloatArray, Run
 
 STUCK_S = 600.0
 """A sensor that shows one value for longer [s] may be stuck."""
 MOVED_DEGC = 0.5
 """What another sensor must have moved by meanwhile [degC], at least."""
-SATURATED_SAMPLES = 20
+SATURATED_SAMPLES = 3
 """Samples at an extreme, one after the other, from which on the output may saturate."""
 SMALL_SPAN_DEGC = 5.0
 """A temperature span under this [degC] is small."""
 _IRREGULAR_SHARE = 0.01
 _IRREGULAR_INTERVAL = 0.1
-_RARE = 10
-"""A spell of one value is odd if it is this many times longer than is usual in the column."""
+_LEAST_SPELLS = 100
+_NOISY_SPELL = 2
+_LEAST_STEPS = 8
+_TAIL_RATIO = 3
+_RESTING_SAMPLES = 10
+_RESTING_RATIO = 10
 
 IndexArray = NDArray[np.intp]
 
@@ -34,12 +38,21 @@ IndexArray = NDArray[np.intp]
 def check_run(run: Run) -> tuple[Finding, ...]:
     """Everything noticed in a run, in O(n).
 
-    ``gap``: intervals longer than 3 median sample intervals. ``irregular_sampling``: more than
-    1 % of the other intervals are off the median by more than a tenth. ``stuck_sensor``: one
-    value for over 10 min while a temperature moves by more than 0.5 degC and more than twice the
-    resolution of the sensor. ``saturation``: the gyro stays at its greatest or least value for 20
-    samples, and ten times longer than at any value between. ``outliers``: gyro samples over 8
-    robust sigma off their neighbours. ``small_temperature_span``: under 5 degC.
+    ``gap``
+        Intervals longer than 3 median sample intervals.
+    ``irregular_sampling``
+        More than 1 % of the other intervals are off the median by more than a tenth.
+    ``stuck_sensor``
+        A temperature holds one value for over 10 min while another moves by more than 0.5 degC
+        and more than twice the sensor's resolution; or the gyro does, whose samples else differ.
+    ``saturation``
+        The gyro stays at its greatest or least value for 3 samples on end, and is there over 3
+        times more often than at the value next to it, so that noise is cut off there; not
+        where a quiet output rests at other values as well.
+    ``outliers``
+        Gyro samples over 8 robust sigma off the median of the five about them (`find_outliers`).
+    ``small_temperature_span``
+        Under 5 degC.
     """
     if len(run) < 2:
         return ()
@@ -86,9 +99,11 @@ def _stuck(run: Run) -> Iterator[Finding]:
             continue
         least = max(MOVED_DEGC, 2.0 * _resolution(values)) if name != "gyro" else MOVED_DEGC
         if name == "gyro":
-            # A coarse output may rest at one value for long; only one that flickers otherwise is odd.
-            rest = (len(values) - int((stops - starts)[long].sum())) / max(len(starts) - len(long), 1)
-            long = long[(stops - starts)[long] > _RARE * max(rest, 1.0)] if rest else long[:0]
+            # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
+            spells = len(starts) - len(long)
+            samples = len(values) - int((stops - starts)[long].sum())
+            if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
+                continue
         others = [run.columns[other] for other in temperatures if other != name]
         found = [i for i in long.tolist() if any(np.ptp(x[starts[i] : stops[i]]) > least for x in others)]
         if found:
@@ -121,19 +136,31 @@ def _saturated(run: Run) -> Iterator[Finding]:
         message = f"'gyro' is {greatest:.6g} in every sample; the output may be dead"
         yield Finding("saturation", message, column="gyro", row=1, count=len(gyro))
         return
-    at_extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
-    if max(int(np.count_nonzero(at)) for _, at in at_extremes) < SATURATED_SAMPLES:
-        return
-    starts, stops = _spells(gyro)
-    lengths = stops - starts
-    between = (gyro[starts] != greatest) & (gyro[starts] != least)
-    # A coarse or quiet output rests at other values as long.
-    usual = max(SATURATED_SAMPLES - 1, _RARE * int(lengths[between].max(initial=0)))
-    for extreme, at in at_extremes:
-        if lengths[at[starts]].max(initial=0) > usual:
-            count = int(np.count_nonzero(at))
+    if greatest - least < _LEAST_STEPS * _resolution(gyro):
+        return  # so few steps hold no shape of noise that could be cut off
+    extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
+    usual = None
+    for extreme, at in extremes:
+        count, spell = int(np.count_nonzero(at)), _longest(at)
+        if spell < SATURATED_SAMPLES:
+            continue
+        if usual is None:
+            same = gyro[1:] == gyro[:-1]
+            usual = _longest(same & ~extremes[0][1][1:] & ~extremes[1][1][1:]) + 1
+        others = gyro[~at]
+        next_to = others.max() if extreme == greatest else others.min()
+        is_tail = count <= _TAIL_RATIO * np.count_nonzero(others == next_to)
+        # A quiet output of few steps rests at other values too.
+        rests = usual >= _RESTING_SAMPLES and spell < _RESTING_RATIO * usual
+        if not is_tail and not rests:
             message = f"{count} samples of 'gyro' at its extreme of {extreme:.6g}; the output may saturate"
             yield Finding("saturation", message, column="gyro", row=int(np.argmax(at)) + 1, count=count)
+
+
+def _longest(mask: BoolArray) -> int:
+    """Most neighbouring samples that are True."""
+    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
 def _outliers(run: Run) -> Iterator[Finding]:
@@ -142,7 +169,7 @@ def _outliers(run: Run) -> Iterator[Finding]:
         row = int(found[0])
         samples = "1 sample" if len(found) == 1 else f"{len(found)} samples"
         message = (
-            f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({sigma:.4g}) off their "
+            f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({sigma[0]:.4g}) off their "
             f"neighbours, the first {run.gyro[row]:.6g} at {run.time[row]:.6g} s; kept"
         )
         yield Finding("outliers", message, column="gyro", row=row + 1, count=len(found))

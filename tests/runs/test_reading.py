@@ -1,0 +1,340 @@
+"""Run files of all formats as other programs write them, read to the last digit."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pyarrow as arrow
+import pyarrow.parquet as parquet
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from fogml.errors import InputError
+from fogml.runs.columns import KNOWN
+from fogml.runs.reading import read_blocks, read_run
+from fogml.runs.run import Run
+from tests.runs.files import SUFFIXES, csv_of, samples, write_table
+
+finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
+moderate = st.floats(-1e9, 1e9)
+slow = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+@st.composite
+def tables(draw, values=finite):
+    """Header cells of the run format in internal units, and any finite values; time increases."""
+    names = draw(st.sets(st.sampled_from([*sorted(set(KNOWN) - {"time", "gyro"}), "T1", "T2", "T17"])))
+    rows = draw(st.integers(2, 12))
+    time = draw(st.lists(moderate, min_size=rows, max_size=rows, unique=True).map(sorted))
+    cells = [f"{name} [{KNOWN[name].internal if name in KNOWN else 'degC'}]" for name in sorted(names)]
+    columns = {"time [s]": time, "gyro [deg/h]": draw(st.lists(finite, min_size=rows, max_size=rows))}
+    columns |= {cell: draw(st.lists(values, min_size=rows, max_size=rows)) for cell in cells}
+    return {cell: np.array(column) for cell, column in columns.items()}
+
+
+def same(run: Run, columns) -> bool:
+    read = {cell.split(" [")[0]: values for cell, values in columns.items()}
+    # HDF5 knows columns by name only, without order.
+    return set(run.columns) == set(read) and all(
+        np.array_equal(run.columns[name], values) for name, values in read.items()
+    )
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@slow
+@given(columns=tables())
+def test_any_numbers_come_back_to_the_last_digit(tmp_path, suffix, columns):
+    path = write_table(tmp_path / f"run{suffix}", columns)
+    assert same(read_run(path), columns)
+
+
+@slow
+@given(
+    columns=tables(),
+    separator=st.sampled_from([";", "\t", ","]),
+    comma=st.booleans(),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    quoted=st.booleans(),
+    bom=st.booleans(),
+    leading=st.integers(0, 3),
+    blank=st.booleans(),
+    trailing=st.integers(0, 2),
+    in_header=st.booleans(),
+    end=st.booleans(),
+)
+def test_any_dialect(
+    tmp_path, columns, separator, comma, line_end, quoted, bom, leading, blank, trailing, in_header, end
+):
+    lines = csv_of(columns, separator, "," if comma else ".", "\n", quoted).splitlines()
+    lines = [line + separator * (trailing if number or in_header else 0) for number, line in enumerate(lines)]
+    text = line_end * leading + (line_end * (1 + blank)).join(lines) + (line_end if end else "")
+    path = tmp_path / "run.csv"
+    path.write_bytes((b"\xef\xbb\xbf" if bom else b"") + text.encode())
+    run = read_run(path)
+    assert same(run, columns)
+    assert ("unfinished_line" in [finding.code for finding in run.findings]) is not end
+    assert same(next(read_blocks(path)), columns)
+
+
+UNITS = [
+    ("time [ms]", 1500.0, "time", 1.5),
+    ("time [us]", 2.5e6, "time", 2.5),
+    ("time [ns]", 2.5e9, "time", 2.5),
+    ("time [min]", 2.5, "time", 150.0),
+    ("time [h]", 2.5, "time", 9000.0),
+    ("time [sec]", 2.5, "time", 2.5),
+    ("gyro [deg/s]", 0.01, "gyro", 36.0),
+    ("gyro [°/h]", 0.5, "gyro", 0.5),
+    ("gyro [°/s]", 0.5, "gyro", 1800.0),
+    ("gyro [rad/s]", 1e-6, "gyro", 1e-6 * 3600 * 180 / np.pi),
+    ("T [K]", 300.0, "T", 26.85),
+    ("T [°C]", 26.85, "T", 26.85),
+    ("T_in [K]", 273.15, "T_in", 0.0),
+    ("T_out [K]", 0.0, "T_out", -273.15),
+    ("T7 [K]", 300.0, "T7", 26.85),
+    ("T_chamber [K]", 300.0, "T_chamber", 26.85),
+    ("T_case [C]", 1.0, "T_case", 1.0),
+    ("T_electronics [K]", 300.0, "T_electronics", 26.85),
+    ("rate [deg/h]", 3600.0, "rate", 1.0),
+    ("rate [rad/s]", 1.0, "rate", 180 / np.pi),
+    ("rate [deg/s]", 10.0, "rate", 10.0),
+    ("angle [rad]", np.pi, "angle", 180.0),
+    ("angle [deg]", 90.0, "angle", 90.0),
+    ("power [W]", 2.0, "power", 2.0),
+    ("supply [V]", 5.0, "supply", 5.0),
+    ("humidity [%]", 40.0, "humidity", 40.0),
+    ("vibration [g]", 0.1, "vibration", 0.1),
+    ("compressor [%]", 50.0, "compressor", 0.5),
+    ("heater [0/1]", 1.0, "heater", 1.0),
+    ("fan [%]", 100.0, "fan", 1.0),
+    ("B_x [G]", 0.5, "B_x", 50.0),
+    ("B_y [uT]", 50.0, "B_y", 50.0),
+    ("B_z [µT]", 50.0, "B_z", 50.0),
+]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("cell, value, name, internal", UNITS)
+def test_units_are_brought_to_the_internal_ones(tmp_path, suffix, cell, value, name, internal):
+    columns = {"time [s]": np.arange(3.0), "gyro [deg/h]": np.arange(3.0)}
+    columns = {other: values for other, values in columns.items() if not other.startswith(f"{name} ")}
+    columns[cell] = np.array([0.0, value / 2, value]) if name == "time" else np.full(3, value)
+    run = read_run(write_table(tmp_path / f"run{suffix}", columns))
+    assert run.columns[name][-1] == pytest.approx(internal, rel=1e-15, abs=1e-13)
+
+
+def test_every_unit_of_the_run_format_is_tested():
+    tested = {(name, cell.split("[")[1][:-1]) for cell, _, name, _ in UNITS}
+    aliases = {"°/h": "deg/h", "°C": "degC", "C": "degC", "µT": "uT", "sec": "s"}
+    tested |= {(name, aliases.get(unit, unit)) for name, unit in tested}
+    conversions = {(spec.name, unit) for spec in KNOWN.values() for unit in spec.units if unit != "count"}
+    trivial = {(name, unit) for name, unit in conversions if unit == KNOWN[name].internal}
+    assert conversions - trivial - tested <= {
+        ("compressor", "%"), ("heater", "%"), ("B_y", "G"), ("B_z", "G"), ("T_case", "K")
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+def test_counts_stay_counts_and_become_a_rate_by_the_scale_factor(tmp_path, suffix):
+    columns = {"time [s]": np.arange(3.0), "gyro [count]": np.array([7200.0, 3600.0, 0.0])}
+    path = write_table(tmp_path / f"run{suffix}", columns)
+    with pytest.raises(InputError, match=r"run\..*scale_factor"):
+        _ = read_run(path).gyro_deg_h
+    path.with_suffix(".yaml").write_text('scale_factor: {value: 3600.0, unit: "count per deg/s"}\n')
+    run = read_run(path)
+    assert run.gyro_unit == "count"
+    assert run.gyro.tolist() == [7200.0, 3600.0, 0.0]
+    assert run.gyro_deg_h.tolist() == [7200.0, 3600.0, 0.0]
+
+
+def test_latin_1_with_degree_signs(tmp_path):
+    path = tmp_path / "run.csv"
+    text = "time [s];gyro [°/h];T [°C];Bemerkung\n0,0;1,5;20,25;größer\n1,0;1,6;20,5;ok\n"
+    path.write_bytes(text.encode("latin-1"))
+    run = read_run(path)
+    assert run.gyro.tolist() == [1.5, 1.6]
+    assert run.temperature().tolist() == [20.25, 20.5]
+    assert "Bemerkung" not in run.columns
+    assert [finding.code for finding in run.findings][:1] == ["text_column"]
+
+
+def test_a_decimal_comma_may_first_come_late(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s];gyro [deg/h]\n0;1\n1;2\n2;2,5\n")
+    assert read_run(path).gyro.tolist() == [1.0, 2.0, 2.5]
+
+
+def test_spellings_of_numbers_that_the_fast_parser_does_not_know(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h]\n+0.0, +1.5\n1e0 ,-.5E+1\n 2,  7.\n")
+    assert read_run(path).gyro.tolist() == [1.5, -5.0, 7.0]
+    assert next(read_blocks(path)).gyro.tolist() == [1.5, -5.0, 7.0]
+
+
+def test_unknown_columns_are_kept_and_named(tmp_path):
+    # A table's index comes without a name.
+    columns = {"": np.arange(200.0), **samples(), "flow [l/min]": np.arange(200.0)}
+    run = read_run(write_table(tmp_path / "run.csv", columns))
+    assert run.columns["flow"].tolist() == list(range(200))
+    (note,) = [finding for finding in run.findings if finding.code == "unknown_column"]
+    assert "'flow'" in note.message and note.count == 2
+
+
+@pytest.mark.parametrize("late", [5, 60_000])
+def test_text_in_an_unknown_column_is_no_fault(tmp_path, late):
+    rows = late + 10
+    events = [""] * rows
+    events[late] = "door opened"
+    lines = [f"{i},{i % 7},{1 if late > 10 else ''}{events[i]}" for i in range(rows)]
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h],event\n" + "\n".join(lines) + "\n")
+    for run in (read_run(path), next(read_blocks(path))):
+        assert len(run) == rows
+        told = [finding for finding in run.findings if finding.code == "text_column"]
+        assert [finding.column for finding in told] == ["event"]
+        if "event" in run.columns:
+            assert np.isnan(run.columns["event"][late])
+            assert f"line {late + 2}" in told[0].message
+
+
+def test_missing_values_of_unknown_columns_are_no_fault(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h],flow\n0,1,\n1,2,3\n2,3,NaN\n")
+    flow = read_run(path).columns["flow"]
+    assert np.isnan(flow[[0, 2]]).all() and flow[1] == 3.0
+
+
+@pytest.mark.parametrize(
+    "kind", [np.float32, np.int64, np.int16, np.uint8, np.bool_], ids=lambda kind: kind.__name__
+)
+@pytest.mark.parametrize("suffix", [".parquet", ".h5", ".mat"])
+def test_numbers_of_any_kind(tmp_path, suffix, kind):
+    heater = np.array([0, 1, 1]).astype(kind)
+    columns = {"time [s]": np.arange(3.0), "gyro [deg/h]": np.arange(3.0), "heater [0/1]": heater}
+    run = read_run(write_table(tmp_path / f"run{suffix}", columns))
+    assert run.columns["heater"].tolist() == [0.0, 1.0, 1.0]
+
+
+def test_nanoseconds_since_1970_in_parquet(tmp_path):
+    time = 1_772_438_400_000_000_001 + 10_000_000 * np.arange(5)
+    path = write_table(tmp_path / "run.parquet", {"time [ns]": time, "gyro [deg/h]": np.zeros(5)})
+    assert np.diff(read_run(path).time) == pytest.approx(0.01, abs=1e-6)
+
+
+def test_hdf5_in_a_group_with_rows_or_columns(tmp_path):
+    path = tmp_path / "run.h5"
+    with h5py.File(path, "w") as file:
+        group = file.create_group("run")
+        group["time [s]"] = np.arange(5.0)[:, None]
+        group["gyro [deg/h]"] = np.arange(5.0)[None, :]
+        group["comment"] = "free text"
+        group["calibration"] = np.zeros((3, 3))
+    run = read_run(path)
+    assert run.gyro.tolist() == [0, 1, 2, 3, 4]
+    assert {finding.column for finding in run.findings if finding.code == "left_out"} == {
+        "comment",
+        "calibration",
+    }
+    blocks = list(read_blocks(path, block_rows=2))
+    assert np.concatenate([block.gyro for block in blocks]).tolist() == run.gyro.tolist()
+
+
+def test_mat_with_the_rest_of_a_workspace(tmp_path):
+    path = tmp_path / "run.mat"
+    run_struct = {
+        "time": np.arange(4.0),
+        "gyro": np.ones((1, 4)),
+        "T": np.ones((4, 1)),
+        "fs": 100.0,
+        "matrix": np.eye(3),
+        "comment": "text",
+        "units": {"time": "s", "gyro": "deg/h", "T": "K"},
+        "facts": json.dumps({"unit": "FOG-0417", "latitude": 39.9}),
+    }
+    savemat(path, {"run": run_struct})
+    run = read_run(path)
+    assert run.temperature().tolist() == [-272.15] * 4
+    assert run.facts.unit == "FOG-0417"
+    assert {finding.column for finding in run.findings if finding.code == "left_out"} == {
+        "fs",
+        "matrix",
+        "comment",
+    }
+
+
+class TestFacts:
+    @pytest.fixture
+    def path(self, tmp_path) -> Path:
+        return write_table(tmp_path / "run.csv", samples())
+
+    def test_all_of_them(self, path):
+        path.with_suffix(".yaml").write_text(
+            "unit: 0417\naxis: x\nlatitude: 39.9\ninput_axis: {heading: 30.0}\n"
+            'scale_factor: {value: 2.0, unit: "count per deg/h"}\npowered_on: -60\n'
+            "started: 2026-03-02T08:00:00Z\nnotes: free text\n"
+        )
+        facts = read_run(path).facts
+        # YAML takes 0417 for an octal number; a serial number is a name.
+        assert facts.unit == "0417"
+        assert facts.axis == "x"
+        assert facts.input_axis.heading == 30.0
+        assert facts.scale_factor.count_per_deg_h == 2.0
+        assert facts.powered_on == -60.0
+        assert facts.started == datetime(2026, 3, 2, 8, tzinfo=UTC)
+
+    @pytest.mark.parametrize("name", ["0x1F", "12:30", "2026-03-02", "1_000", "yes", "1e3", "007"])
+    def test_a_serial_number_is_kept_letter_by_letter(self, path, name):
+        path.with_suffix(".yml").write_text(f"unit: {name}\n")
+        assert read_run(path).facts.unit == name
+
+    def test_an_empty_side_file(self, path):
+        path.with_suffix(".yaml").write_text("# nothing known yet\n")
+        assert read_run(path).facts.as_dict() == {}
+
+    def test_a_side_file_comes_before_what_the_file_states(self, tmp_path):
+        path = tmp_path / "run.parquet"
+        table = arrow.table(samples())
+        metadata = {"fogml.facts": json.dumps({"unit": "inside", "axis": "x"})}
+        parquet.write_table(table.replace_schema_metadata(metadata), path)
+        assert read_run(path).facts.unit == "inside"
+        path.with_suffix(".yaml").write_text("unit: beside\n")
+        assert read_run(path).facts.as_dict() == {"unit": "beside"}
+
+    @pytest.mark.parametrize(
+        "text, told",
+        [
+            ("latitud: 39.9", "latitud.*known keys.*latitude"),
+            ("latitude: north", "latitude.*number"),
+            ("latitude: 91", "latitude.*90"),
+            ("latitude: .nan", "latitude"),
+            ("input_axis: sideways", "input_axis.*'up'.*heading"),
+            ("input_axis: {heading: .inf}", "input_axis"),
+            ("scale_factor: 3", "scale_factor.*value: 1.0"),
+            ("scale_factor: {value: 0}", "scale_factor.*0"),
+            ('scale_factor: {value: 1, unit: "V"}', "count per deg/h"),
+            ("started: 2026-13-45", "YAML"),
+            ("started: soon", "started.*2026-03-02"),
+            ("powered_on: .inf", "powered_on"),
+            ("- a\n- b", "key: value"),
+            ("unit: [", "line 1.*YAML|YAML"),
+            ("unit: a\naxis: x\nunit: b", "line 3.*'unit'.*twice"),
+            ("[" * 5000, "YAML"),
+            ("1: 2", "'1'"),
+        ],
+    )
+    def test_faults_name_file_and_key(self, path, text, told):
+        path.with_suffix(".yaml").write_text(text)
+        for read in (read_run, lambda path: next(read_blocks(path))):
+            with pytest.raises(InputError, match=rf"(?s)run\.yaml.*({told})"):
+                read(path)
+
+    def test_a_side_file_that_is_no_text(self, path):
+        path.with_suffix(".yaml").write_bytes(bytes(range(256)))
+        with pytest.raises(InputError, match=r"run\.yaml.*YAML"):
+            read_run(path)
