@@ -1,0 +1,24 @@
+"""The configurations that ship are ones that the commands take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from fogml.cli.train_job import TrainSettings
+from fogml.features.parse import parse_features
+from fogml.models.names import make_model
+from fogml.validation.limits import check_limits
+
+CONFIGS = sorted((Path(__file__).parents[2] / "configs" / "models").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
+def test_model_configuration(path: Path) -> None:
+    settings = TrainSettings.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    make_model(settings.model, settings.features)
+    check_limits(settings.limits)
+    if settings.features is not None:
+        assert parse_features(settings.features).names()
