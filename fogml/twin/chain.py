@@ -21,7 +21,6 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import (
     BiasEffect,
     Effect,
-    LoggerEffect,
     LoopEffect,
     ReadoutEffect,
     RigEffect,
@@ -154,7 +153,7 @@ def _unseen(twin: Twin, inputs: Inputs, nominal_inputs: Inputs, signature: Signa
 
 def sensor_shares(twin: Twin, inputs: Inputs) -> dict[str, FloatArray]:
     """What a replay that trusts the sensors lacks for each sensor effect [deg/h], to first order."""
-    found = twin.stage(SensorEffect)
+    found = twin.falsifying
     if not found:
         return {}
     given = replace(inputs, slopes=temperature_slopes(inputs, twin.nominal))
@@ -163,9 +162,8 @@ def sensor_shares(twin: Twin, inputs: Inputs) -> dict[str, FloatArray]:
 
 def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> FloatArray:
     """The output as it is recorded [deg/h], shape (n,)."""
-    for declared, setting in twin.on:
-        if isinstance(declared, LoggerEffect):
-            output = declared.record(output, inputs.with_output(output), setting.amplitude, **setting.shape)
+    for declared, setting in twin.logging:
+        output = declared.record(output, inputs.with_output(output), setting.amplitude, **setting.shape)
     return output
 
 
@@ -173,9 +171,8 @@ def sensed(
     twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: np.random.Generator
 ) -> FloatArray:
     """What the sensor behind column `name` records [degC] at a place with `temperature`, shape (n,)."""
-    for declared, setting in twin.on:
-        if isinstance(declared, SensorEffect):
-            temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
+    for declared, setting in twin.falsifying:
+        temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
     errors = twin.sensors.of(name)
     if errors.lag > 0.0:
         temperature = inputs.memory.lag(f"sensor {name}", inputs.time, temperature, errors.lag)

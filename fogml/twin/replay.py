@@ -198,7 +198,7 @@ class Replayer:
         missing = needed - set(recorded.temperatures) - ({"T"} if recorded.place("T") else set())
         if self.truth is not None or not missing or not recorded.temperatures:
             return self._given.setdefault("recorded", _Given("recorded", recorded, recorded))
-        changes = tuple((d, s.amplitude, s.key) for d, s in twin.stage(ThermalEffect))
+        changes = tuple((d, s.amplitude, s.key) for d, s in twin.thermal)
         key = (twin.plant, changes)
         if key not in self._given:
             nodes = estimate_nodes(

@@ -18,6 +18,7 @@ from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
 from fogml.twin.truth import Truth
 from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin
 from fogml.twin.world import Samples, World
 
 DEFAULT_COLUMNS = (
@@ -200,22 +201,20 @@ def _world(
 ) -> World:
     if not isinstance(programme, Programme):
         programme = load_programme(programme)
-    if not isinstance(twin, Twin):
-        from fogml.twin.twin_file import load_twin
-
-        twin = load_twin(twin)
+    unit = twin if isinstance(twin, Twin) else load_twin(twin)
     facts = DEFAULT_FACTS if facts is None else facts
-    stated = facts.model_copy(update={"unit": facts.unit or twin.name})
+    stated = facts.model_copy(update={"unit": facts.unit or unit.name})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
         if name in ("time", "gyro") or (name not in KNOWN and coil_sensor_number(name) is None):
             known = [key for key in KNOWN if key not in ("time", "gyro")]
             raise InputError(
-                f"columns: '{name}' can't be recorded; known are {', '.join(known)} and coil sensors T1, T2 ..."
+                f"columns: '{name}' can't be recorded; known are {', '.join(known)} "
+                "and coil sensors T1, T2 ..."
             )
     if len(set(names)) < len(names):
         raise InputError("columns: one is named twice")
-    return World(programme, twin, sample_s, seed, names, stated, truth)
+    return World(programme, unit, sample_s, seed, names, stated, truth)
 
 
 def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:

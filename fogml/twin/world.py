@@ -12,7 +12,6 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.chain import ChainOutput, heading_of, logged, sensed, sensor_shares, through_chain
-from fogml.twin.effect import LoggerEffect, NoiseEffect, ThermalEffect
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import NoiseSource, stream
@@ -62,8 +61,7 @@ class _Branch:
     ) -> dict[str, FloatArray]:
         """Temperature of every node at all samples of the block, on or off."""
         chamber = block.set_point
-        for declared, setting in self.twin.stage(ThermalEffect):
-            assert isinstance(declared, ThermalEffect)
+        for declared, setting in self.twin.thermal:
             inputs = Inputs(block.time, {AIR: chamber}, rate, drives=drives, memory=self.chamber_memory)
             chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
         return self.network.temperatures(
@@ -110,13 +108,12 @@ class World:
         self._main = _Branch(twin)
         self._without = {}
         if truth:
-            thermal = [declared.id for declared, _ in twin.stage(ThermalEffect)]
+            thermal = [declared.id for declared, _ in twin.thermal]
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
         self._noise = NoiseSource(twin.noise, seed, sample_s)
         self._extra_noise = [
-            (declared, setting, stream(seed, f"effect {declared.id}"))
-            for declared, setting in twin.stage(NoiseEffect)
+            (declared, setting, stream(seed, f"effect {declared.id}")) for declared, setting in twin.random
         ]
         self._sensor_rng = {name: stream(seed, f"sensor {name}") for name in columns}
         self._sensor_memory, self._share_memory = Memory(), Memory()
@@ -167,7 +164,7 @@ class World:
         parts |= sensor_shares(
             self.twin, replace(samples.inputs, memory=self._share_memory).with_output(output)
         )
-        loggers = self.twin.stage(LoggerEffect)
+        loggers = self.twin.logging
         if loggers:
             # One logger is the rule; what several change together is told of the first.
             parts |= {declared.id: np.zeros(len(output)) for declared, _ in loggers}
@@ -183,7 +180,6 @@ class World:
         drives = self._block_drives(block, angle, heading)
         noise = self._noise.block(len(block))
         for declared, setting, rng in self._extra_noise:
-            assert isinstance(declared, NoiseEffect)
             noise += declared.draw(
                 rng, len(block), self.timeline.sample_s, setting.amplitude, **setting.shape
             )
