@@ -143,7 +143,8 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
     InputError
         If a column's name can't be a dataset's.
     """
-    with h5py_module().File(path, "w", track_order=True) as file:
+    # Headers of HDF5 1.8 and later carry checksums, as the chunks of samples do.
+    with h5py_module().File(path, "w", libver=("v108", "v108"), track_order=True) as file:
         for name, cell in cells.items():
             label, unit = parse_header(cell)
             if "/" in label or "\0" in label or label in ("", ".", "run"):

@@ -172,3 +172,22 @@ def test_a_foreign_side_file_is_not_replaced(tmp_path):
         write_run(run, tmp_path / "run.csv")
     assert (tmp_path / "run.yaml").read_text() == "model: M1\n"
     assert not (tmp_path / "run.csv").exists()
+
+
+def test_a_side_file_that_states_the_same_is_left_as_it_is(tmp_path):
+    run = Run("run", {"time": np.arange(2.0), "gyro": np.ones(2)}, Facts(unit="0417"))
+    (tmp_path / "run.yml").write_text("unit: 0417  # on the label\n")
+    write_run(run, tmp_path / "run.csv")
+    assert (tmp_path / "run.yml").read_text() == "unit: 0417  # on the label\n"
+    assert not (tmp_path / "run.yaml").exists()
+    assert read_run(tmp_path / "run.csv").facts == run.facts
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".h5", ".mat"])
+@pytest.mark.parametrize("facts", [Facts(), Facts(unit="B", latitude=39.9)])
+def test_a_side_file_is_replaced_with_its_run(tmp_path, suffix, facts):
+    columns = {"time": np.arange(2.0), "gyro": np.ones(2)}
+    path = tmp_path / f"run{suffix}"
+    write_run(Run("run", columns, Facts(unit="A", axis="x")), path)
+    write_run(Run("run", columns, facts), path)
+    assert read_run(path).facts == facts
