@@ -2,130 +2,40 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable, Mapping
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+from pydantic import ValidationError
 
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 from fogml.runs.facts import read_yaml
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
-from fogml.twin.nominal import PRIOR_SD, UNITS, NominalConstants
+from fogml.twin.nominal import PRIOR_SD, NominalConstants
 from fogml.twin.plant.air import Airflow
 from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.power import SelfHeating
-from fogml.twin.plant.standard import LARGEST_ORDER, ThermalConstants
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
+from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
-from fogml.twin.twin import (
+from fogml.twin.set_up import (
     SENSOR_QUANTITIES,
     SURROUNDING_QUANTITIES,
-    EffectSetting,
     Plant,
     SensorErrors,
     Sensors,
     Surroundings,
-    Twin,
 )
+from fogml.twin.twin import EffectSetting, Twin
+from fogml.twin.twin_schema import AIRFLOW, HEATING, LINE, NOMINAL, TWIN_FILE, Stated, message, near
 
 SCHEMA = "fogml.twin/1"
 TWIN_FOLDER = Path(__file__).parent / "twins"
-
 _MINUTES = {("s", "s"): 1.0, ("s", "min"): 60.0, ("s", "h"): 3600.0}
-_ANY = (0.0, 0.0)
-
-
-def _quantity(name: str, unit: str, low: float = -1e6, high: float = 1e6) -> Quantity:
-    return Quantity(name, unit, _ANY, _ANY, limits=(low, high))
-
-
-_NOMINAL = tuple(_quantity(name, unit) for name, unit in UNITS.items())
-_HEATING = (
-    _quantity("steady", "W", 0.0, 1e3),
-    _quantity("initial", "W", 0.0, 1e3),
-    _quantity("time_constant", "s", 1.0),
-)
-_AIRFLOW = (_quantity("fan_gain", "1", 0.0, 100.0), _quantity("rotation_gain", "1", 0.0, 100.0))
-_LINE = (
-    _quantity("inner_radius", "m", 1e-4, 10.0),
-    _quantity("outer_radius", "m", 1e-4, 10.0),
-    _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
-)
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
-
-
-class _Stated(_Strict):
-    """A constant: its value, its unit, and the spread of its prior where it has one."""
-
-    value: float = Field(allow_inf_nan=False)
-    unit: str | None = None
-
-
-class _WithDeviation(_Stated):
-    sd: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
-
-
-class _WithFactor(_Stated):
-    factor: float | None = Field(default=None, ge=1.0, allow_inf_nan=False)
-
-
-def _plain(value: Any) -> Any:
-    """A bare number is a value in the documented unit."""
-    return value if isinstance(value, dict | _Stated) else {"value": _no_truth(value)}
-
-
-def _no_truth(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("a number is needed")
-    return value
-
-
-def _section(
-    name: str, quantities: Iterable[Quantity], kind: type[_Stated] = _Stated, **more: Any
-) -> type[_Strict]:
-    fields: dict[str, Any] = {
-        q.name: (Annotated[kind | None, BeforeValidator(_plain)], None) for q in quantities
-    }
-    return create_model(name, __base__=_Strict, **fields, **more)
-
-
-_Sensor = _section("_Sensor", SENSOR_QUANTITIES, reads=(dict[str, float], {}))
-_FILE = create_model(
-    "_File",
-    __base__=_Strict,
-    schema_=(Literal["fogml.twin/1"], Field(alias="schema")),
-    name=(str | None, None),
-    description=(str, ""),
-    grade=(Literal["tactical", "navigation"], "tactical"),
-    nominal=(_section("_Nominal", _NOMINAL, _WithDeviation), {}),
-    noise=(_section("_Noise", NOISE, _WithFactor), {}),
-    plant=(
-        _section(
-            "_Plant",
-            THERMAL,
-            order=(Annotated[int, Field(ge=1, le=LARGEST_ORDER)], 6),
-            heating=(_section("_Heating", _HEATING), {}),
-            airflow=(_section("_Airflow", _AIRFLOW), {}),
-            line=(
-                _section("_Line", _LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None,
-                None,
-            ),
-        ),
-        {},
-    ),
-    sensors=(_section("_Sensors", SENSOR_QUANTITIES, single=(dict[str, _Sensor], {})), {}),
-    surroundings=(_section("_Surroundings", SURROUNDING_QUANTITIES), {}),
-    effects=(dict[str, dict[str, Annotated[_Stated, BeforeValidator(_plain)]]], {}),
-)
 
 
 def twin_names() -> tuple[str, ...]:
@@ -170,11 +80,11 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
     if not isinstance(values, Mapping):
         raise InputError(f"{source}: a twin file holds 'key: value' lines; see configs/twin/nominal.yaml")
     try:
-        stated: Any = _FILE.model_validate(dict(values))
+        stated: Any = TWIN_FILE.model_validate(dict(values))
     except ValidationError as error:
-        raise InputError(_message(error, source)) from None
-    nominal = _values(source, "nominal", stated.nominal, _NOMINAL)
-    deviations = {q.name: getattr(stated.nominal, q.name, None) for q in _NOMINAL}
+        raise InputError(message(error, source)) from None
+    nominal = _values(source, "nominal", stated.nominal, NOMINAL)
+    deviations = {q.name: getattr(stated.nominal, q.name, None) for q in NOMINAL}
     noise = _values(source, "noise", stated.noise, NOISE)
     factors = {q.name: getattr(stated.noise, q.name, None) for q in NOISE}
     try:
@@ -206,7 +116,7 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
     def section(quantities: Iterable[Quantity], held: Any) -> dict[str, Any]:
         return {q.name: {"value": getattr(held, q.name), "unit": q.unit} for q in quantities}
 
-    nominal = section(_NOMINAL, twin.nominal)
+    nominal = section(NOMINAL, twin.nominal)
     for name, entry in nominal.items():
         entry["sd"] = getattr(twin.nominal_sd, name)
     noise = section(NOISE, twin.noise)
@@ -219,10 +129,10 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
         "initial": heating.initial_w,
         "time_constant": heating.time_constant_s,
     }
-    plant["heating"] = {q.name: {"value": parts[q.name], "unit": q.unit} for q in _HEATING}
-    plant["airflow"] = section(_AIRFLOW, twin.plant.airflow)
+    plant["heating"] = {q.name: {"value": parts[q.name], "unit": q.unit} for q in HEATING}
+    plant["airflow"] = section(AIRFLOW, twin.plant.airflow)
     if twin.plant.line is not None:
-        plant["line"] = section(_LINE, twin.plant.line) | {"layers": twin.plant.line.layers}
+        plant["line"] = section(LINE, twin.plant.line) | {"layers": twin.plant.line.layers}
     single = {
         name: section(SENSOR_QUANTITIES, errors) | ({"reads": dict(errors.reads)} if errors.reads else {})
         for name, errors in twin.sensors.single.items()
@@ -245,37 +155,38 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
 
 
 def _plant(source: str, stated: Any) -> Plant:
-    heating = _values(source, "plant.heating", stated.heating, _HEATING)
+    heating = _values(source, "plant.heating", stated.heating, HEATING)
     steady = heating.get("steady", 0.0)
     line = stated.line
     return Plant(
         constants=ThermalConstants(**_values(source, "plant", stated, THERMAL)),
         order=stated.order,
         heating=SelfHeating(steady, heating.get("initial", steady), heating.get("time_constant", 1200.0)),
-        airflow=Airflow(**_values(source, "plant.airflow", stated.airflow, _AIRFLOW)),
+        airflow=Airflow(**_values(source, "plant.airflow", stated.airflow, AIRFLOW)),
         line=None
         if line is None
-        else RadialLine(**_values(source, "plant.line", line, _LINE), layers=line.layers),
+        else RadialLine(**_values(source, "plant.line", line, LINE), layers=line.layers),
     )
 
 
 def _sensors(source: str, stated: Any) -> Sensors:
     common = _values(source, "sensors", stated, SENSOR_QUANTITIES)
+    shared = SensorErrors(**common, reads={})
     single = {}
     for name, held in stated.single.items():
         own = _values(source, f"sensors.single.{name}", held, SENSOR_QUANTITIES)
-        single[name] = SensorErrors(**{**common, **own}, reads=held.reads)
-    return Sensors(SensorErrors(**common), single)
+        single[name] = replace(shared, **own, reads=held.reads)
+    return Sensors(shared, single)
 
 
-def _setting(source: str, id: str, entry: Mapping[str, _Stated]) -> EffectSetting:
+def _setting(source: str, id: str, entry: Mapping[str, Stated]) -> EffectSetting:
     declared = effect(id)
     known = {"amplitude": declared.amplitude, **{q.name: q for q in declared.shape}}
     values = {}
     for name, held in entry.items():
         if name not in known:
             raise InputError(
-                f"unknown key 'effects.{id}.{name}'{_near(name, known)}; known keys are {', '.join(known)}"
+                f"unknown key 'effects.{id}.{name}'{near(name, known)}; known keys are {', '.join(known)}"
             )
         values[name] = _value(source, f"effects.{id}.{name}", held, known[name])
     amplitude, shape = declared.checked(values)
@@ -292,7 +203,7 @@ def _values(source: str, section: str, stated: Any, quantities: Iterable[Quantit
     return values
 
 
-def _value(source: str, key: str, held: _Stated, quantity: Quantity) -> float:
+def _value(source: str, key: str, held: Stated, quantity: Quantity) -> float:
     unit = held.unit.replace("°", "deg") if held.unit else quantity.unit
     factor = 1.0 if unit == quantity.unit else _MINUTES.get((quantity.unit, unit))
     if factor is None:
@@ -305,45 +216,6 @@ def _value(source: str, key: str, held: _Stated, quantity: Quantity) -> float:
             f"{low:g} and {high:g} {quantity.unit}"
         )
     return value
-
-
-def _message(error: ValidationError, source: str) -> str:
-    first = error.errors()[0]
-    # Names of alternatives that pydantic adds to the place are no keys.
-    words = [str(part) for part in first["loc"] if not str(part).startswith(("_", "function-"))]
-    key = ".".join(words) or "?"
-    if first["type"] == "extra_forbidden":
-        known = _known_keys(words[:-1])
-        return f"{source}: unknown key '{key}'{_near(words[-1], known)}; known keys are {', '.join(known)}"
-    if first["type"] == "missing":
-        return f"{source}: nothing is given for '{key}'"
-    reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
-    return f"{source}: key '{key}': {reason} (found {first['input']!r})"
-
-
-def _known_keys(path: list[str]) -> list[str]:
-    kind: Any = _FILE
-    for word in path:
-        fields = getattr(kind, "model_fields", {})
-        if word in fields:
-            kind = _model_in(fields[word].annotation)
-        else:
-            kind = _Sensor if kind is dict or "single" in path else kind
-    fields = getattr(kind, "model_fields", {})
-    return [field.alias or name for name, field in fields.items()]
-
-
-def _model_in(annotation: Any) -> Any:
-    """The model in an annotation such as ``Model | None``."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return annotation
-    found = [_model_in(part) for part in getattr(annotation, "__args__", ())]
-    return next((part for part in found if part is not None), None)
-
-
-def _near(key: str, known: Iterable[str]) -> str:
-    near = difflib.get_close_matches(key, list(known), n=1)
-    return f"; did you mean '{near[0]}'?" if near else ""
 
 
 def _prefixed(source: str, message: str) -> str:

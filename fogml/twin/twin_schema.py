@@ -1,0 +1,148 @@
+"""The schema ``fogml.twin/1``: which keys a twin file has, and what is said of a wrong one."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
+
+from fogml.twin.noise import QUANTITIES as NOISE
+from fogml.twin.nominal import UNITS
+from fogml.twin.plant.standard import LARGEST_ORDER
+from fogml.twin.plant.standard import QUANTITIES as THERMAL
+from fogml.twin.quantities import Grade, Quantity
+from fogml.twin.set_up import SENSOR_QUANTITIES, SURROUNDING_QUANTITIES
+
+_ANY = (0.0, 0.0)
+_SCHEMA: Any = Literal["fogml.twin/1"]
+
+
+def _quantity(name: str, unit: str, low: float = -1e6, high: float = 1e6) -> Quantity:
+    return Quantity(name, unit, _ANY, _ANY, limits=(low, high))
+
+
+NOMINAL = tuple(_quantity(name, unit) for name, unit in UNITS.items())
+HEATING = (
+    _quantity("steady", "W", 0.0, 1e3),
+    _quantity("initial", "W", 0.0, 1e3),
+    _quantity("time_constant", "s", 1.0),
+)
+AIRFLOW = (_quantity("fan_gain", "1", 0.0, 100.0), _quantity("rotation_gain", "1", 0.0, 100.0))
+LINE = (
+    _quantity("inner_radius", "m", 1e-4, 10.0),
+    _quantity("outer_radius", "m", 1e-4, 10.0),
+    _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
+)
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Stated(_Strict):
+    """A constant: its value, its unit, and the spread of its prior where it has one."""
+
+    value: float = Field(allow_inf_nan=False)
+    unit: str | None = None
+
+
+class _WithDeviation(Stated):
+    sd: float | None = Field(default=None, ge=0.0, allow_inf_nan=False)
+
+
+class _WithFactor(Stated):
+    factor: float | None = Field(default=None, ge=1.0, allow_inf_nan=False)
+
+
+def _plain(value: Any) -> Any:
+    """A bare number is a value in the documented unit."""
+    return value if isinstance(value, dict | Stated) else {"value": _no_truth(value)}
+
+
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("a number is needed")
+    return value
+
+
+def _section(
+    name: str, quantities: Iterable[Quantity], kind: type[Stated] = Stated, **more: Any
+) -> type[_Strict]:
+    fields: dict[str, Any] = {
+        q.name: (Annotated[kind | None, BeforeValidator(_plain)], None) for q in quantities
+    }
+    return create_model(name, __base__=_Strict, **fields, **more)
+
+
+_Sensor: Any = _section("_Sensor", SENSOR_QUANTITIES, reads=(dict[str, float], {}))
+_SENSOR_TABLE: Any = dict[str, _Sensor]
+TWIN_FILE: Any = create_model(
+    "_File",
+    __base__=_Strict,
+    schema_=(_SCHEMA, Field(alias="schema")),
+    name=(str | None, None),
+    description=(str, ""),
+    grade=(Grade, "tactical"),
+    nominal=(_section("_Nominal", NOMINAL, _WithDeviation), {}),
+    noise=(_section("_Noise", NOISE, _WithFactor), {}),
+    plant=(
+        _section(
+            "_Plant",
+            THERMAL,
+            order=(Annotated[int, Field(ge=1, le=LARGEST_ORDER)], 6),
+            heating=(_section("_Heating", HEATING), {}),
+            airflow=(_section("_Airflow", AIRFLOW), {}),
+            line=(
+                _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None,
+                None,
+            ),
+        ),
+        {},
+    ),
+    sensors=(_section("_Sensors", SENSOR_QUANTITIES, single=(_SENSOR_TABLE, {})), {}),
+    surroundings=(_section("_Surroundings", SURROUNDING_QUANTITIES), {}),
+    effects=(dict[str, dict[str, Annotated[Stated, BeforeValidator(_plain)]]], {}),
+)
+
+
+def message(error: ValidationError, source: str) -> str:
+    """The first fault that pydantic found, in one sentence that names source and key."""
+    first = error.errors()[0]
+    # Names of alternatives that pydantic adds to the place are no keys.
+    words = [str(part) for part in first["loc"] if not str(part).startswith(("_", "function-"))]
+    key = ".".join(words) or "?"
+    if first["type"] == "extra_forbidden":
+        known = _known_keys(words[:-1])
+        return f"{source}: unknown key '{key}'{near(words[-1], known)}; known keys are {', '.join(known)}"
+    if first["type"] == "missing":
+        return f"{source}: nothing is given for '{key}'"
+    reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
+    return f"{source}: key '{key}': {reason} (found {first['input']!r})"
+
+
+def _known_keys(path: list[str]) -> list[str]:
+    kind: Any = TWIN_FILE
+    for word in path:
+        fields = getattr(kind, "model_fields", {})
+        if word in fields:
+            kind = _model_in(fields[word].annotation)
+        else:
+            kind = _Sensor if kind is dict or "single" in path else kind
+    fields = getattr(kind, "model_fields", {})
+    return [field.alias or name for name, field in fields.items()]
+
+
+def _model_in(annotation: Any) -> Any:
+    """The model in an annotation such as ``Model | None``."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    found = [_model_in(part) for part in getattr(annotation, "__args__", ())]
+    return next((part for part in found if part is not None), None)
+
+
+def near(key: str, known: Iterable[str]) -> str:
+    """``; did you mean ...?`` where a known key looks like this one, else nothing."""
+    found = difflib.get_close_matches(key, list(known), n=1)
+    return f"; did you mean '{found[0]}'?" if found else ""
