@@ -177,7 +177,18 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
             assert rough <= SMOOTHNESS * size, (
                 f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
             )
+        if isinstance(effect, ThermalEffect) and not matters:
+            above = _forward(
+                effect, inputs["programme"], {**shape, quantity.name: shape[quantity.name] + step}
+            )
+            matters = not np.array_equal(above, _forward(effect, inputs["programme"], shape))
         assert matters, f"{effect.id}: shape parameter {quantity.name} makes no difference"
+
+
+def _forward(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
+    """What the forward hooks of an effect give at a usual amplitude."""
+    amplitude = effect.amplitude.typical()
+    return np.concatenate([apply(amplitude) for _, apply, _ in _hooks(effect, inputs, shape)])
 
 
 def _slope(effect: Effect, inputs: Inputs, shape: Mapping[str, float], name: str, step: float) -> FloatArray:
@@ -253,7 +264,11 @@ def _hooks(
 
         def solved(a: float) -> FloatArray:
             nodes = effect.change_plant(plant, a, **shape).temperatures(
-                inputs.time, chamber, fan=inputs.drives["fan"], table_rate=inputs.table_rate
+                inputs.time,
+                chamber,
+                powered=((0.0, inputs.power_ons_s[0] - 600.0), (inputs.power_ons_s[0], np.inf)),
+                fan=inputs.drives["fan"],
+                table_rate=inputs.table_rate,
             )
             return np.concatenate([nodes[name] for name in plant.nodes])
 
