@@ -136,7 +136,7 @@ def sinusoid(
     count: int, sample_s: float, amplitude: float, frequency_hz: float, phase_rad: float
 ) -> FloatArray:
     """A line as means over the samples hold it, sinc and alias included, shape (count,)."""
-    angle = 2.0 * math.pi * frequency_hz * sample_s * np.arange(count + 1) + (phase_rad - 0.5 * math.pi)
+    angle = 2.0 * math.pi * frequency_hz * sample_s * np.arange(count + 1.0) + (phase_rad - 0.5 * math.pi)
     return amplitude * mean_cosine(angle[:-1], angle[1:])
 
 
