@@ -92,7 +92,7 @@ class RBFRegressor(NetworkRegressor):
         network_inputs: Sequence[int] | None = None,
         wide_inputs: Sequence[int] | None = None,
         average_rows: int = 3000,
-        width_prior: float = 0.3,
+        width_prior: float = 1.0,
         seed: int = 0,
         threads: int | None = None,
         device: str = "cpu",

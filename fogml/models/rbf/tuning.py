@@ -54,7 +54,7 @@ class TuningSettings:
 
     shared_steps: int = 80
     own_steps: int = 100
-    width_prior: float = 0.3
+    width_prior: float = 1.0
     centre_prior: float = 1.0
     log_ridge: float | None = None
 
