@@ -11,11 +11,15 @@ import h5py
 import numpy as np
 import pyarrow as arrow
 import pyarrow.parquet as parquet
+from hypothesis import strategies as st
 from scipy.io import savemat
 
-from fogml.runs.columns import parse_header
+from fogml.runs.columns import KNOWN, parse_header
+from fogml.runs.run import Run
 
 SUFFIXES = (".csv", ".parquet", ".h5", ".mat")
+finite = st.floats(allow_nan=False, allow_infinity=False)
+moderate = st.floats(-1e9, 1e9)
 
 
 def write_table(path: Path, columns: Mapping[str, np.ndarray]) -> Path:
@@ -68,3 +72,24 @@ def samples(rows: int = 200, step: float = 0.5, seed: int = 0) -> dict[str, np.n
         "T_in [degC]": temperature,
         "T_out [degC]": temperature + 0.3,
     }
+
+
+@st.composite
+def tables(draw) -> dict[str, np.ndarray]:
+    """Header cells of the run format in internal units, and any finite values; time increases."""
+    names = draw(st.sets(st.sampled_from([*sorted(set(KNOWN) - {"time", "gyro"}), "T1", "T2", "T17"])))
+    rows = draw(st.integers(2, 12))
+    time = draw(st.lists(moderate, min_size=rows, max_size=rows, unique=True).map(sorted))
+    cells = [f"{name} [{KNOWN[name].internal if name in KNOWN else 'degC'}]" for name in sorted(names)]
+    columns = {"time [s]": time, "gyro [deg/h]": draw(st.lists(finite, min_size=rows, max_size=rows))}
+    columns |= {cell: draw(st.lists(finite, min_size=rows, max_size=rows)) for cell in cells}
+    return {cell: np.array(column) for cell, column in columns.items()}
+
+
+def same(run: Run, columns: Mapping[str, np.ndarray]) -> bool:
+    """Whether a run holds these columns, given in internal units, to the last digit."""
+    read = {cell.split(" [")[0]: values for cell, values in columns.items()}
+    # HDF5 knows columns by name only, without order.
+    return set(run.columns) == set(read) and all(
+        np.array_equal(run.columns[name], values) for name, values in read.items()
+    )

@@ -12,38 +12,14 @@ import pyarrow as arrow
 import pyarrow.parquet as parquet
 import pytest
 from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
 from scipy.io import savemat
 
 from fogml.errors import InputError
 from fogml.runs.columns import KNOWN
 from fogml.runs.reading import read_blocks, read_run
-from fogml.runs.run import Run
-from tests.runs.files import SUFFIXES, csv_of, samples, write_table
+from tests.runs.files import SUFFIXES, same, samples, tables, write_table
 
-finite = st.floats(allow_nan=False, allow_infinity=False, width=64)
-moderate = st.floats(-1e9, 1e9)
 slow = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-
-
-@st.composite
-def tables(draw, values=finite):
-    """Header cells of the run format in internal units, and any finite values; time increases."""
-    names = draw(st.sets(st.sampled_from([*sorted(set(KNOWN) - {"time", "gyro"}), "T1", "T2", "T17"])))
-    rows = draw(st.integers(2, 12))
-    time = draw(st.lists(moderate, min_size=rows, max_size=rows, unique=True).map(sorted))
-    cells = [f"{name} [{KNOWN[name].internal if name in KNOWN else 'degC'}]" for name in sorted(names)]
-    columns = {"time [s]": time, "gyro [deg/h]": draw(st.lists(finite, min_size=rows, max_size=rows))}
-    columns |= {cell: draw(st.lists(values, min_size=rows, max_size=rows)) for cell in cells}
-    return {cell: np.array(column) for cell, column in columns.items()}
-
-
-def same(run: Run, columns) -> bool:
-    read = {cell.split(" [")[0]: values for cell, values in columns.items()}
-    # HDF5 knows columns by name only, without order.
-    return set(run.columns) == set(read) and all(
-        np.array_equal(run.columns[name], values) for name, values in read.items()
-    )
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -52,34 +28,6 @@ def same(run: Run, columns) -> bool:
 def test_any_numbers_come_back_to_the_last_digit(tmp_path, suffix, columns):
     path = write_table(tmp_path / f"run{suffix}", columns)
     assert same(read_run(path), columns)
-
-
-@slow
-@given(
-    columns=tables(),
-    separator=st.sampled_from([";", "\t", ","]),
-    comma=st.booleans(),
-    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
-    quoted=st.booleans(),
-    bom=st.booleans(),
-    leading=st.integers(0, 3),
-    blank=st.booleans(),
-    trailing=st.integers(0, 2),
-    in_header=st.booleans(),
-    end=st.booleans(),
-)
-def test_any_dialect(
-    tmp_path, columns, separator, comma, line_end, quoted, bom, leading, blank, trailing, in_header, end
-):
-    lines = csv_of(columns, separator, "," if comma else ".", "\n", quoted).splitlines()
-    lines = [line + separator * (trailing if number or in_header else 0) for number, line in enumerate(lines)]
-    text = line_end * leading + (line_end * (1 + blank)).join(lines) + (line_end if end else "")
-    path = tmp_path / "run.csv"
-    path.write_bytes((b"\xef\xbb\xbf" if bom else b"") + text.encode())
-    run = read_run(path)
-    assert same(run, columns)
-    assert ("unfinished_line" in [finding.code for finding in run.findings]) is not end
-    assert same(next(read_blocks(path)), columns)
 
 
 UNITS = [
@@ -151,63 +99,6 @@ def test_counts_stay_counts_and_become_a_rate_by_the_scale_factor(tmp_path, suff
     assert run.gyro_unit == "count"
     assert run.gyro.tolist() == [7200.0, 3600.0, 0.0]
     assert run.gyro_deg_h.tolist() == [7200.0, 3600.0, 0.0]
-
-
-def test_latin_1_with_degree_signs(tmp_path):
-    path = tmp_path / "run.csv"
-    text = "time [s];gyro [°/h];T [°C];Bemerkung\n0,0;1,5;20,25;größer\n1,0;1,6;20,5;ok\n"
-    path.write_bytes(text.encode("latin-1"))
-    run = read_run(path)
-    assert run.gyro.tolist() == [1.5, 1.6]
-    assert run.temperature().tolist() == [20.25, 20.5]
-    assert "Bemerkung" not in run.columns
-    assert [finding.code for finding in run.findings][:1] == ["text_column"]
-
-
-def test_a_decimal_comma_may_first_come_late(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time [s];gyro [deg/h]\n0;1\n1;2\n2;2,5\n")
-    assert read_run(path).gyro.tolist() == [1.0, 2.0, 2.5]
-
-
-def test_spellings_of_numbers_that_the_fast_parser_does_not_know(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time [s],gyro [deg/h]\n+0.0, +1.5\n1e0 ,-.5E+1\n 2,  7.\n")
-    assert read_run(path).gyro.tolist() == [1.5, -5.0, 7.0]
-    assert next(read_blocks(path)).gyro.tolist() == [1.5, -5.0, 7.0]
-
-
-def test_unknown_columns_are_kept_and_named(tmp_path):
-    # A table's index comes without a name.
-    columns = {"": np.arange(200.0), **samples(), "flow [l/min]": np.arange(200.0)}
-    run = read_run(write_table(tmp_path / "run.csv", columns))
-    assert run.columns["flow"].tolist() == list(range(200))
-    (note,) = [finding for finding in run.findings if finding.code == "unknown_column"]
-    assert "'flow'" in note.message and note.count == 2
-
-
-@pytest.mark.parametrize("late", [5, 60_000])
-def test_text_in_an_unknown_column_is_no_fault(tmp_path, late):
-    rows = late + 10
-    events = [""] * rows
-    events[late] = "door opened"
-    lines = [f"{i},{i % 7},{1 if late > 10 else ''}{events[i]}" for i in range(rows)]
-    path = tmp_path / "run.csv"
-    path.write_text("time [s],gyro [deg/h],event\n" + "\n".join(lines) + "\n")
-    for run in (read_run(path), next(read_blocks(path))):
-        assert len(run) == rows
-        told = [finding for finding in run.findings if finding.code == "text_column"]
-        assert [finding.column for finding in told] == ["event"]
-        if "event" in run.columns:
-            assert np.isnan(run.columns["event"][late])
-            assert f"line {late + 2}" in told[0].message
-
-
-def test_missing_values_of_unknown_columns_are_no_fault(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time [s],gyro [deg/h],flow\n0,1,\n1,2,3\n2,3,NaN\n")
-    flow = read_run(path).columns["flow"]
-    assert np.isnan(flow[[0, 2]]).all() and flow[1] == 3.0
 
 
 @pytest.mark.parametrize(

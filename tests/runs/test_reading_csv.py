@@ -4,8 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
-from fogml.runs.reading import read_run
+from fogml.runs.reading import read_blocks, read_run
+from tests.runs.files import csv_of, same, samples, tables, write_table
+
+slow = settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 
 TIME = [0.0, 0.5, 1.25, 2.0]
 GYRO = [1.5, -2.25, 3.0, 0.125]
@@ -23,22 +28,6 @@ def check(run):
     np.testing.assert_array_equal(run.time, TIME)
     np.testing.assert_array_equal(run.gyro, GYRO)
     np.testing.assert_array_equal(run.columns["T_in"], INNER)
-
-
-@pytest.mark.parametrize("quote", ["", '"'], ids=["plain", "quoted"])
-@pytest.mark.parametrize("end", ["\n", "\r\n", "\r"], ids=["lf", "crlf", "cr"])
-@pytest.mark.parametrize(
-    ("separator", "mark"),
-    [(",", "."), (";", "."), ("\t", "."), (";", ","), ("\t", ",")],
-    ids=["comma", "semicolon", "tab", "semicolon, decimal comma", "tab, decimal comma"],
-)
-@pytest.mark.parametrize("start", [b"", b"\xef\xbb\xbf"], ids=["", "mark"])
-def test_every_spelling(tmp_path, separator, mark, end, quote, start):
-    path = tmp_path / "run.csv"
-    path.write_bytes(start + table(separator, mark, end, quote).encode())
-    run = read_run(path)
-    check(run)
-    assert run.name == "run.csv"
 
 
 def test_quoted_decimal_commas_between_commas(tmp_path):
@@ -70,76 +59,6 @@ def test_degree_signs(tmp_path, encoding):
     np.testing.assert_array_equal(run.columns["T"], [20.0, 30.0])
 
 
-@pytest.mark.parametrize(
-    ("cell", "value", "name", "expected"),
-    [
-        ("time [ms]", 1500, "time", 1.5),
-        ("time [us]", 1500, "time", 1.5e-3),
-        ("time [ns]", 1500, "time", 1.5e-6),
-        ("time [min]", 1.5, "time", 90.0),
-        ("time [h]", 1.5, "time", 5400.0),
-        ("gyro [rad/s]", np.pi / 180 / 3600, "gyro", 1.0),
-        ("T [K]", 293.15, "T", 20.0),
-        ("T3 [K]", 273.15, "T3", 0.0),
-        ("T_chamber [K]", 233.15, "T_chamber", -40.0),
-        ("rate [deg/h]", 3600, "rate", 1.0),
-        ("rate [rad/s]", np.pi, "rate", 180.0),
-        ("angle [rad]", np.pi / 2, "angle", 90.0),
-        ("heater [%]", 25, "heater", 0.25),
-        ("fan [0/1]", 1, "fan", 1.0),
-        ("humidity [%]", 25, "humidity", 25.0),
-        ("B_x [G]", 0.5, "B_x", 50.0),
-        ("B_z [uT]", 48, "B_z", 48.0),
-    ],
-)
-def test_units(tmp_path, cell, value, name, expected):
-    cells = [c for c in ("time [s]", "gyro [deg/h]") if not cell.startswith(c.split()[0])]
-    path = tmp_path / "run.csv"
-    zeros = ",".join("0" for _ in cells)
-    ones = ",".join("1" for _ in cells)
-    start = "0" if name == "time" else repr(float(value))
-    path.write_text(",".join([*cells, cell]) + f"\n{zeros},{start}\n{ones},{float(value)!r}\n")
-    assert read_run(path).columns[name][-1] == pytest.approx(expected, rel=1e-12, abs=1e-12)
-
-
-def test_counts_stay_counts(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time [s],gyro [count],T [degC]\n0,100,20\n1,-300,30\n")
-    path.with_suffix(".yaml").write_text('scale_factor: {value: 50, unit: "count per deg/h"}\n')
-    run = read_run(path)
-    assert run.gyro_unit == "count"
-    np.testing.assert_array_equal(run.gyro, [100.0, -300.0])
-    np.testing.assert_array_equal(run.gyro_deg_h, [2.0, -6.0])
-
-
-def test_other_columns_are_kept_and_named(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("time [s],gyro [deg/h],flow [l/min],state,T [degC]\n0,1,5,on,20\n1,2,,off,30\n")
-    run = read_run(path)
-    np.testing.assert_array_equal(run.columns["flow"], [5.0, np.nan])
-    assert "state" not in run.columns
-    messages = {finding.code: finding.message for finding in run.findings}
-    assert "flow" in messages["unknown_column"]
-    assert "state" in messages["text_column"]
-
-
-def test_separators_at_the_end_of_every_line(tmp_path):
-    path = tmp_path / "run.csv"
-    path.write_text("\n".join(line + ";" for line in table(";", ",", "\n").splitlines()[1:]))
-    path.write_text(table(";", ",", "\n").splitlines()[0] + "\n" + path.read_text() + "\n")
-    check(read_run(path))
-
-
-def test_every_digit_is_read(tmp_path):
-    values = np.random.default_rng(1).normal(size=2000) * 10.0 ** np.random.default_rng(2).integers(
-        -200, 200, 2000
-    )
-    path = tmp_path / "run.csv"
-    rows = "".join(f"{i},{value!r}\n" for i, value in enumerate(values.tolist()))
-    path.write_text("time [s],gyro [deg/h]\n" + rows)
-    np.testing.assert_array_equal(read_run(path).gyro, values)
-
-
 def test_side_file_and_name(tmp_path):
     path = tmp_path / "run.csv"
     path.write_text(table(",", ".", "\n"))
@@ -147,3 +66,71 @@ def test_side_file_and_name(tmp_path):
     run = read_run(path, name="oven run")
     assert (run.name, run.facts.unit, run.facts.axis) == ("oven run", "0417", "x")
     assert run.facts.earth_rate_deg_h == pytest.approx(15.041067 * np.sin(np.radians(39.9)))
+
+
+@slow
+@given(
+    columns=tables(),
+    separator=st.sampled_from([";", "\t", ","]),
+    comma=st.booleans(),
+    line_end=st.sampled_from(["\n", "\r\n", "\r"]),
+    quoted=st.booleans(),
+    bom=st.booleans(),
+    leading=st.integers(0, 3),
+    blank=st.booleans(),
+    trailing=st.integers(0, 2),
+    in_header=st.booleans(),
+    end=st.booleans(),
+)
+def test_any_dialect(
+    tmp_path, columns, separator, comma, line_end, quoted, bom, leading, blank, trailing, in_header, end
+):
+    lines = csv_of(columns, separator, "," if comma else ".", "\n", quoted).splitlines()
+    lines = [line + separator * (trailing if number or in_header else 0) for number, line in enumerate(lines)]
+    text = line_end * leading + (line_end * (1 + blank)).join(lines) + (line_end if end else "")
+    path = tmp_path / "run.csv"
+    path.write_bytes((b"\xef\xbb\xbf" if bom else b"") + text.encode())
+    run = read_run(path)
+    assert same(run, columns)
+    assert ("unfinished_line" in [finding.code for finding in run.findings]) is not end
+    assert same(next(read_blocks(path)), columns)
+
+
+def test_spellings_of_numbers_that_the_fast_parser_does_not_know(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h]\n+0.0, +1.5\n1e0 ,-.5E+1\n 2,  7.\n")
+    assert read_run(path).gyro.tolist() == [1.5, -5.0, 7.0]
+    assert next(read_blocks(path)).gyro.tolist() == [1.5, -5.0, 7.0]
+
+
+def test_unknown_columns_are_kept_and_named(tmp_path):
+    # A table's index comes without a name.
+    columns = {"": np.arange(200.0), **samples(), "flow [l/min]": np.arange(200.0)}
+    run = read_run(write_table(tmp_path / "run.csv", columns))
+    assert run.columns["flow"].tolist() == list(range(200))
+    (note,) = [finding for finding in run.findings if finding.code == "unknown_column"]
+    assert "'flow'" in note.message and note.count == 2
+
+
+@pytest.mark.parametrize("late", [5, 60_000])
+def test_text_in_an_unknown_column_is_no_fault(tmp_path, late):
+    rows = late + 10
+    events = [""] * rows
+    events[late] = "door opened"
+    lines = [f"{i},{i % 7},{1 if late > 10 else ''}{events[i]}" for i in range(rows)]
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h],event\n" + "\n".join(lines) + "\n")
+    for run in (read_run(path), next(read_blocks(path))):
+        assert len(run) == rows
+        told = [finding for finding in run.findings if finding.code == "text_column"]
+        assert [finding.column for finding in told] == ["event"]
+        if "event" in run.columns:
+            assert np.isnan(run.columns["event"][late])
+            assert f"line {late + 2}" in told[0].message
+
+
+def test_missing_values_of_unknown_columns_are_no_fault(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("time [s],gyro [deg/h],flow\n0,1,\n1,2,3\n2,3,NaN\n")
+    flow = read_run(path).columns["flow"]
+    assert np.isnan(flow[[0, 2]]).all() and flow[1] == 3.0
