@@ -233,5 +233,5 @@ def _power_windows(run: Run) -> PowerWindows:
 
 def _power_ons(time: FloatArray, time_on: FloatArray) -> list[float]:
     """Times of power-on [s] from the time since."""
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(time_on) < 0.0) + 1])
+    starts = np.concatenate([[0], np.flatnonzero(time_on[1:] < time_on[:-1]) + 1])
     return (time[starts] - time_on[starts]).tolist()

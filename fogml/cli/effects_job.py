@@ -1,0 +1,132 @@
+"""The job of ``fogml effects``."""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.outputs import whole_folder
+from fogml.twin.registry import effect, effects
+
+_WIDTH = 100
+_TERMINAL_PROGRAMMES = ("multi-point-cycle", "joint-staircase", "separating")
+_CATALOGUE_PROGRAMME = "separating"
+
+
+class EffectsSettings(Settings):
+    """Settings of ``fogml effects``."""
+
+    effect: str | None = None
+    out: str | None = None
+
+
+def show_effects(settings: EffectsSettings, terminal: Terminal) -> None:
+    """Print the catalogue or a card, and write its page where a folder is named."""
+    if settings.effect is None:
+        _catalogue(settings.out, terminal)
+    else:
+        _card(settings.effect, settings.out, terminal)
+
+
+def _catalogue(out: str | None, terminal: Terminal) -> None:
+    found = effects()
+    if out is not None:
+        from fogml.report.catalogue_page import catalogue_page
+        from fogml.twin.card import card_values, pictures
+
+        cards = []
+        with whole_folder(out) as folder:
+            with terminal.work("drawing", total=len(found)) as work:
+                for declared in found.values():
+                    work.doing(declared.id)
+                    (picture,) = pictures(declared, (_CATALOGUE_PROGRAMME,))
+                    cards.append((card_values(declared), picture))
+                    work.advance()
+            (folder / "catalogue.html").write_text(catalogue_page(cards), encoding="utf-8")
+    terminal.say(f"{len(found)} effects: letter code, id, stage, title\n")
+    for declared in found.values():
+        stage = declared.stage.replace("_", " ")
+        terminal.say(f"{declared.code:4} {declared.id:28} {stage:13} {declared.title}")
+    terminal.result(
+        {
+            "schema": "fogml.effects/1",
+            "effects": [
+                {
+                    "id": declared.id,
+                    "code": declared.code,
+                    "stage": declared.stage,
+                    "unit": declared.amplitude.unit,
+                    "title": declared.title,
+                    "candidate": declared.candidate,
+                }
+                for declared in found.values()
+            ],
+        }
+    )
+    if out is not None:
+        terminal.say(f"Written to {out}: open {Path(out) / 'catalogue.html'}")
+    else:
+        terminal.say("\n`fogml effects ID` prints the card of one.")
+
+
+def _card(id: str, out: str | None, terminal: Terminal) -> None:
+    from fogml.twin.card import STANDARD_PROGRAMMES, card_values, pictures
+
+    declared = effect(id)
+    values = card_values(declared)
+    if out is not None:
+        with whole_folder(out) as folder, terminal.work("drawing"):
+            from fogml.report.effect_card import effect_page
+
+            drawn = pictures(declared, STANDARD_PROGRAMMES)
+            (folder / f"{id}.html").write_text(effect_page(values, drawn), encoding="utf-8")
+    if not (terminal.quiet or terminal.as_json):
+        _print_card(values, terminal)
+        _print_pictures(id, terminal)
+    terminal.result(values)
+    if out is not None:
+        terminal.say(f"Written to {out}: open {Path(out) / f'{id}.html'}")
+
+
+def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
+    terminal.say(f"{card['code']}  {card['id']}: {card['title']}  ({card['stage'].replace('_', ' ')})\n")
+    terminal.say(f"{_filled(card['summary'])}\n")
+    terminal.say(textwrap.indent(card["equation"], "    "))
+    for remark in card["remarks"]:
+        terminal.say(f"\n{_filled(remark)}")
+    rows = [
+        [
+            quantity["name"],
+            quantity["unit"],
+            *(" to ".join(map(number, quantity[grade])) for grade in ("tactical", "navigation")),
+            quantity["meaning"],
+        ]
+        for quantity in (card["amplitude"], *card["shape"])
+    ]
+    terminal.table("", ["parameter", "unit", "tactical", "navigation", "meaning"], rows)
+    terminal.say(_filled(f"Shows: {card['shows']}."))
+    if card["confused_with"]:
+        terminal.say("Confused with, and told apart by")
+    for other, what in card["confused_with"].items():
+        terminal.say(_filled(f"{other}: {what}", "  "))
+    terminal.say(_filled(f"Source: {card['source']}"))
+
+
+def _print_pictures(id: str, terminal: Terminal) -> None:
+    from fogml.report.braille import braille
+    from fogml.twin.card import pictures
+
+    for picture in pictures(effect(id), _TERMINAL_PROGRAMMES):
+        low, high = float(picture.values.min()), float(picture.values.max())
+        span = f"{number(low)} to {number(high)} deg/h, {picture.hours[-1]:.3g} h"
+        terminal.say(f"\n{picture.programme}: {span}")
+        if low != high:
+            terminal.say("\n".join(braille(picture.values)))
+
+
+def _filled(text: str, indent: str = "") -> str:
+    return textwrap.fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent)

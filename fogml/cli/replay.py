@@ -1,0 +1,53 @@
+"""``fogml replay``: a twin's output for a run's inputs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fogml.cli import options
+from fogml.cli.terminal import Terminal
+
+app = typer.Typer(**options.APP_SETTINGS)
+
+
+@app.command()
+def replay(
+    twin: Annotated[
+        str | None, typer.Argument(metavar="TWIN", help="A twin file, or the name of one that ships.")
+    ] = None,
+    run: Annotated[str | None, typer.Argument(metavar="RUN", help="The run whose inputs to take.")] = None,
+    only: Annotated[
+        str | None, typer.Option("--only", metavar="EFFECT", help="The difference that one effect makes.")
+    ] = None,
+    truth: Annotated[
+        str | None, typer.Option("--truth", help="Truth of a simulated run, in place of its columns.")
+    ] = None,
+    repair: options.Repair = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write: .csv or .parquet.")] = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """The twin's noise-free output for what a run recorded, or the difference that one effect makes.
+
+    The file written holds the run's columns and 'replayed [deg/h]'.
+    """
+    from fogml.cli.replay_job import ReplaySettings, replay_and_write
+
+    settings = ReplaySettings.gather(
+        config,
+        {
+            "twin": twin,
+            "run": run,
+            "only": only,
+            "truth": truth,
+            "repair": repair,
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
+    )
+    replay_and_write(settings, Terminal(as_json, quiet))

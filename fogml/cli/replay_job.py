@@ -1,0 +1,107 @@
+"""The job of ``fogml replay``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from fogml.cli.runs import open_run
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.outputs import whole_file
+from fogml.runs.run import FloatArray, Run
+from fogml.runs.writing import BlockWriter, header_cells
+from fogml.twin.replay import replay
+from fogml.twin.truth import read_truth
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin, twin_names
+
+
+class ReplaySettings(Settings):
+    """Settings of ``fogml replay``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("twin", "run", "truth")
+    twin: str | None = None
+    run: str | None = None
+    only: str | None = None
+    truth: str | None = None
+    repair: bool = False
+    out: str | None = None
+
+    def in_full(self) -> ReplaySettings:
+        """The settings with every path in full."""
+        assert self.twin and self.run and self.out
+        paths = {"run": absolute(self.run), "out": absolute(self.out)}
+        if self.twin not in twin_names():
+            paths["twin"] = absolute(self.twin)
+        if self.truth:
+            paths["truth"] = absolute(self.truth)
+        return self.model_copy(update=paths)
+
+
+def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
+    """Replay a run, write it with the column ``replayed``, and print how far the two are apart."""
+    if not settings.twin:
+        raise InputError("no twin is given; name a file or one of " + ", ".join(twin_names()))
+    if not settings.run:
+        raise InputError("no run is given; name the run to replay")
+    if not settings.out:
+        raise InputError("no --out is given; name the file to write, .csv or .parquet")
+    out = Path(settings.out)
+    if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
+        raise InputError(f"{out}: is the run itself; choose another --out")
+    twin = load_twin(settings.twin)
+    with terminal.work(f"reading {settings.run}") as work:
+        run = open_run(settings.run, repair=settings.repair)
+        truth = read_truth(settings.truth) if settings.truth else None
+        work.doing("replaying")
+        replayed = replay(twin, run, only=settings.only, truth=truth)
+        work.doing(f"writing {out.name}")
+        with whole_file(out.with_suffix(".config.yaml")) as config:
+            config.write_text(settings.in_full().yaml("replay"), encoding="utf-8")
+            _write(run, replayed, out)
+    _print(settings, twin, run, replayed, terminal)
+
+
+def _write(run: Run, replayed: FloatArray, out: Path) -> None:
+    recorded = {cell: run.columns[name] for name, cell in header_cells(run).items()}
+    with BlockWriter(out, run.facts) as writer:
+        writer.write({**recorded, "replayed [deg/h]": replayed})
+
+
+def _print(settings: ReplaySettings, twin: Twin, run: Run, replayed: FloatArray, terminal: Terminal) -> None:
+    assert settings.out
+    values: dict[str, Any] = {
+        "schema": "fogml.replay/1",
+        "run": run.name,
+        "out": Path(settings.out).name,
+        "twin": twin.name,
+        "only": settings.only,
+        "rows": len(run),
+        "unit": "deg/h",
+        "replayed_rms": _rms(replayed),
+    }
+    if settings.only is not None:
+        terminal.say(f"{settings.only} changes {run.name} by {number(values['replayed_rms'])} deg/h rms")
+    else:
+        gap = run.gyro_deg_h - replayed if _in_rate(run) else None
+        values["gap_mean"] = float(gap.mean()) if gap is not None else None
+        values["gap_rms"] = _rms(gap) if gap is not None else None
+        terminal.say(
+            f"{run.name} replayed by {twin.name}: recorded less replayed is {number(values['gap_mean'])} "
+            f"deg/h in the mean, {number(values['gap_rms'])} deg/h rms over single samples"
+        )
+    terminal.say(f"Written to {settings.out}")
+    terminal.result(values)
+
+
+def _in_rate(run: Run) -> bool:
+    """Whether the output is known as a rate."""
+    return run.gyro_unit == "deg/h" or run.facts.scale_factor is not None
+
+
+def _rms(values: FloatArray) -> float:
+    return float(np.sqrt(np.mean(values * values)))

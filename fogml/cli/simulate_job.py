@@ -1,0 +1,115 @@
+"""The job of ``fogml simulate``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, ClassVar, Literal
+
+import yaml
+from pydantic import Field
+
+from fogml import __version__
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.outputs import whole_file
+from fogml.runs.facts import Facts, facts_from
+from fogml.twin.programme import Programme, load_programme, programme_names
+from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file
+from fogml.twin.timeline import timeline
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin, twin_names
+
+
+class SimulateSettings(Settings):
+    """Settings of ``fogml simulate``: a file of schema ``fogml.simulate/1``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("programme", "twin")
+    schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
+    sample_s: float = 1.0
+    programme: str | list[Any] | dict[str, Any] | None = None
+    twin: str | dict[str, Any] = "nominal"
+    columns: list[str] = list(DEFAULT_COLUMNS)
+    facts: dict[str, Any] | None = None
+    out: str | None = None
+    truth: str | None = None
+
+    def in_full(self) -> SimulateSettings:
+        """The settings with every path in full."""
+        assert self.out
+        paths: dict[str, Any] = {"out": absolute(self.out)}
+        if self.truth:
+            paths["truth"] = absolute(self.truth)
+        if isinstance(self.programme, str) and self.programme not in programme_names():
+            paths["programme"] = absolute(self.programme)
+        if isinstance(self.twin, str) and self.twin not in twin_names():
+            paths["twin"] = absolute(self.twin)
+        return self.model_copy(update=paths)
+
+    def yaml(self, command: str) -> str:
+        """The settings in full as the text of a configuration file."""
+        head = f"# fogml {__version__}: run it again with  fogml {command} config.yaml\n"
+        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
+    """Simulate block by block into a file, and print what was written."""
+    if settings.programme is None:
+        raise InputError("no programme is given; state 'programme' in the file, or --programme")
+    if not settings.out:
+        raise InputError("no --out is given; name the run to write, .csv or .parquet")
+    out = Path(settings.out)
+    if settings.truth is not None and Path(settings.truth).absolute() == out.absolute():
+        raise InputError(f"{out}: is the run and the truth; choose another --truth")
+    programme, twin = load_programme(settings.programme), load_twin(settings.twin)
+    facts = DEFAULT_FACTS if settings.facts is None else facts_from(settings.facts, "facts")
+    with whole_file(out.with_suffix(".config.yaml")) as config:
+        config.write_text(settings.in_full().yaml("simulate"), encoding="utf-8")
+        rows = _simulate(settings, programme, twin, facts, out, terminal)
+    _print(settings, programme, twin, rows, terminal)
+
+
+def _simulate(
+    settings: SimulateSettings, programme: Programme, twin: Twin, facts: Facts, out: Path, terminal: Terminal
+) -> int:
+    total = len(timeline(programme, settings.sample_s))
+    with terminal.work(f"simulating {programme.name}", total=total) as work:
+        return simulate_to_file(
+            programme,
+            twin,
+            out,
+            sample_s=settings.sample_s,
+            seed=settings.seed,
+            columns=settings.columns,
+            facts=facts,
+            truth_path=settings.truth,
+            progress=work.advance,
+        )
+
+
+def _print(
+    settings: SimulateSettings, programme: Programme, twin: Twin, rows: int, terminal: Terminal
+) -> None:
+    assert settings.out
+    values = {
+        "schema": "fogml.simulation/1",
+        "run": Path(settings.out).name,
+        "truth": Path(settings.truth).name if settings.truth else None,
+        "rows": rows,
+        "sample_s": settings.sample_s,
+        "hours": programme.total_hours,
+        "seed": settings.seed,
+        "programme": programme.name,
+        "twin": twin.name,
+        "effects": list(twin.settings),
+    }
+    terminal.say(
+        f"{rows} samples every {settings.sample_s:g} s, {programme.total_hours:.3g} h of {programme.name}, "
+        f"written to {settings.out}"
+    )
+    on = ", ".join(twin.settings) or "none"
+    terminal.say(f"Twin {twin.name}, seed {settings.seed}; effects: {on}.")
+    if settings.truth:
+        terminal.say(f"The truth of every node and effect is in {settings.truth}.")
+    terminal.result(values)

@@ -1,0 +1,58 @@
+"""The page of the whole catalogue: every effect with its equation, ranges and signature."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from markupsafe import Markup
+
+from fogml.report.effect_card import about, panel, quantities_table
+from fogml.report.page import render
+from fogml.report.tables import Table
+from fogml.twin.card import Picture
+
+STAGE_WORDS = {
+    "thermal": "Thermal plant",
+    "rig": "Rig: the rate that is there",
+    "bias": "Bias",
+    "scale_factor": "Scale factor",
+    "loop": "Closed loop",
+    "readout": "Read-out",
+    "sensor": "Temperature sensors",
+    "logger": "Logger",
+    "noise": "Random errors",
+}
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An effect as the catalogue shows it."""
+
+    card: Mapping[str, Any]
+    quantities: Table
+    figure: Markup
+    programme: str
+    words: str
+    about: list[tuple[str, str]]
+
+
+def catalogue_page(cards: Sequence[tuple[Mapping[str, Any], Picture]]) -> str:
+    """The self-contained HTML page of all effects.
+
+    Parameters
+    ----------
+    cards
+        Card of schema ``fogml.effect/1`` and its signature on one programme, of each effect in the
+        order of the catalogue.
+    """
+    stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
+    for card, picture in cards:
+        drawn = panel(card, picture)
+        entry = Entry(
+            card, quantities_table(card), drawn.signature, picture.programme, drawn.words, about(card)
+        )
+        stages[card["stage"]].append(entry)
+    shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
+    return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown)

@@ -1,0 +1,153 @@
+"""The card of an effect: what its declaration says, and its signature on standard programmes."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import textwrap
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.noise import NoiseConstants
+from fogml.twin.programme import load_programme
+from fogml.twin.quantities import GRADES, Quantity
+from fogml.twin.simulate import simulate
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin
+
+STANDARD_PROGRAMMES = (
+    "multi-point-cycle",
+    "joint-staircase",
+    "ten-degrees-per-hour-up",
+    "four-positions",
+    "separating",
+)
+"""What an effect's signature is shown on."""
+_POINTS = 2000
+_HORIZONTAL = Facts(axis="x", latitude=39.9, input_axis="north")
+_UPRIGHT = Facts(axis="x", latitude=39.9, input_axis="up")
+
+
+@dataclass(frozen=True)
+class Prose:
+    """An effect's docstring in parts.
+
+    Attributes
+    ----------
+    summary
+        Its first sentence.
+    equation
+        The indented blocks, one above the other.
+    remarks
+        Paragraphs on symbols and conditions.
+    source
+        Where equation and ranges come from, with how far that was checked.
+    """
+
+    summary: str
+    equation: str
+    remarks: tuple[str, ...]
+    source: str
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """An effect's part of the output on a programme, at its usual amplitude.
+
+    Attributes
+    ----------
+    programme
+        Name of the programme.
+    hours
+        Time [h], shape (n,).
+    chamber
+        Chamber air [degC], shape (n,).
+    values
+        The effect's part of the output [deg/h], shape (n,).
+    """
+
+    programme: str
+    hours: FloatArray
+    chamber: FloatArray
+    values: FloatArray
+
+
+def prose(declared: Effect) -> Prose:
+    """What the docstring of an effect's class says."""
+    text = inspect.getdoc(type(declared)) or declared.title
+    equations, remarks, source = [], [], ""
+    blocks = text.split("\n\n")
+    for block in blocks[1:]:
+        lines = block.strip("\n")
+        if lines.strip() == "::":
+            continue
+        if lines.startswith(" "):
+            equations.append(textwrap.dedent(lines))
+        elif lines.startswith("Source:"):
+            source = " ".join(lines.removeprefix("Source:").split())
+        else:
+            remarks.append(" ".join(lines.replace("``", "").split()))
+    return Prose(" ".join(blocks[0].split()), "\n".join(equations), tuple(remarks), source)
+
+
+def card_values(declared: Effect) -> dict[str, Any]:
+    """An effect's card as JSON-ready values."""
+    told = prose(declared)
+    return {
+        "schema": "fogml.effect/1",
+        "id": declared.id,
+        "code": declared.code,
+        "title": declared.title,
+        "stage": declared.stage,
+        "summary": told.summary,
+        "equation": told.equation,
+        "remarks": list(told.remarks),
+        "source": told.source,
+        "sources": list(declared.sources),
+        "amplitude": _quantity(declared.amplitude),
+        "shape": [_quantity(quantity) for quantity in declared.shape],
+        "needs": list(declared.needs),
+        "conflicts": list(declared.conflicts),
+        "shows": declared.shows,
+        "confused_with": dict(declared.confused_with),
+        "candidate": declared.candidate,
+        "drawn_per_run": declared.drawn_per_run,
+    }
+
+
+def pictures(declared: Effect, programmes: Sequence[str] = STANDARD_PROGRAMMES) -> tuple[Picture, ...]:
+    """An effect's part of the output on standard programmes, on a tactical unit with nothing else on."""
+    return tuple(_picture(declared, name) for name in programmes)
+
+
+def _picture(declared: Effect, name: str) -> Picture:
+    programme = load_programme(name)
+    sample_s = max(0.5, float(math.ceil(programme.total_s / _POINTS)))
+    facts = _HORIZONTAL if name == "four-positions" else _UPRIGHT
+    twin = _unit().with_effect(declared.id)
+    true = simulate(programme, twin, sample_s=sample_s, facts=facts, columns=(), truth=True).truth
+    assert true is not None
+    values = true.noise if isinstance(declared, NoiseEffect) else true.contributions[declared.id]
+    return Picture(name, true.time / 3600.0, true.nodes["T_chamber"], values)
+
+
+@lru_cache(maxsize=1)
+def _unit() -> Twin:
+    """The tactical unit that ships with neither effects nor noise."""
+    return replace(load_twin("tactical"), settings={}, noise=NoiseConstants(), name="card")
+
+
+def _quantity(quantity: Quantity) -> dict[str, Any]:
+    return {
+        "name": quantity.name,
+        "unit": quantity.unit,
+        "meaning": quantity.meaning,
+        "signed": quantity.signed,
+        "usual": quantity.typical(),
+        **{grade: list(quantity.range(grade)) for grade in GRADES},
+    }
