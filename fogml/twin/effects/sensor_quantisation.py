@@ -12,8 +12,6 @@ from fogml.twin.responses import unseen
 
 _USUAL_STEP_DEGC = 0.0625
 _FINEST_STEP_DEGC = 5e-4
-_LARGEST_STEP_DEGC = 2.0
-_SMOOTHING_S = 60.0
 
 
 class SensorQuantisation(SensorEffect):
@@ -24,9 +22,9 @@ class SensorQuantisation(SensorEffect):
         T_s = q round(T / q)
 
     q is the amplitude: 0.0625 degC (DS18B20), 0.01 or 0.001 degC. The signature is what a step hides, times
-    the nominal output's slope: temperature smoothed over a minute, without lag in a ramp, less the recorded
-    one, per step that the record has shown so far. A record that has none is put to steps of
-    0.0625 degC.
+    the nominal output's slope. A rounded record tells it where steps can be told apart: half a step when it
+    changes, then on by the rate of temperature; its step is the smallest change so far. A record that is
+    not rounded is put to steps of 0.0625 degC.
 
     Source: rounding (derived); data sheets of sensors (literature).
     """
@@ -57,15 +55,19 @@ class SensorQuantisation(SensorEffect):
         return amplitude * np.rint(temperature / amplitude)
 
     def _hidden(self, name: str, inputs: Inputs) -> FloatArray:
-        """Temperature that a step hides, in steps, shape (n,); within one step either way."""
-        memory, temperature = inputs.memory, inputs.temperature(name)
+        """Temperature that a step hides, in steps, shape (n,); within half a step either way."""
+        memory, time, temperature = inputs.memory, inputs.time, inputs.temperature(name)
         change = np.abs(temperature - memory.previous(f"{self.id} {name}", temperature))
         change[change < 1e-9] = np.inf
         step = memory.least(f"{self.id} step {name}", change)
-        # Two lags, the second one off the first, leave no lag in a ramp.
-        once = memory.lag(f"{self.id} once {name}", inputs.time, temperature, _SMOOTHING_S)
-        twice = memory.lag(f"{self.id} twice {name}", inputs.time, once, _SMOOTHING_S)
-        whole = (step < _FINEST_STEP_DEGC) | ((step > _LARGEST_STEP_DEGC) & np.isfinite(step))
+        changed = -memory.least(f"{self.id} changed {name}", np.where(np.isfinite(change), -time, np.inf))
+        interval = time - memory.previous(f"{self.id} time {name}", time)
+        known = np.isfinite(step)
+        rate = np.where(known, inputs.dT(name) / 60.0, 0.0) / np.where(known, step, 1.0)
+        # As the record changes, temperature is half of a step behind it, and goes on from there.
+        within = np.clip(np.abs(rate) * np.where(known, time - changed, 0.0) - 0.5, -0.5, 0.5)
+        # Not to be told from steps that are rarer than the window of the rate, or as dense as samples.
+        told = np.clip(np.abs(rate) * inputs.rate_window_s - 0.5, 0.0, 1.0)
+        told *= np.clip(2.0 - 2.0 * np.abs(rate) * interval, 0.0, 1.0)
         usual = temperature / _USUAL_STEP_DEGC
-        seen = np.clip((2.0 * once - twice - temperature) / step, -1.0, 1.0)
-        return np.where(whole, usual - np.rint(usual), seen)
+        return np.where(step < _FINEST_STEP_DEGC, usual - np.rint(usual), np.sign(rate) * within * told)

@@ -1,0 +1,93 @@
+"""Noise terms of the catalogue: units against the toolkit's own reading of an Allan deviation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.runs.run import FloatArray
+from fogml.signals.allan import allan_deviation
+from fogml.signals.noise_terms import noise_terms
+from fogml.twin.effect import NoiseEffect
+from fogml.twin.registry import effect
+
+COUNT, SAMPLE_S = 1 << 16, 2.0
+TERMS = {
+    "quantisation": ("Q", "urad", 3.0),
+    "angle_random_walk": ("N", "deg/sqrt(h)", 0.02),
+    "bias_instability": ("B", "deg/h", 0.3),
+    "rate_random_walk": ("K", "deg/h/sqrt(h)", 0.4),
+    "rate_ramp": ("R", "deg/h/h", 0.05),
+}
+
+
+def noise(id: str) -> NoiseEffect:
+    found = effect(id)
+    assert isinstance(found, NoiseEffect)
+    return found
+
+
+def draw(id: str, amplitude: float, seed: int = 3, sample_s: float = SAMPLE_S, **shape: float) -> FloatArray:
+    declared = noise(id)
+    full = {**declared.default_shape(), **shape}
+    return declared.draw(np.random.default_rng(seed), COUNT, sample_s, amplitude, **full)
+
+
+@pytest.mark.parametrize("id", TERMS)
+def test_term_is_read_back_in_its_unit(id: str) -> None:
+    name, unit, amplitude = TERMS[id]
+    assert effect(id).amplitude.unit == unit
+    found = noise_terms(allan_deviation(draw(id, amplitude), SAMPLE_S), level=0.99).terms[name]  # type: ignore[index]
+    assert found.unit == unit
+    assert found.fitted == pytest.approx(amplitude, rel=0.15)
+    assert found.lower <= amplitude <= found.upper or id == "rate_ramp"
+
+
+def test_terms_agree_with_the_twins_noise_source() -> None:
+    from fogml.twin.noise import NoiseConstants
+
+    taus = np.array([2.0, 64.0, 1024.0])
+    for id, (name, _, amplitude) in TERMS.items():
+        expected = np.sqrt(NoiseConstants(**{name: amplitude}).allan_variance(taus))
+        found = allan_deviation(draw(id, amplitude), SAMPLE_S, taus)
+        assert found.adev == pytest.approx(expected, rel=0.12), id
+
+
+@pytest.mark.parametrize(
+    ("depth", "walk"), [(np.pi / 2, 1.65e-3), (3 * np.pi / 4, 7.2e-4), (7 * np.pi / 8, 4.6e-4)]
+)
+def test_photon_noise_at_20_microwatt(depth: float, walk: float) -> None:
+    series = draw("arw_physics", 1.0, power=20.0, modulation_depth=depth)
+    found = allan_deviation(series, SAMPLE_S, [3600.0 / 256])
+    assert float(np.std(series) * np.sqrt(SAMPLE_S / 3600.0)) == pytest.approx(walk, rel=0.015)
+    assert found.adev[0] * np.sqrt(found.taus_s[0] / 3600.0) == pytest.approx(walk, rel=0.05)
+
+
+def test_hump_of_a_gauss_markov_process() -> None:
+    """IEEE Std 952: 0.437 q_c sqrt(T_c) at 1.89 T_c, with A = q_c sqrt(T_c / 2)."""
+    series = draw("gauss_markov", 0.5, sample_s=10.0, time_constant=60.0)
+    found = allan_deviation(series, 10.0, np.arange(20.0, 400.0, 10.0))
+    q = 0.5 * np.sqrt(2.0 / 60.0)
+    assert found.adev.max() == pytest.approx(0.437 * q * np.sqrt(60.0), rel=0.05)
+    assert found.taus_s[np.argmax(found.adev)] == pytest.approx(1.89 * 60.0, rel=0.3)
+
+
+def test_line_has_another_phase_in_each_draw_and_its_own_frequency() -> None:
+    first, second = (draw("sinusoidal", 0.2, seed, frequency=0.01) for seed in (1, 2))
+    for series in (first, second):
+        peak = np.fft.rfftfreq(COUNT, SAMPLE_S)[np.argmax(np.abs(np.fft.rfft(series)))]
+        assert peak == pytest.approx(0.01, abs=1e-5)
+        assert np.sqrt(2.0) * np.std(series) == pytest.approx(0.2, rel=0.01)
+    assert abs(np.corrcoef(first, second)[0, 1]) < 0.999
+
+
+def test_outliers_are_rare_and_large() -> None:
+    series = draw("outliers_dropouts", 50.0, probability=1e-3, mean_length=1.0)
+    hit = np.count_nonzero(series)
+    assert hit == pytest.approx(COUNT * 1e-3, rel=0.35)
+    assert np.std(series[series != 0.0]) == pytest.approx(50.0, rel=0.3)
+
+
+def test_candidates_are_those_of_the_standard() -> None:
+    assert all(effect(id).candidate for id in (*TERMS, "gauss_markov", "sinusoidal"))
+    assert not effect("arw_physics").candidate and not effect("outliers_dropouts").candidate
