@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -56,6 +57,16 @@ class NoiseConstants:
         """The coefficients by name."""
         return asdict(self)
 
+    def with_effects(self, amplitudes: Mapping[str, float]) -> NoiseConstants:
+        """The coefficients with those of independent sources, by the ids of `TERM_EFFECTS`, on top."""
+        total = self.as_dict()
+        for id, name in TERM_EFFECTS.items():
+            if name == "R":
+                total[name] += amplitudes.get(id, 0.0)
+            else:
+                total[name] = math.hypot(total[name], amplitudes.get(id, 0.0))
+        return NoiseConstants(**total)
+
     def allan_variance(self, taus_s: FloatArray) -> FloatArray:
         """Expected Allan variance [(deg/h)^2] at averaging times [s], shape (m,)."""
         hours = taus_s / 3600.0
@@ -68,6 +79,14 @@ class NoiseConstants:
         )
 
 
+TERM_EFFECTS = {
+    "quantisation": "Q",
+    "angle_random_walk": "N",
+    "bias_instability": "B",
+    "rate_random_walk": "K",
+    "rate_ramp": "R",
+}
+"""Effects of the catalogue whose amplitude is one of the coefficients."""
 NAMES = tuple(field.name for field in fields(NoiseConstants))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,7 +39,7 @@ DEFAULT_COLUMNS = (
 )
 """What is recorded beside time and gyro unless told otherwise."""
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
-BLOCK_ROWS = 1 << 16
+BLOCK_ROWS = 1 << 14
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,8 +148,6 @@ def simulate_to_file(
     InputError
         As `simulate`, or if a file can't be written.
     """
-    from concurrent.futures import ThreadPoolExecutor
-
     from fogml.runs.writing import BlockWriter
 
     world = _world(programme, twin, sample_s, seed, columns, facts, truth_path is not None)
@@ -219,9 +218,18 @@ def _world(
 
 def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
     """Recorded columns, and the truth, block by block."""
-    for samples in world.samples(BLOCK_ROWS):
+    for samples in _ahead(world.samples(BLOCK_ROWS)):
         chain = world.output(samples)
         yield _recorded(world, samples, chain)
+
+
+def _ahead(blocks: Iterator[Samples]) -> Iterator[Samples]:
+    """The same blocks, each worked out beside what is done with the one before."""
+    with ThreadPoolExecutor(max_workers=1) as beside:
+        pending = beside.submit(next, blocks, None)
+        while (samples := pending.result()) is not None:
+            pending = beside.submit(next, blocks, None)
+            yield samples
 
 
 def _recorded(

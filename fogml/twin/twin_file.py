@@ -84,9 +84,9 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
     except ValidationError as error:
         raise InputError(message(error, source)) from None
     nominal = _values(source, "nominal", stated.nominal, NOMINAL)
-    deviations = {q.name: getattr(stated.nominal, q.name, None) for q in NOMINAL}
+    deviations = {q.name: getattr(stated.nominal, q.name) for q in NOMINAL}
     noise = _values(source, "noise", stated.noise, NOISE)
-    factors = {q.name: getattr(stated.noise, q.name, None) for q in NOISE}
+    factors = {q.name: getattr(stated.noise, q.name) for q in NOISE}
     try:
         return Twin(
             name=stated.name or Path(source).stem,
@@ -197,7 +197,7 @@ def _values(source: str, section: str, stated: Any, quantities: Iterable[Quantit
     """Values of a section in the documented units, for what is stated."""
     values = {}
     for quantity in quantities:
-        held = getattr(stated, quantity.name, None) if not isinstance(stated, dict) else None
+        held = getattr(stated, quantity.name)
         if held is not None:
             values[quantity.name] = _value(source, f"{section}.{quantity.name}", held, quantity)
     return values

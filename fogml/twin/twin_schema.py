@@ -76,8 +76,14 @@ def _section(
     return create_model(name, __base__=_Strict, **fields, **more)
 
 
+def _optional(kind: type[_Strict]) -> tuple[Any, Any]:
+    """A section that may be left out, then with nothing stated in it."""
+    return kind, Field(default_factory=kind)
+
+
 _Sensor: Any = _section("_Sensor", SENSOR_QUANTITIES, reads=(dict[str, float], {}))
 _SENSOR_TABLE: Any = dict[str, _Sensor]
+_LINE_SECTION: Any = _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None
 TWIN_FILE: Any = create_model(
     "_File",
     __base__=_Strict,
@@ -85,26 +91,23 @@ TWIN_FILE: Any = create_model(
     name=(str | None, None),
     description=(str, ""),
     grade=(Grade, "tactical"),
-    nominal=(_section("_Nominal", NOMINAL, _WithDeviation), {}),
-    noise=(_section("_Noise", NOISE, _WithFactor), {}),
-    plant=(
+    nominal=_optional(_section("_Nominal", NOMINAL, _WithDeviation)),
+    noise=_optional(_section("_Noise", NOISE, _WithFactor)),
+    plant=_optional(
         _section(
             "_Plant",
             THERMAL,
             order=(Annotated[int, Field(ge=1, le=LARGEST_ORDER)], 6),
-            heating=(_section("_Heating", HEATING), {}),
-            airflow=(_section("_Airflow", AIRFLOW), {}),
-            line=(
-                _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None,
-                None,
-            ),
-        ),
-        {},
+            heating=_optional(_section("_Heating", HEATING)),
+            airflow=_optional(_section("_Airflow", AIRFLOW)),
+            line=(_LINE_SECTION, None),
+        )
     ),
-    sensors=(_section("_Sensors", SENSOR_QUANTITIES, single=(_SENSOR_TABLE, {})), {}),
-    surroundings=(_section("_Surroundings", SURROUNDING_QUANTITIES), {}),
+    sensors=_optional(_section("_Sensors", SENSOR_QUANTITIES, single=(_SENSOR_TABLE, {}))),
+    surroundings=_optional(_section("_Surroundings", SURROUNDING_QUANTITIES)),
     effects=(dict[str, dict[str, Annotated[Stated, BeforeValidator(_plain)]]], {}),
 )
+"""The file as pydantic checks it; values and units are checked against their quantities afterwards."""
 
 
 def message(error: ValidationError, source: str) -> str:

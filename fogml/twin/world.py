@@ -14,7 +14,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.chain import ChainOutput, heading_of, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
-from fogml.twin.noise import NoiseSource, stream
+from fogml.twin.noise import TERM_EFFECTS, NoiseSource, stream
 from fogml.twin.plant.network import AIR, PlantState
 from fogml.twin.programme import Programme
 from fogml.twin.timeline import TimelineBlock, timeline
@@ -111,10 +111,9 @@ class World:
             thermal = [declared.id for declared, _ in twin.thermal]
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
-        self._noise = NoiseSource(twin.noise, seed, sample_s)
-        self._extra_noise = [
-            (declared, setting, stream(seed, f"effect {declared.id}")) for declared, setting in twin.random
-        ]
+        terms = {declared.id: setting.amplitude for declared, setting in twin.random}
+        self._noise = NoiseSource(twin.noise.with_effects(terms), seed, sample_s)
+        self._drawn, self._passed = self._other_noise(seed), 0
         self._sensor_rng = {name: stream(seed, f"sensor {name}") for name in columns}
         self._sensor_memory, self._share_memory = Memory(), Memory()
         self._log_memory, self._free_memory = Memory(), Memory()
@@ -179,10 +178,9 @@ class World:
         rate = -rate if facts.input_axis == "down" else rate
         drives = self._block_drives(block, angle, heading)
         noise = self._noise.block(len(block))
-        for declared, setting, rng in self._extra_noise:
-            noise += declared.draw(
-                rng, len(block), self.timeline.sample_s, setting.amplitude, **setting.shape
-            )
+        if self._drawn is not None:
+            noise += self._drawn[self._passed : self._passed + len(block)]
+        self._passed += len(block)
         on = block.powered > 0.0
         rows = slice(None) if on.all() else on
         drives_on = {name: values[rows] for name, values in drives.items()}
@@ -204,6 +202,17 @@ class World:
 
         without = {id: inputs(branch) for id, branch in self._without.items()}
         return Samples(inputs(self._main), noise[rows], without)
+
+    def _other_noise(self, seed: int) -> FloatArray | None:
+        """Random errors that are no term of the standard, drawn for the whole programme at once."""
+        total = None
+        for declared, setting in self.twin.random:
+            if declared.id not in TERM_EFFECTS:
+                rng = stream(seed, f"effect {declared.id}")
+                count, sample_s = len(self.timeline), self.timeline.sample_s
+                drawn = declared.draw(rng, count, sample_s, setting.amplitude, **setting.shape)
+                total = drawn if total is None else np.add(total, drawn, out=total)
+        return total
 
     def _needed_drives(self) -> set[str]:
         """Drives that are recorded, or that an effect reads; all of them for the truth."""
