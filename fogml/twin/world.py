@@ -11,7 +11,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
-from fogml.twin.chain import ChainOutput, heading_of, logged, sensed, sensor_shares, through_chain
+from fogml.twin.chain import ChainOutput, heading_of, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import TERM_EFFECTS, NoiseSource, stream
@@ -108,7 +108,7 @@ class World:
         self._main = _Branch(twin)
         self._without = {}
         if truth:
-            thermal = [declared.id for declared, _ in twin.thermal]
+            thermal = [declared.id for declared, _ in twin.thermal if not hidden(declared)]
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
         terms = {declared.id: setting.amplitude for declared, setting in twin.random}
