@@ -1,0 +1,171 @@
+"""Simulation: blocks against the whole, files against memory, truth against the run, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts
+from fogml.runs.reading import read_run
+from fogml.twin import simulate as simulating
+from fogml.twin.effect import LoggerEffect, SensorEffect, ThermalEffect
+from fogml.twin.noise import NoiseConstants
+from fogml.twin.nominal import NominalConstants
+from fogml.twin.registry import effects
+from fogml.twin.set_up import SensorErrors, Sensors
+from fogml.twin.simulate import simulate, simulate_to_file
+from fogml.twin.truth import read_truth
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin
+
+QUICK = [
+    {"soak at 25 degC for 20 min": ["power on at minute 2", "turn at 5 deg/s for 60 s from minute 10"]},
+    "ramp to 45 degC at 2 degC/min",
+    {"soak at 45 degC for 20 min": ["power off for 3 min from minute 10"]},
+]
+# Jumps of hundreds of deg/s and wrong units would hide all else.
+DAMAGE = ("fringe_jump", "units_and_gaps")
+
+
+def everything(**more) -> Twin:
+    twin = Twin("all", nominal=NominalConstants(300, 20, 0.2, 2, 0.02, 2e-4, 0.3, 1.0), **more)
+    for id, declared in effects().items():
+        if id not in DAMAGE and not declared.conflicts:
+            twin = twin.with_effect(id)
+    return twin
+
+
+def test_blocks_do_not_matter(monkeypatch):
+    twin = everything(
+        noise=NoiseConstants(N=0.01, B=0.1, K=0.1), sensors=Sensors(SensorErrors(0.01, 0.01, 20.0))
+    )
+    whole = simulate(QUICK, twin, seed=4, truth=True)
+    monkeypatch.setattr(simulating, "BLOCK_ROWS", 333)
+    pieces = simulate(QUICK, twin, seed=4, truth=True)
+    assert set(whole.run.columns) == set(pieces.run.columns)
+    for name, values in whole.run.columns.items():
+        np.testing.assert_allclose(pieces.run.columns[name], values, rtol=1e-11, atol=1e-9, err_msg=name)
+    for cell, values in whole.truth.columns().items():
+        np.testing.assert_allclose(pieces.truth.columns()[cell], values, rtol=1e-10, atol=1e-8, err_msg=cell)
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_file_holds_what_memory_does(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(simulating, "BLOCK_ROWS", 500)
+    twin, path, beside = load_twin("tactical"), tmp_path / f"run{suffix}", tmp_path / f"truth{suffix}"
+    seen = []
+    rows = simulate_to_file(QUICK, twin, path, sample_s=2.0, seed=9, truth_path=beside, progress=seen.append)
+    expected = simulate(QUICK, twin, sample_s=2.0, seed=9, truth=True)
+    run, true = read_run(path), read_truth(beside)
+    assert rows == len(run) == len(expected.run) and len(seen) >= 2
+    assert run.facts == expected.run.facts and run.facts.unit == "tactical"
+    for name, values in expected.run.columns.items():
+        np.testing.assert_array_equal(run.columns[name], values, err_msg=name)
+    for cell, values in expected.truth.columns().items():
+        np.testing.assert_array_equal(true.columns()[cell], values, err_msg=cell)
+
+
+def test_the_seed_is_all_that_is_random():
+    twin = load_twin("tactical")
+    a, b, c = (simulate(QUICK, twin, sample_s=5.0, seed=s).run for s in (1, 1, 2))
+    assert a.hash == b.hash != c.hash
+    # A source of its own for each: another column leaves the rest alone.
+    fewer = simulate(QUICK, twin, sample_s=5.0, seed=1, columns=("T_out",)).run
+    assert list(fewer.columns) == ["time", "gyro", "T_out", "time_on"]
+    np.testing.assert_array_equal(fewer.gyro, a.gyro)
+    np.testing.assert_array_equal(fewer.columns["T_out"], a.columns["T_out"])
+
+
+def test_nothing_is_recorded_while_the_unit_is_off():
+    run = simulate(QUICK, Twin(), sample_s=1.0).run
+    total = 20 * 60 + 10 * 60 + 20 * 60
+    assert len(run) == total - 120 - 180
+    assert run.time[0] == 120.0 and run.facts.powered_on == 120.0
+    (again,) = np.flatnonzero(np.diff(run.time) > 1.0)
+    assert run.columns["time_on"][0] == 0.0 and run.columns["time_on"][again + 1] == 0.0
+    with pytest.raises(InputError, match="never on"):
+        simulate([{"soak at 25 degC for 1 min": ["power off"]}], Twin())
+
+
+def test_truth_adds_up():
+    twin = everything(noise=NoiseConstants(N=0.02))
+    loggers = [id for id in twin.settings if isinstance(effects()[id], LoggerEffect)]
+    twin = twin.without_effect(*loggers)
+    result = simulate(QUICK, twin, sample_s=2.0, truth=True)
+    true = result.truth
+    np.testing.assert_allclose(true.noise_free + true.noise, result.run.gyro, rtol=1e-13, atol=1e-9)
+    beside = {
+        id
+        for id in twin.settings
+        if isinstance(effects()[id], SensorEffect)
+        or (isinstance(effects()[id], ThermalEffect) and id != "hidden_thermal_node")
+    }
+    inside = [values for id, values in true.contributions.items() if id not in beside]
+    np.testing.assert_allclose(np.sum(inside, axis=0), true.noise_free, rtol=0.0, atol=1e-8)
+    assert set(true.contributions) == {"nominal", *twin.settings} - {
+        id for id in twin.settings if effects()[id].stage == "noise"
+    }
+
+
+def test_thermal_contribution_is_the_difference_of_two_simulations():
+    twin = load_twin("tactical").with_noise(N=0.0, B=0.0, K=0.0, Q=0.0).with_effect("self_heating", 12.0)
+    with_it = simulate(QUICK, twin, sample_s=5.0, truth=True)
+    without = simulate(QUICK, twin.without_effect("self_heating"), sample_s=5.0)
+    difference = with_it.run.gyro - without.run.gyro
+    assert np.abs(difference).max() > 1e-3
+    np.testing.assert_allclose(with_it.truth.contributions["self_heating"], difference, atol=1e-9)
+
+
+def test_recorded_temperatures_are_the_nodes_with_stated_errors():
+    exact = simulate(QUICK, Twin(), sample_s=1.0, truth=True)
+    for name in ("T_in", "T_out", "T_case", "T_electronics", "T_chamber"):
+        np.testing.assert_array_equal(exact.run.columns[name], exact.truth.nodes[name])
+    stated = Twin(sensors=Sensors(SensorErrors(noise=0.02, resolution=0.05)))
+    found = simulate(QUICK, stated, sample_s=1.0, columns=("T_in",), truth=True)
+    error = found.run.columns["T_in"] - found.truth.nodes["T_in"]
+    assert np.std(error) == pytest.approx(np.hypot(0.02, 0.05 / np.sqrt(12)), rel=0.1)
+
+
+def test_coil_sensors_read_their_places():
+    sensors = Sensors(single={"T4": SensorErrors(reads={"T_out": 0.75, "T_case": 0.25})})
+    found = simulate(QUICK, Twin(sensors=sensors), sample_s=5.0, columns=("T1", "T2", "T3", "T4"), truth=True)
+    nodes, columns = found.truth.nodes, found.run.columns
+    np.testing.assert_array_equal(columns["T1"], nodes["T_in"])
+    np.testing.assert_array_equal(columns["T3"], nodes["T_in"])
+    np.testing.assert_array_equal(columns["T2"], nodes["T_out"])
+    np.testing.assert_allclose(columns["T4"], 0.75 * nodes["T_out"] + 0.25 * nodes["T_case"], rtol=1e-14)
+
+
+def test_attitude():
+    turn = [{"soak at 25 degC for 10 min": ["turn at 5 deg/s for 60 s from minute 2"]}]
+    up, down, north = (
+        simulate(turn, Twin(), facts=Facts(latitude=30.0, input_axis=axis)).run
+        for axis in ("up", "down", "north")
+    )
+    np.testing.assert_allclose(down.gyro, -up.gyro, atol=1e-9)
+    assert up.gyro.max() == pytest.approx(5 * 3600 + 15.041067 * 0.5)
+    # A table with an upright axis turns a level input axis through the headings instead.
+    assert not north.rate.any()
+    angle = np.radians(north.columns["angle"])
+    np.testing.assert_allclose(north.gyro, 15.041067 * np.cos(np.radians(30.0)) * np.cos(angle), atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"columns": ("T_hub",)}, "'T_hub' can't be recorded"),
+        ({"columns": ("gyro",)}, "'gyro' can't be recorded"),
+        ({"columns": ("rate", "rate")}, "named twice"),
+        ({"sample_s": 0.0}, "'sample_s' is 0"),
+    ],
+)
+def test_refused(more, message):
+    with pytest.raises(InputError, match=message):
+        simulate(QUICK, Twin(), **{"sample_s": 10.0, **more})
+
+
+def test_a_sensor_needs_its_place():
+    twin = Twin(sensors=Sensors(single={"T3": SensorErrors(reads={"T_nowhere": 1.0})}))
+    with pytest.raises(InputError, match="'T3' reads 'T_nowhere'"):
+        simulate(QUICK, twin, sample_s=10.0, columns=("T3",))
