@@ -21,7 +21,7 @@ def effects(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """List the effects that a twin can have, or print the card of one.
+    """The catalogue of effects that a twin can have, or the card of one.
 
     A card states equation, unit, ranges, where the effect shows, what it is confused with and what
     separates the two, and draws its signature. With --out, writes ID.html, or catalogue.html with all.

@@ -32,9 +32,9 @@ def replay(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """The twin's noise-free output for what a run recorded, or the difference that one effect makes.
+    """A twin's output for a run's inputs, or what one effect changes.
 
-    The file written holds the run's columns and 'replayed [deg/h]'.
+    The output is the one without noise. The file written holds the run's columns and 'replayed [deg/h]'.
     """
     from fogml.cli.replay_job import ReplaySettings, replay_and_write
 

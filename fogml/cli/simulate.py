@@ -35,9 +35,10 @@ def simulate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Run a twin through a programme, block by block into a file.
+    """A synthetic run from a programme and a twin.
 
-    The run holds what was recorded; --truth keeps every node and every effect's contribution apart.
+    It is written block by block. The run holds what was recorded; --truth keeps every node and every
+    effect's contribution apart.
     Samples in which the unit is off are not recorded.
     """
     from fogml.cli.simulate_job import SimulateSettings, simulate_and_write

@@ -86,12 +86,16 @@ def truth_from_columns(columns: Mapping[str, FloatArray], source: str = "truth")
     InputError
         If a column is missing.
     """
-    named = {parse_header(cell)[0]: np.asarray(values, np.float64) for cell, values in columns.items()}
+    named = {parse_header(cell)[0]: np.asarray(values) for cell, values in columns.items()}
     for name in ("time", "rate", "time_on", "noise_free", "noise"):
         if name not in named:
             raise InputError(
                 f"{source}: no column '{name}'; a file that `fogml simulate --truth` wrote is needed"
             )
+    for name, values in named.items():
+        if not np.issubdtype(values.dtype, np.number):
+            raise InputError(f"{source}: column '{name}' holds no numbers")
+        named[name] = values.astype(np.float64, copy=False)
     parts = {name.removeprefix(_PART): named.pop(name) for name in list(named) if name.startswith(_PART)}
     time, rate, on = (named.pop(name) for name in ("time", "rate", "time_on"))
     free, noise = named.pop("noise_free"), named.pop("noise")
