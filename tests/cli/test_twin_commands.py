@@ -51,7 +51,7 @@ def test_simulate_then_replay(config, tmp_path, invoke_json, invoke):
     assert "thermal_hysteresis changes run.csv by" in result.stdout
     part = read_run(again).columns["replayed"]
     wanted = read_truth(truth).contributions["thermal_hysteresis"]
-    # A play operator turns errors of the sensor, of 0.03 degC and steps of 0.0625 degC, into A / w times them.
+    # A play operator turns the errors of the sensor, steps of 0.0625 degC and noise, into A / w times them.
     np.testing.assert_allclose(part, wanted, atol=0.12 / 8.0 * 0.2)
 
 
