@@ -59,19 +59,18 @@ class Score:
 def choose(scores: Sequence[Score]) -> Score:
     """The candidate to take.
 
-    The first score is the standard form's. A larger candidate replaces it only if it
-    beats it; among those the smallest that the best of them does not beat. A smaller one replaces
-    it if it is no worse; the smallest of those is taken. What does not beat the training runs'
-    mean is not worth its parameters: then the mean is taken.
+    The first score is the standard form's. A larger candidate replaces it only if it beats it; of
+    those the best is taken. Else a smaller one replaces it if it is no worse; the smallest of
+    those is taken. What does not beat the training runs' mean is not worth its parameters: then
+    the mean is taken.
     """
     mean = next(score for score in scores if not score.candidate.features)
     standard = scores[0]
     larger = [s for s in scores if s.parameters > standard.parameters and s.beats(standard)]
     if larger:
-        best = min(larger, key=lambda s: s.mean_square)
-        allowed = [s for s in larger if not best.beats(s)]
+        choice = min(larger, key=lambda s: s.mean_square)
     else:
         small = [s for s in scores if s.parameters <= standard.parameters]
-        allowed = [s for s in small if s.mean_square <= standard.mean_square]
-    choice = min(allowed, key=lambda s: (s.parameters, s.mean_square))
+        no_worse = [s for s in small if s.mean_square <= standard.mean_square]
+        choice = min(no_worse, key=lambda s: (s.parameters, s.mean_square))
     return choice if choice.beats(mean) else mean
