@@ -19,6 +19,7 @@ PACKAGES = (
     "torch",
     "numba",
     "allantools",
+    "colorednoise",
 )
 
 
