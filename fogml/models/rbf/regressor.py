@@ -66,7 +66,7 @@ class RBFRegressor(NetworkRegressor):
     seed
         Seed of k-means.
     threads
-        Threads; by default all cores for prediction, and one for tuning.
+        Threads of prediction; by default all cores. Tuning takes one.
     device, dtype
         Where torch tunes (``"cpu"``, ``"cuda"``), and in ``"float64"`` or ``"float32"``.
 
@@ -91,8 +91,8 @@ class RBFRegressor(NetworkRegressor):
         ridge: float | Literal["evidence"] = "evidence",
         network_inputs: Sequence[int] | None = None,
         wide_inputs: Sequence[int] | None = None,
-        average_rows: int = 3000,
-        width_prior: float = 1.0,
+        average_rows: int = 4000,
+        width_prior: float = 0.5,
         seed: int = 0,
         threads: int | None = None,
         device: str = "cpu",
@@ -245,7 +245,6 @@ class RBFRegressor(NetworkRegressor):
             ),
             wide_inputs=None if self.wide_inputs is None else tuple(int(i) for i in self.wide_inputs),
             seed=self.seed,
-            threads=self.threads,
             device=self.device,
             dtype=self.dtype,
         )
