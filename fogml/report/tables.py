@@ -148,7 +148,7 @@ def candidates_table(model: Mapping[str, Any]) -> Table | None:
             Row((str(told["name"]), str(told["parameters"]), number(float(told["held_out_rms"]))))
             for told in candidates
         ),
-        caption="On parts left out of training in turn; a larger candidate is taken only if better beyond noise.",
+        caption="On parts left out of training in turn; a larger one is taken only if better beyond noise.",
     )
 
 
