@@ -22,7 +22,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
 
 HERE = Path(__file__).parent
-UNITS = range(100, 112)
+UNITS = range(300, 312)
 FEATURES = "T, dT, T*dT"
 TRAINING = {"one rate": (1.0,), "two rates": (0.5, 1.0), "three rates": (0.5, 1.0, 2.0)}
 TESTS = {"slower": 0.7, "faster": 1.5, "beyond": 2.5}

@@ -5,11 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.rbf_rates.__main__ import CUBIC, chamber, world
+from experiments.rbf_rates import __main__ as rbf_rates
+from experiments.rbf_rates.__main__ import CUBIC, chamber, gaussian_process, mean_of, rms_error, world
+from experiments.synthetic_world import cycle
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
 from fogml.models.rbf.rates import distinct_rates, followed_columns, restrained_inputs, training_rates
 from fogml.runs.run import Run
+from fogml.signals.averages import block_averages
 
 FEATURES = "T, dT, T*dT"
 
@@ -96,6 +99,33 @@ def test_trained_at_three_rates_a_network_of_the_rate_follows_the_truth_beyond_t
     found = errors((0.5, 1.0, 2.0), (0.7, 1.5, 2.5), 4)
     assert max(found["rbf"][:2]) < 0.1 * 0.05, found  # a tenth of the noise of one sample
     assert np.all(np.array(found["rbf"]) < found[CUBIC]), found
+
+
+def test_trained_at_three_rates_a_network_is_level_with_a_gaussian_process(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(rbf_rates, "PROCESS_ROWS", 300)
+    ratios = []
+    for seed in (11, 12):
+        train, _ = run_at((0.5, 1.0, 2.0), seed, seed + 50)
+        network, process = make_model("rbf", FEATURES).fit(train).predict, gaussian_process(train)
+        for rate in (0.7, 1.5):
+            run, truth = run_at((rate,), seed, seed + 90)
+            ratios.append(rms_error(network, run, truth) / rms_error(process, run, truth))
+    assert mean_of(ratios) < 1.1, ratios
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_left_on_another_run_is_hardly_more_than_its_noise(seed: int) -> None:
+    unit = world(seed, noise=0.3)
+    train, _ = unit.run(cycle(1.0, 1.0, 10.0), 1.0, 2 * seed, "a")
+    test, truth = unit.run(cycle(0.8, 1.0, 10.0), 1.0, 2 * seed + 1, "b")
+    drift = make_model("rbf", "T, dT, T*dT, T_in-T_out").fit(train).predict(test)
+    left, floor = (
+        block_averages(test.time[200:], values[200:], window_s=100.0).values[0].std()
+        for values in (test.gyro - drift, test.gyro - truth)
+    )
+    assert left < 1.10 * floor
 
 
 def test_model_says_that_it_was_restrained_and_only_then() -> None:
