@@ -52,6 +52,7 @@ def _allan_200(quick: bool, folder: Path) -> Work:
 def _csv(quick: bool, folder: Path) -> Work:
     import pyarrow as pa
     import pyarrow.csv
+
     from fogml.runs.reading import read_run
 
     run = chamber_run(20_000 if quick else 1_000_000, seed=2)
