@@ -78,7 +78,7 @@ def about(card: Mapping[str, Any]) -> list[tuple[str, str]]:
         rows.append(("amplitude", "another one at each power-on"))
     if card["conflicts"]:
         rows.append(("not together with", ", ".join(card["conflicts"])))
-    return [*rows, ("source", card["source"]), *(("read", source) for source in card["sources"])]
+    return [*rows, ("source", card["source"]), *(("reference", source) for source in card["sources"])]
 
 
 def panel(card: Mapping[str, Any], picture: Picture) -> Panel:
@@ -96,7 +96,8 @@ def words(card: Mapping[str, Any], picture: Picture) -> str:
     low, high = float(picture.values.min()), float(picture.values.max())
     if low == high == 0.0:
         return "Nothing of it shows in the output here."
-    amplitude = f"{number(card['amplitude']['usual'])} {card['amplitude']['unit']}"
+    unit = card["amplitude"]["unit"]
+    amplitude = number(card["amplitude"]["usual"]) + ("" if unit == "1" else f" {unit}")
     return f"From {number(low)} to {number(high)} deg/h at an amplitude of {amplitude}."
 
 

@@ -91,7 +91,7 @@ def prose(declared: Effect) -> Prose:
         elif lines.startswith("Source:"):
             source = " ".join(lines.removeprefix("Source:").split())
         else:
-            remarks.append(" ".join(lines.replace("``", "").split()))
+            remarks.append(" ".join(lines.replace("`", "").split()))
     return Prose(" ".join(blocks[0].split()), "\n".join(equations), tuple(remarks), source)
 
 
