@@ -89,8 +89,8 @@ def _check_finite(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
             assert isinstance(signature, np.ndarray) and signature.dtype == np.float64, (
                 f"{effect.id}: the signature on '{name}' is no float64 array"
             )
-            expected = (len(given),)
-            assert signature.shape == expected, f"{effect.id}: {signature.shape} on '{name}', not {expected}"
+            shape_told = f"{effect.id}: the signature on '{name}' has shape {signature.shape}"
+            assert signature.shape == (len(given),), f"{shape_told}, not ({len(given)},)"
             assert np.isfinite(signature).all(), f"{effect.id}: not finite everywhere on '{name}'"
             again = _signature(effect, given, shape)
             assert np.array_equal(signature, again), f"{effect.id}: a second call on '{name}' differs"
