@@ -54,8 +54,12 @@ def candidates_of(features: str) -> list[Candidate]:
     return [Candidate(features), Candidate(features, network=True), Candidate("")]
 
 
-def candidates_for(runs: Sequence[Run], rates_told: bool) -> list[Candidate]:
-    """Candidates for training runs, `STANDARD` first.
+STATIC_STANDARD = Candidate("T^1..3")
+"""The same where temperature moves one way only."""
+
+
+def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool) -> list[Candidate]:
+    """Candidates for training runs, the standard form first.
 
     Parameters
     ----------
@@ -65,7 +69,14 @@ def candidates_for(runs: Sequence[Run], rates_told: bool) -> list[Candidate]:
         Whether the training runs hold three or more distinct rates of temperature. With fewer,
         nothing tells a rate from its direction, from its powers or from the rate of a gradient,
         and what was fitted fails at the next rate: only terms linear in the rate are offered.
+    both_directions
+        Whether temperature both rises and falls. On one way only, rate and gradient are functions
+        of temperature and time, and what was fitted to them turns against the model on the way
+        back: only terms in the temperatures are offered.
     """
+    if not both_directions:
+        linear = [STATIC_STANDARD, *(Candidate(text) for text in _STATIC if text != STATIC_STANDARD.features)]
+        return [*linear, Candidate("T", network=True)]
     sensors = shared_sensors(runs)
     faces = len(sensors) > 1
     gradient = ("", *(_GRADIENT if rates_told else _GRADIENT[:1])) if faces else ("",)

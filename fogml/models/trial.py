@@ -68,7 +68,9 @@ class Trial:
             rate.min(initial=0.0) < -MOVING_DEGC_MIN and rate.max(initial=0.0) > MOVING_DEGC_MIN
         )
         self.candidates = (
-            candidates_of(features) if features else candidates_for(runs, self.rates >= RATES_THAT_TELL)
+            candidates_of(features)
+            if features
+            else candidates_for(runs, self.rates >= RATES_THAT_TELL, self.both_directions)
         )
         union = union_of(self.candidates)
         self._column = {atom.text: column for column, atom in enumerate(union.atoms)}

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from experiments.synthetic_world import World, cycle, programme
+from fogml.features.parse import parse_features
 from fogml.models import trial
 from fogml.models.auto import AutoModel
 from fogml.models.candidates import STANDARD, Candidate, candidates_for
@@ -83,11 +84,18 @@ def test_it_finds_the_drift_and_holds_at_another_rate(linear_only: None) -> None
 
 def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
     run, _ = world_run(1.0, 0)
-    few = {c.features for c in candidates_for([run], rates_told=False)}
-    many = {c.features for c in candidates_for([run], rates_told=True)}
+    few = {c.features for c in candidates_for([run], rates_told=False, both_directions=True)}
+    many = {c.features for c in candidates_for([run], rates_told=True, both_directions=True)}
     assert not any("sign" in text or "d(T_in-T_out)" in text for text in few)
     assert any("sign" in text for text in many) and any("d(T_in-T_out)" in text for text in many)
     assert few < many
+
+
+def test_one_way_only_offers_no_rates() -> None:
+    run, _ = world_run(1.0, 0)
+    offered = candidates_for([run], rates_told=True, both_directions=False)
+    assert {name for c in offered if c.features for name in parse_features(c.features).sensors} == {"T"}
+    assert all(parse_features(c.features).window_s == 0.0 for c in offered if c.features)
 
 
 def test_rates_of_the_training_runs_are_told() -> None:
