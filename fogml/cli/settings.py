@@ -112,7 +112,7 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
     first = error.errors()[0]
     key = str(first["loc"][0]) if first["loc"] else "?"
     if first["type"] == "extra_forbidden":
-        known = list(settings.model_fields)
+        known = [field.alias or name for name, field in settings.model_fields.items()]
         near = get_close_matches(key, known, n=1)
         hint = f"did you mean '{near[0]}'? " if near else ""
         return f"{source}: unknown key '{key}'; {hint}known keys are {', '.join(known)}"
