@@ -5,19 +5,18 @@ Run ``python -m experiments.default_rates``; it writes ``results.json`` and ``re
 
 from __future__ import annotations
 
-import json
 import warnings
 from pathlib import Path
 
 import numpy as np
 
+from experiments.results import write_results
 from experiments.synthetic_world import World, cycle
 from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.models.table import training_table
-from fogml.outputs import whole_file
 from fogml.runs.run import Run
 
 HERE = Path(__file__).parent
@@ -151,10 +150,7 @@ The process sees {PROCESS_ROWS} averages. fogml {__version__}; `python -m experi
 def main(seeds: int = 10) -> None:
     """Compute and write the results."""
     rows = [row for seed in range(seeds) for row in case(seed)]
-    with whole_file(HERE / "results.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "results.md") as partial:
-        partial.write_text(page(rows), encoding="utf-8")
+    write_results(HERE, rows, page(rows))
     print(page(rows))
 
 

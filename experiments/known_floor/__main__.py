@@ -5,15 +5,14 @@ Run ``python -m experiments.known_floor``; it writes ``results.json`` and ``resu
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
 
+from experiments.results import write_results
 from experiments.synthetic_world import World, cycle
 from fogml import __version__
 from fogml.models.names import make_model
-from fogml.outputs import whole_file
 from fogml.runs.run import Run
 from fogml.signals.averages import block_averages
 from fogml.validation.judge import judge
@@ -108,10 +107,7 @@ The floor that fogml estimates from the output alone is {estimated:.3f} times th
 def main(seeds: int = 6) -> None:
     """Compute and write the results."""
     rows = [row for seed in range(seeds) for row in case(seed)]
-    with whole_file(HERE / "results.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "results.md") as partial:
-        partial.write_text(page(rows), encoding="utf-8")
+    write_results(HERE, rows, page(rows))
     print(page(rows))
 
 

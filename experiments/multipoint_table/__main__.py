@@ -5,15 +5,14 @@ Run ``python -m experiments.multipoint_table``; it writes ``results.json`` and `
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from experiments.results import write_results
 from fogml import __version__
 from fogml.models.names import make_model
-from fogml.outputs import whole_file
 from fogml.runs.run import Run
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate
@@ -142,10 +141,7 @@ trained on are limited to its box, so that no model runs away as M4 does in the 
 def main() -> None:
     """Compute and write the results."""
     rows = table()
-    with whole_file(HERE / "results.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "results.md") as partial:
-        partial.write_text(page(rows), encoding="utf-8")
+    write_results(HERE, rows, page(rows))
     print(page(rows))
 
 

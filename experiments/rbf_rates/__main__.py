@@ -6,18 +6,17 @@ Errors are against the noise-free truth, so no noise floor hides them.
 
 from __future__ import annotations
 
-import json
 import warnings
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from experiments.results import write_results
 from experiments.synthetic_world import World, programme
 from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
-from fogml.outputs import whole_file
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
 
@@ -150,10 +149,7 @@ def mean_of(values: list[float]) -> float:
 def main() -> None:
     """Run every unit and write the results."""
     rows = [row for seed in UNITS for row in case(seed)]
-    with whole_file(HERE / "results.json") as path:
-        path.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "results.md") as path:
-        path.write_text(table(rows), encoding="utf-8")
+    write_results(HERE, rows, table(rows))
 
 
 if __name__ == "__main__":

@@ -5,7 +5,6 @@ Run ``python -m experiments.thermal_cycle``; it writes ``results.json`` and ``re
 
 from __future__ import annotations
 
-import json
 import warnings
 from functools import partial
 from itertools import permutations
@@ -13,9 +12,9 @@ from pathlib import Path
 
 import numpy as np
 
+from experiments.results import write_results
 from fogml import __version__
 from fogml.models.names import make_model
-from fogml.outputs import whole_file
 from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.validation.compare import compare
@@ -158,10 +157,7 @@ and `up`, judged on `last down`, rms [deg/h]:
 def main() -> None:
     """Compute and write the results."""
     rows = results()
-    with whole_file(HERE / "results.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "results.md") as partial:
-        partial.write_text(page(rows), encoding="utf-8")
+    write_results(HERE, rows, page(rows))
 
 
 if __name__ == "__main__":

@@ -92,16 +92,17 @@ class AutoModel(DriftModel):
                 f"chosen from {len(self.scores_)} candidates: {chosen.candidate.name} leaves {rms[0]} deg/h "
                 f"rms on {held_out}, the training mean {rms[1]} deg/h"
             ]
-        if trial.both_directions and trial.rates < RATES_THAT_TELL:
+        weighed = self.features is None
+        if weighed and trial.both_directions and trial.rates < RATES_THAT_TELL:
             notes.append(
                 f"at most temperatures the training runs hold {trial.rates} distinct rate(s): only terms "
                 "linear in the rate are weighed; train at three or more rates to allow others"
             )
         if not trial.both_directions:
+            only = "so only terms in temperature are weighed, " if weighed else ""
             notes.append(
                 "trained on temperature moving one way only: temperature, its rate, time and direction "
-                "can't be told apart, so only terms in temperature are weighed, and hysteresis is not "
-                "seen; train on a run up and a run down"
+                f"can't be told apart, {only}and hysteresis is not seen; train on a run up and a run down"
             )
         return notes
 
