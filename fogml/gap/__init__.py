@@ -1,0 +1,1 @@
+"""The diagnosis of the gap between the twin and a recording."""

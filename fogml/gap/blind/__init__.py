@@ -1,0 +1,1 @@
+"""The check on withheld effects: blind cases, their diagnosis and its score."""

@@ -1,0 +1,286 @@
+"""What is true of a blind case: the schema ``fogml.blind_truth/1``, its files and their hashes.
+
+``truth/NNNN.json`` holds a `Truth`, ``truth/NNNN.npz`` what each missing effect truly adds to each
+run, and ``truth/SHA256SUMS`` the hashes of all of them, in the form that ``sha256sum -c`` takes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from fogml.errors import InputError
+from fogml.outputs import whole_file
+
+FloatArray = NDArray[np.float64]
+
+SCHEMA = "fogml.blind_truth/1"
+SUMS = "SHA256SUMS"
+Kind = Literal[
+    "nothing",
+    "one",
+    "two",
+    "three",
+    "unknown_left_out",
+    "unknown_invented",
+    "unknown_and_known",
+    "wrong_thermal",
+]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+STRATA = ((0.0, 4.0), (4.0, 6.0), (6.0, 10.0), (10.0, 20.0), (20.0, math.inf))
+"""Bounds of the strata by d'; the wanted figures rest on those from 4."""
+RIGHT_FOR_WRONG_THERMAL = "hidden_thermal_node"
+"""The effect that is no wrong name where the twin's thermal structure is wrong."""
+
+
+def stratum(d_prime: float) -> str:
+    """The name of the stratum of a d': ``under 4``, ``4-6``, ``6-10``, ``10-20`` or ``over 20``."""
+    low, high = next(bounds for bounds in STRATA if d_prime < bounds[1] or math.isinf(bounds[1]))
+    if low == 0.0:
+        return f"under {high:g}"
+    return f"over {low:g}" if math.isinf(high) else f"{low:g}-{high:g}"
+
+
+STRATUM_NAMES = tuple(stratum(low) for low, _ in STRATA)
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+
+
+class Amount(_Part):
+    """A number with its unit."""
+
+    value: float
+    unit: str
+
+
+class TrueEffect(_Part):
+    """An effect that the reality has and the nominal twin lacks.
+
+    Attributes
+    ----------
+    id
+        Id in the library, whether or not it is left out of the candidates; None for one that no
+        library holds.
+    name
+        The id, or the name of an invented one.
+    stage
+        Where it acts.
+    form
+        Which form the reality gives it, e.g. ``Preisach``.
+    amplitude
+        In the card's unit, where the reality's form has one that compares; else None.
+    shape
+        Parameters of the reality's form.
+    d_prime
+        ``||W (I - P) s||`` over all fit runs, of this effect's contribution alone.
+    """
+
+    id: str | None
+    name: str
+    stage: str
+    form: str = ""
+    amplitude: Amount | None = None
+    shape: dict[str, float] = Field(default_factory=dict)
+    d_prime: float
+
+    @property
+    def stratum(self) -> str:
+        """The stratum of its d'."""
+        return stratum(self.d_prime)
+
+
+class Segment(_Part):
+    """A stretch of at least 600 s in which the 100 s averages of the true gap exceed the floor."""
+
+    run: str
+    from_s: float
+    to_s: float
+
+
+class TrueClosed(_Part):
+    """What the true effects, fitted in the reality's own form, close on a held-out run.
+
+    Rms values in deg/h of averages over `averaging_s`, defined as in ``gap.json``.
+    """
+
+    run: str
+    averaging_s: float
+    recalibrated: float
+    after: float
+    floor: float
+    closed: float | None
+
+
+class Runs(_Part):
+    """Files of a case by base name."""
+
+    fit: tuple[str, ...]
+    held_out: tuple[str, ...]
+    noise: str | None = None
+
+
+class Truth(_Part):
+    """What is true of one case.
+
+    Attributes
+    ----------
+    case
+        Its number, as in the file names.
+    seed
+        What it was drawn from.
+    kind
+        What it is drawn as.
+    runs
+        Its files.
+    sample_s
+        Sample interval [s].
+    turning
+        Whether the table turns in a run.
+    effects
+        What is missing from the nominal twin, in no order; empty where nothing is.
+    left_out
+        Ids that the diagnosis is told not to offer: a withheld effect and its relatives.
+    d_prime
+        ``||W (I - P) s||`` of all missing effects together; 0 where nothing is missing.
+    segments
+        Where the true structural gap lies, on the fit runs.
+    closed
+        On each held-out run.
+    noise
+        True noise constants by name, with units.
+    nominal
+        True nominal constants by name, in the units of `fogml.gap`.
+    thermal
+        A few words on the reality's thermal structure.
+    """
+
+    schema_: Literal["fogml.blind_truth/1"] = Field(default="fogml.blind_truth/1", alias="schema")
+    case: str
+    seed: int
+    kind: Kind
+    runs: Runs
+    sample_s: float
+    turning: bool
+    effects: tuple[TrueEffect, ...] = ()
+    left_out: tuple[str, ...] = ()
+    d_prime: float = 0.0
+    segments: tuple[Segment, ...] = ()
+    closed: tuple[TrueClosed, ...] = ()
+    noise: dict[str, Amount] = Field(default_factory=dict)
+    nominal: dict[str, float] = Field(default_factory=dict)
+    thermal: str = ""
+
+    @property
+    def known(self) -> tuple[TrueEffect, ...]:
+        """The missing effects that the diagnosis may name."""
+        return tuple(e for e in self.effects if e.id is not None and e.id not in self.left_out)
+
+    @property
+    def unknown(self) -> tuple[TrueEffect, ...]:
+        """The missing effects that the diagnosis can't name."""
+        return tuple(e for e in self.effects if e.id is None or e.id in self.left_out)
+
+    @property
+    def stratum(self) -> str:
+        """The stratum of the weakest missing effect, which is the one that decides; ``none`` without one."""
+        return stratum(min(e.d_prime for e in self.effects)) if self.effects else "none"
+
+
+def write_truth(folder: Path, truth: Truth, contributions: Mapping[tuple[str, int], FloatArray]) -> None:
+    """Write one case's truth: ``NNNN.json`` and ``NNNN.npz``.
+
+    Parameters
+    ----------
+    folder
+        The folder ``truth``.
+    truth
+        The truth.
+    contributions
+        What an effect truly adds to the output [deg/h], shape (n,), by run and place in
+        `truth.effects`.
+    """
+    values = truth.model_dump(mode="json", by_alias=True)
+    with whole_file(folder / f"{truth.case}.json") as partial:
+        partial.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    with whole_file(folder / f"{truth.case}.npz") as partial, partial.open("wb") as file:
+        arrays: dict[str, Any] = {_key(run, i): values for (run, i), values in contributions.items()}
+        np.savez_compressed(file, **arrays)
+
+
+def read_truth(path: Path) -> Truth:
+    """The truth of one case from its JSON file.
+
+    Raises
+    ------
+    InputError
+        If it is missing or breaks the schema; names the file and the key.
+    """
+    try:
+        return Truth.model_validate_json(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such truth; make the cases first (fogml blind make)") from None
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"])
+        raise InputError(f"{path}: key '{place}': {first['msg']}; make the cases anew") from None
+
+
+def read_contributions(path: Path) -> dict[tuple[str, int], FloatArray]:
+    """What `write_truth` was given as `contributions`, from the ``.npz`` file."""
+    with np.load(path, allow_pickle=False) as arrays:
+        return {_parsed(key): arrays[key] for key in arrays.files}
+
+
+def write_sums(folder: Path) -> None:
+    """Write ``SHA256SUMS`` over every truth in the folder."""
+    files = sorted(path for path in folder.iterdir() if path.suffix in (".json", ".npz"))
+    with whole_file(folder / SUMS) as partial:
+        lines = [f"{_digest(path)}  {path.name}\n" for path in files]
+        partial.write_text("".join(lines), encoding="ascii")
+
+
+def check_sums(folder: Path) -> int:
+    """How many truths there are, once all of them have the hashes that were written.
+
+    Raises
+    ------
+    InputError
+        If the list is missing, a file changed, is missing, or is not listed.
+    """
+    path = folder / SUMS
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; the truth must be hashed when it is made")
+    lines = [line.split("  ", 1) for line in path.read_text(encoding="ascii").splitlines()]
+    stated = {name: digest for digest, name in lines}
+    held = {file.name for file in folder.iterdir() if file.suffix in (".json", ".npz")}
+    for name in sorted(held ^ set(stated)):
+        what = "is not listed" if name in held else "is listed, but missing"
+        raise InputError(f"{folder / name}: {what} in {SUMS}; make the cases anew")
+    for name, digest in stated.items():
+        if _digest(folder / name) != digest:
+            raise InputError(f"{folder / name}: changed since it was hashed; make the cases anew")
+    return sum(name.endswith(".json") for name in held)
+
+
+def _key(run: str, place: int) -> str:
+    return f"{place}|{run}"
+
+
+def _parsed(key: str) -> tuple[str, int]:
+    place, run = key.split("|", 1)
+    return run, int(place)
+
+
+def _digest(path: Path) -> str:
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
