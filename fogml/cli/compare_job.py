@@ -10,7 +10,7 @@ from typing import ClassVar
 from pydantic import field_validator
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings, absolute
+from fogml.cli.settings import LimitSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import check_settings
 from fogml.errors import InputError
@@ -42,16 +42,6 @@ class CompareSettings(LimitSettings):
         if isinstance(value, str):
             return [name.strip() for name in value.split(",") if name.strip()]
         return value
-
-    def in_full(self) -> CompareSettings:
-        """The settings with every path in full."""
-        return self.model_copy(
-            update={
-                "runs": [absolute(path) for path in self.runs],
-                "test": [absolute(path) for path in self.test],
-                "out": absolute(self.out),
-            }
-        )
 
 
 def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.cli.runs import open_blocks
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.outputs import whole_file
@@ -33,12 +33,6 @@ class CompensateSettings(Settings):
     model: str | None = None
     any_unit: bool = False
     out: str | None = None
-
-    def in_full(self) -> CompensateSettings:
-        """The settings with every path in full."""
-        assert self.run and self.model and self.out
-        paths = {"run": self.run, "model": self.model, "out": self.out}
-        return self.model_copy(update={name: absolute(path) for name, path in paths.items()})
 
 
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:

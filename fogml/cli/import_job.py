@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -21,15 +21,10 @@ class ImportSettings(Settings):
     axis: str | None = None
     out: str | None = None
 
-    def in_full(self) -> ImportSettings:
-        """The settings with every path in full; a profile that ships keeps its name."""
+    def _ships(self, key: str, value: str) -> bool:
         from fogml.runs.profiles import profile_names
 
-        assert self.file and self.profile and self.out
-        profile = self.profile if self.profile in profile_names() else absolute(self.profile)
-        return self.model_copy(
-            update={"file": absolute(self.file), "profile": profile, "out": absolute(self.out)}
-        )
+        return super()._ships(key, value) or (key == "profile" and value in profile_names())
 
 
 def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:

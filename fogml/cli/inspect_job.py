@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -24,13 +24,6 @@ class InspectSettings(Settings):
     repair: bool = False
     strict: bool = False
     out: str | None = None
-
-    def in_full(self) -> InspectSettings:
-        """The settings with every path in full."""
-        assert self.out
-        return self.model_copy(
-            update={"runs": [absolute(path) for path in self.runs], "out": absolute(self.out)}
-        )
 
 
 def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:

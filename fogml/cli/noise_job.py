@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -23,11 +23,6 @@ class NoiseSettings(Settings):
     overlapping: bool = True
     repair: bool = False
     out: str | None = None
-
-    def in_full(self) -> NoiseSettings:
-        """The settings with every path in full."""
-        assert self.run and self.out
-        return self.model_copy(update={"run": absolute(self.run), "out": absolute(self.out)})
 
 
 def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:

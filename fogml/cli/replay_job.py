@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.outputs import whole_file
@@ -31,15 +31,8 @@ class ReplaySettings(Settings):
     repair: bool = False
     out: str | None = None
 
-    def in_full(self) -> ReplaySettings:
-        """The settings with every path in full."""
-        assert self.twin and self.run and self.out
-        paths = {"run": absolute(self.run), "out": absolute(self.out)}
-        if self.twin not in twin_names():
-            paths["twin"] = absolute(self.twin)
-        if self.truth:
-            paths["truth"] = absolute(self.truth)
-        return self.model_copy(update=paths)
+    def _ships(self, key: str, value: str) -> bool:
+        return super()._ships(key, value) or (key == "twin" and value in twin_names())
 
 
 def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:

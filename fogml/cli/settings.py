@@ -24,6 +24,8 @@ class Settings(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
     path_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files to read."""
+    written_keys: ClassVar[tuple[str, ...]] = ("out",)
+    """Settings that name files or folders to write."""
     seed: int = 0
 
     @classmethod
@@ -46,6 +48,20 @@ class Settings(BaseModel):
             return cls.model_validate({**stated, **given})
         except ValidationError as error:
             raise InputError(_message(cls, error, source, stated)) from None
+
+    def in_full(self) -> Self:
+        """The settings with every path in full, to be run from anywhere; what ships keeps its name."""
+        keys = [key for key in (*self.path_keys, *self.written_keys) if key in type(self).model_fields]
+        return self.model_copy(update={key: self._in_full(key, getattr(self, key)) for key in keys})
+
+    def _in_full(self, key: str, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self._in_full(key, item) for item in value]
+        return absolute(value) if isinstance(value, str) and not self._ships(key, value) else value
+
+    def _ships(self, key: str, value: str) -> bool:
+        """Whether a value of a path's setting names something that ships rather than a file."""
+        return value.startswith(SHIPPED)
 
     def yaml(self, command: str) -> str:
         """The settings in full as the text of a configuration file."""
@@ -104,8 +120,8 @@ def _beside(value: Any, folder: Path) -> Any:
 
 
 def absolute(path: str) -> str:
-    """The path in full, so that written settings can be run from anywhere."""
-    return path if path.startswith(SHIPPED) else str(Path(path).absolute())
+    """The path in full."""
+    return str(Path(path).absolute())
 
 
 def _message(settings: type[Settings], error: ValidationError, source: str, stated: Mapping[str, Any]) -> str:

@@ -9,7 +9,7 @@ import yaml
 from pydantic import Field
 
 from fogml import __version__
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.outputs import whole_file
@@ -25,6 +25,7 @@ class SimulateSettings(Settings):
     """Settings of ``fogml simulate``: a file of schema ``fogml.simulate/1``."""
 
     path_keys: ClassVar[tuple[str, ...]] = ("programme", "twin")
+    written_keys: ClassVar[tuple[str, ...]] = ("out", "truth")
     schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
     sample_s: float = 1.0
     programme: str | list[Any] | dict[str, Any] | None = None
@@ -34,17 +35,10 @@ class SimulateSettings(Settings):
     out: str | None = None
     truth: str | None = None
 
-    def in_full(self) -> SimulateSettings:
-        """The settings with every path in full."""
-        assert self.out
-        paths: dict[str, Any] = {"out": absolute(self.out)}
-        if self.truth:
-            paths["truth"] = absolute(self.truth)
-        if isinstance(self.programme, str) and self.programme not in programme_names():
-            paths["programme"] = absolute(self.programme)
-        if isinstance(self.twin, str) and self.twin not in twin_names():
-            paths["twin"] = absolute(self.twin)
-        return self.model_copy(update=paths)
+    def _ships(self, key: str, value: str) -> bool:
+        # A programme written out as a list of sentences names no file.
+        known = {"programme": programme_names, "twin": twin_names}.get(key, tuple)()
+        return super()._ships(key, value) or value in known or isinstance(getattr(self, key), list)
 
     def yaml(self, command: str) -> str:
         """The settings in full as the text of a configuration file."""

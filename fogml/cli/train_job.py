@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings, absolute
+from fogml.cli.settings import LimitSettings
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -36,16 +36,6 @@ class TrainSettings(LimitSettings):
     strict: bool = False
     any_unit: bool = False
     out: str = "train-results"
-
-    def in_full(self) -> TrainSettings:
-        """The settings with every path in full."""
-        return self.model_copy(
-            update={
-                "runs": [absolute(path) for path in self.runs],
-                "test": [absolute(path) for path in self.test],
-                "out": absolute(self.out),
-            }
-        )
 
 
 def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:

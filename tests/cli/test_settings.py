@@ -7,7 +7,12 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fogml.cli.compensate_job import CompensateSettings
+from fogml.cli.import_job import ImportSettings
 from fogml.cli.options import spread_values
+from fogml.cli.replay_job import ReplaySettings
+from fogml.cli.settings import Settings
+from fogml.cli.simulate_job import SimulateSettings
 from fogml.cli.train_job import TrainSettings
 from fogml.errors import InputError
 
@@ -106,3 +111,46 @@ def test_written_settings_read_back_the_same(tmp_path):
 )
 def test_values_after_an_option_belong_to_it(given, expected):
     assert spread_values(given, "--test") == expected
+
+
+@pytest.mark.parametrize(
+    ("settings", "in_full"),
+    [
+        (
+            TrainSettings(runs=["a.csv", "shipped:thermal-cycle-1-x"], test=["b.csv"]),
+            {
+                "runs": ["/here/a.csv", "shipped:thermal-cycle-1-x"],
+                "test": ["/here/b.csv"],
+                "out": "/here/train-results",
+            },
+        ),
+        (CompensateSettings(run="a.csv", model="m"), {"run": "/here/a.csv", "model": "/here/m", "out": None}),
+        (
+            ImportSettings(file="a.log", profile="ring-laser-static"),
+            {"file": "/here/a.log", "profile": "ring-laser-static"},
+        ),
+        (ImportSettings(file="a.log", profile="own.yaml"), {"profile": "/here/own.yaml"}),
+        (
+            ReplaySettings(twin="nominal", run="a.csv", truth="t"),
+            {"twin": "nominal", "run": "/here/a.csv", "truth": "/here/t"},
+        ),
+        (SimulateSettings(twin="t.yaml", out="b.csv"), {"twin": "/here/t.yaml", "out": "/here/b.csv"}),
+        (
+            SimulateSettings(programme=["soak 1 h"], truth="t"),
+            {"programme": ["soak 1 h"], "truth": "/here/t"},
+        ),
+    ],
+)
+def test_paths_are_written_in_full_and_names_as_they_are(
+    settings: Settings, in_full: dict, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.chdir(tmp_path)
+    changed = yaml.safe_load(settings.in_full().yaml("any").replace(str(tmp_path), "/here"))
+    assert {key: changed.get(key) for key in in_full} == in_full
+    # All else, and the order of the keys, is as stated.
+    stated = yaml.safe_load(settings.yaml("any"))
+    assert list(changed) == list(stated)
+    paths = {*type(settings).path_keys, *type(settings).written_keys}
+    assert {k: v for k, v in changed.items() if k not in paths} == {
+        k: v for k, v in stated.items() if k not in paths
+    }
