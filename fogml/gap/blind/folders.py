@@ -1,0 +1,135 @@
+"""Where a blind suite keeps its cases, answers and truth, and what a case is made of.
+
+::
+
+    DIR/cases/NNNN/    fit-1.csv ... held-out-1.csv ... static.csv, side files, options.json
+    DIR/answers/NNNN/  gap.json, gap.html, twin.yaml, outcome.json
+    DIR/answers-NAME/  the same of a baseline
+    DIR/truth/         NNNN.json, NNNN.npz, SHA256SUMS
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fogml.errors import InputError
+
+DIAGNOSIS = "diagnosis"
+"""The method whose answers stand in the folder ``answers``."""
+OUTCOME = "outcome.json"
+OUTCOME_SCHEMA = "fogml.blind_outcome/1"
+_ANSWERS = "answers"
+
+
+@dataclass(frozen=True)
+class CaseFiles:
+    """What a diagnosis gets of a case.
+
+    Attributes
+    ----------
+    name
+        The case's number.
+    fit, held_out
+        Runs, in the order of their numbers.
+    noise
+        The static run for the noise, if there is one.
+    without
+        Ids that are no candidates.
+    """
+
+    name: str
+    fit: tuple[Path, ...]
+    held_out: tuple[Path, ...]
+    noise: Path | None
+    without: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class BlindFolder:
+    """A blind suite's folder."""
+
+    path: Path
+
+    @property
+    def cases(self) -> Path:
+        """The folder of the cases."""
+        return self.path / "cases"
+
+    @property
+    def truth(self) -> Path:
+        """The folder of the truths."""
+        return self.path / "truth"
+
+    def answers(self, method: str = DIAGNOSIS) -> Path:
+        """The folder of a method's answers."""
+        return self.path / (_ANSWERS if method == DIAGNOSIS else f"{_ANSWERS}-{method}")
+
+    def methods(self) -> tuple[str, ...]:
+        """Methods that answered, the diagnosis first."""
+        found = [DIAGNOSIS] if self.answers().is_dir() else []
+        others = sorted(self.path.glob(f"{_ANSWERS}-*"))
+        return (*found, *(path.name.removeprefix(f"{_ANSWERS}-") for path in others if path.is_dir()))
+
+    def names(self) -> tuple[str, ...]:
+        """Numbers of the cases, in order.
+
+        Raises
+        ------
+        InputError
+            If there are none.
+        """
+        found = sorted(path.name for path in self.cases.glob("*") if path.is_dir()) if self.cases else []
+        if not found:
+            raise InputError(f"{self.cases}: holds no cases; make them first (fogml blind make)")
+        return tuple(found)
+
+
+def case_files(folder: Path) -> CaseFiles:
+    """What lies in a case's folder.
+
+    Raises
+    ------
+    InputError
+        If there is no fit run, or ``options.json`` is not as it should be.
+    """
+    fit, held_out = _numbered(folder, "fit"), _numbered(folder, "held-out")
+    if not fit:
+        raise InputError(f"{folder}: holds no fit-1.csv; make the cases anew")
+    static = folder / "static.csv"
+    options = read_json(folder / "options.json") if (folder / "options.json").is_file() else {}
+    without = options.get("without", [])
+    if not isinstance(without, list) or not all(isinstance(id, str) for id in without):
+        raise InputError(f"{folder / 'options.json'}: key 'without' must list ids of effects")
+    return CaseFiles(folder.name, fit, held_out, static if static.is_file() else None, tuple(without))
+
+
+def read_json(path: Path) -> dict[str, Any]:
+    """The mapping in a JSON file.
+
+    Raises
+    ------
+    InputError
+        If it can't be read or holds no mapping.
+    """
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except ValueError as error:
+        raise InputError(f"{path}: is not JSON ({error})") from None
+    if not isinstance(values, dict):
+        raise InputError(f"{path}: a JSON object was expected")
+    return values
+
+
+def _numbered(folder: Path, stem: str) -> tuple[Path, ...]:
+    found = {}
+    for path in folder.glob(f"{stem}-*.csv"):
+        match = re.fullmatch(rf"{stem}-(\d+)", path.stem)
+        if match:
+            found[int(match.group(1))] = path
+    return tuple(found[number] for number in sorted(found))

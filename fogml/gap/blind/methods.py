@@ -1,0 +1,55 @@
+"""Methods that answer blind cases, by name: the diagnosis and the baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+
+from fogml.errors import InputError
+from fogml.gap.blind.folders import DIAGNOSIS, CaseFiles
+
+Method = Callable[[CaseFiles, Path], None]
+"""Reads a case's runs and writes ``gap.json`` into a folder."""
+
+_PACKAGE = "fogml.gap.blind"
+METHODS = {
+    DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
+    "bic": f"{_PACKAGE}.baselines.forward:bic",
+    "bic-unwhitened": f"{_PACKAGE}.baselines.forward:bic_unwhitened",
+    "bic-fixed-nominal": f"{_PACKAGE}.baselines.forward:bic_fixed_nominal",
+    "stlsq": f"{_PACKAGE}.baselines.sparse:stlsq",
+    "random-forest": f"{_PACKAGE}.baselines.forest:random_forest",
+    "gp-discrepancy": f"{_PACKAGE}.baselines.process:gp_discrepancy",
+    "abstain": f"{_PACKAGE}.baselines.abstain:abstain",
+}
+"""Name of each method to ``module:function``; all of them run sealed."""
+ORACLE = "oracle"
+"""The baseline that is given the truth, and so can't run sealed."""
+BASELINES = (*(name for name in METHODS if name != DIAGNOSIS), ORACLE)
+
+
+def load_method(text: str) -> Method:
+    """The method of a name of `METHODS`, or of ``package.module:function``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    module, colon, name = METHODS.get(text, text).partition(":")
+    if not colon:
+        known = ", ".join(METHODS)
+        raise InputError(f"no method '{text}'; known are {known}, or name one as module:function")
+    try:
+        method: Method = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"method '{text}' does not load: {error}") from None
+    return method
+
+
+def diagnosis(case: CaseFiles, out: Path) -> None:
+    """The diagnosis itself, as ``fogml diagnose`` runs it."""
+    from fogml.gap import diagnose  # type: ignore[attr-defined]
+
+    raise NotImplementedError(diagnose)

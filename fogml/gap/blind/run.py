@@ -1,0 +1,225 @@
+"""Answers to blind cases: each by a sealed process that gets the case's files and nothing else."""
+
+from __future__ import annotations
+
+import json
+import queue
+import shutil
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import fogml
+from fogml.errors import InputError
+from fogml.gap.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files
+from fogml.gap.blind.pool import Worker, WorkerLost
+from fogml.gap.blind.sealing import own_roots, within
+from fogml.outputs import whole_folder
+
+LIMIT_S = 600.0
+"""Time that a case may take unless told otherwise [s]."""
+Progress = Callable[[str], None]
+"""Told the number of each case that is done."""
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """Which cases of a suite are to be answered, and how.
+
+    Attributes
+    ----------
+    folder
+        The suite.
+    method
+        Name of a method, or ``module:function``.
+    name
+        What its answers are called; the method's name unless told otherwise.
+    code
+        Folder of the method's own code, where that is not installed.
+    workers, threads
+        Processes, and threads of each.
+    limit_s
+        Time that a case may take [s].
+    shard
+        ``(i, n)``: every n-th case from the i-th on, i from 1; for n machines on one folder.
+    retry
+        Whether cases that failed before are tried again.
+    """
+
+    folder: BlindFolder
+    method: str = DIAGNOSIS
+    name: str | None = None
+    code: Path | None = None
+    workers: int = 1
+    threads: int = 1
+    limit_s: float = LIMIT_S
+    shard: tuple[int, int] = (1, 1)
+    retry: bool = False
+
+    def __post_init__(self) -> None:
+        i, n = self.shard
+        if not 1 <= i <= n:
+            raise InputError(f"shard {i}/{n}: write i/n with i from 1 to n")
+        if self.workers < 1 or self.threads < 1 or not self.limit_s > 0:
+            raise InputError("workers, threads and the time limit must be positive")
+
+    @property
+    def answers(self) -> Path:
+        """Where the answers go."""
+        return self.folder.answers(self.name or self.method)
+
+    def left(self) -> tuple[str, ...]:
+        """Numbers of the cases of the shard that have no answer yet."""
+        i, n = self.shard
+        return tuple(name for name in self.folder.names()[i - 1 :: n] if not self._answered(name))
+
+    def _answered(self, name: str) -> bool:
+        outcome = self.answers / name / OUTCOME
+        if not outcome.is_file():
+            return False
+        return not self.retry or bool(json.loads(outcome.read_text(encoding="utf-8"))["done"])
+
+
+@dataclass
+class _Shared:
+    """What the keepers of the workers share."""
+
+    plan: RunPlan
+    waiting: queue.SimpleQueue[str]
+    progress: Progress | None
+    failed: int = 0
+    stop: threading.Event = field(default_factory=threading.Event)
+    error: BaseException | None = None
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+
+def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
+    """Answer the cases that are left; returns how many were answered now, and how many of them failed.
+
+    Each answer appears whole, so that an interrupted run goes on where it was. A case that
+    crashes its process, exceeds its time or writes no ``gap.json`` is recorded as failed, and the
+    process is started anew.
+
+    Raises
+    ------
+    InputError
+        If a sealed process could read the truth where it lies, or the method does not load.
+    """
+    check_out_of_reach(plan)
+    left = plan.left()
+    plan.answers.mkdir(parents=True, exist_ok=True)
+    waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+    for name in left:
+        waiting.put(name)
+    shared = _Shared(plan, waiting, progress)
+    keepers = [
+        threading.Thread(target=_keep, args=(shared,), daemon=True)
+        for _ in range(min(plan.workers, len(left)))
+    ]
+    for keeper in keepers:
+        keeper.start()
+    try:
+        for keeper in keepers:
+            keeper.join()
+    except KeyboardInterrupt:
+        shared.stop.set()
+        raise
+    if shared.error is not None:
+        raise shared.error
+    return len(left), shared.failed
+
+
+def check_out_of_reach(plan: RunPlan) -> None:
+    """Refuse a suite whose truth lies among what a sealed process may read.
+
+    Raises
+    ------
+    InputError
+        Naming the folder.
+    """
+    roots = (*own_roots(), *([plan.code.resolve()] if plan.code else []))
+    if within(plan.folder.truth, roots):
+        raise InputError(
+            f"{plan.folder.truth}: lies in a folder that every process may read (Python's, the system's or "
+            "the method's own code); move the suite elsewhere"
+        )
+
+
+def outcome_of(case: str, method: str, answer: dict[str, Any], locks: str, samples: int) -> dict[str, Any]:
+    """The values of ``outcome.json``, schema ``fogml.blind_outcome/1``."""
+    return {
+        "schema": OUTCOME_SCHEMA,
+        "case": case,
+        "method": method,
+        "done": answer["done"],
+        "reason": answer["reason"],
+        "message": answer["message"],
+        "seconds": answer["seconds"],
+        "samples": samples,
+        "sealed_by": locks,
+        "version": fogml.__version__,
+    }
+
+
+def count_samples(folder: Path) -> int:
+    """Samples in all runs of a case: lines less one header each."""
+    files = case_files(folder)
+    return sum(_lines(path) - 1 for path in (*files.fit, *files.held_out))
+
+
+def _lines(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
+
+
+def _keep(shared: _Shared) -> None:
+    """Take cases from the queue until none is left, with one worker after another."""
+    worker: Worker | None = None
+    plan = shared.plan
+    try:
+        while not shared.stop.is_set():
+            try:
+                name = shared.waiting.get_nowait()
+            except queue.Empty:
+                return
+            worker = worker or Worker(plan.method, plan.code, plan.threads)
+            if not _one(shared, worker, name):
+                worker.end()
+                worker = None
+    except BaseException as error:
+        shared.error = error
+        shared.stop.set()
+    finally:
+        if worker is not None:
+            worker.end()
+
+
+def _one(shared: _Shared, worker: Worker, name: str) -> bool:
+    """Answer one case; False where the worker is lost."""
+    plan, usable = shared.plan, True
+    source, case, out = plan.folder.cases / name, worker.home / name, worker.home / "answer"
+    # A copy, not a link: nothing in it leads back to the suite.
+    shutil.copytree(source, case)
+    out.mkdir()
+    try:
+        answer = worker.ask({"case": name, "out": out.name}, plan.limit_s)
+        if answer["done"] and not (out / "gap.json").is_file():
+            answer |= {"done": False, "reason": "no answer", "message": "no gap.json was written"}
+    except WorkerLost as lost:
+        usable = False
+        seconds = plan.limit_s if lost.reason == "timed out" else None
+        answer = {"done": False, "reason": lost.reason, "message": str(lost), "seconds": seconds}
+    values = outcome_of(name, plan.name or plan.method, answer, worker.locks, count_samples(case))
+    with whole_folder(plan.answers) as staging:
+        shutil.copytree(out, staging / name)
+        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
+        (staging / name / OUTCOME).write_text(text + "\n", encoding="utf-8")
+    shutil.rmtree(case)
+    shutil.rmtree(out)
+    with shared.lock:
+        shared.failed += not answer["done"]
+        if shared.progress:
+            shared.progress(name)
+    return usable
