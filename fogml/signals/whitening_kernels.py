@@ -1,0 +1,209 @@
+"""The Kalman recursions behind `fogml.signals.whitening`: gains once, then any number of columns.
+
+States x are Gauss-Markov processes and, last, a random walk and the rounding of the angle before.
+A sample is a mean over its averaging time, so that its noise and that of the states belong together::
+
+    y[i] = c[i] @ x[i-1] + noise,   x[i] = f[i] * x[i-1] + noise
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from fogml.signals.modes import phi_functions
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+_TILE = 64
+
+
+@njit(cache=True, nogil=True)
+def step_terms(
+    step: float,
+    averaging: float,
+    time_constants: FloatArray,
+    variance: float,
+    white: float,
+    walk: float,
+    rounding: float,
+    adjoining: bool,
+    decay: FloatArray,
+    reading: FloatArray,
+    process: FloatArray,
+    cross: FloatArray,
+) -> float:
+    """Constants of one step [s]; the variance of the sample that the states before do not explain.
+
+    Parameters
+    ----------
+    step, averaging
+        Since the sample before, and what the sample is a mean over [s]. A shorter step bounds the mean.
+    time_constants, variance
+        Of the Gauss-Markov states, shape (m,) [s] and one variance for all.
+    white, walk, rounding
+        Densities of white noise and random walk; variance of one rounding over the averaging time.
+    adjoining
+        Whether the angle was read at the sample before where this mean begins.
+    decay, reading, process, cross
+        Overwritten, shape (m + 2,): f, c, the states' noise variances and their covariances
+        with the sample's noise.
+    """
+    m = len(time_constants)
+    a = min(step, averaging)
+    gap = step - a
+    own = white / averaging
+    for j in range(m):
+        tau = time_constants[j]
+        fall, phi_1, phi_2 = phi_functions(a / tau)
+        waited = math.exp(-gap / tau)
+        fresh = -variance * math.expm1(-2.0 * gap / tau)
+        decay[j] = waited * fall
+        reading[j] = waited * phi_1
+        process[j] = -variance * math.expm1(-2.0 * step / tau)
+        cross[j] = fall * phi_1 * fresh + variance * phi_1 * phi_1 * a / tau
+        own += phi_1 * phi_1 * fresh + variance * (2.0 * phi_2 - phi_1 * phi_1)
+    decay[m] = 1.0
+    reading[m] = 1.0
+    process[m] = walk * step
+    cross[m] = walk * (gap + 0.5 * a)
+    own += walk * (gap + a / 3.0)
+    # The rounding in units of its share of a sample: this one's is in, the one before's is out.
+    decay[m + 1] = 0.0
+    reading[m + 1] = -1.0 if adjoining else 0.0
+    process[m + 1] = rounding
+    cross[m + 1] = rounding
+    own += rounding if adjoining else 2.0 * rounding
+    return own
+
+
+@njit(cache=True, nogil=True)
+def gains_kernel(
+    kind: IntArray,
+    steps: FloatArray,
+    averaging: FloatArray,
+    time_constants: FloatArray,
+    variance: float,
+    white: float,
+    walk: float,
+    quantum: float,
+    adjoining: float,
+    size: int,
+    decay: FloatArray,
+    reading: FloatArray,
+    gains: FloatArray,
+    deviation: FloatArray,
+) -> None:
+    """Gains and standard deviations of the innovations of n samples, exact from the first one on.
+
+    Parameters
+    ----------
+    kind
+        Which of u pairs of step and averaging time a sample has, shape (n,).
+    steps, averaging
+        Those pairs [s], shape (u,).
+    time_constants, variance, white, walk
+        As in `step_terms`.
+    quantum
+        Rounding of the angle times 3600 s/h: its share in a sample is over the averaging time.
+    adjoining
+        Longest step, in averaging times, that counts as adjoining.
+    size
+        States in use, s: m + 1 without rounding, m + 2 with it, m where there is no walk either.
+    decay, reading
+        Overwritten with f and c, shape (u, s).
+    gains, deviation
+        Overwritten, shapes (n, s) and (n,).
+    """
+    m = len(time_constants)
+    f, c = np.zeros(m + 2), np.zeros(m + 2)
+    process, cross = np.zeros(m + 2), np.zeros(m + 2)
+    seen = np.zeros(size)
+    spread = np.zeros((size, size))
+    for j in range(m):
+        spread[j, j] = variance
+    if size == m + 2:
+        first = quantum / averaging[kind[0]]
+        spread[m + 1, m + 1] = first * first
+    now, own = -1, 0.0
+    for i in range(len(kind)):
+        if kind[i] != now:
+            now = kind[i]
+            step, a = steps[now], averaging[now]
+            own = step_terms(
+                step, a, time_constants, variance, white, walk,
+                (quantum / a) ** 2, step <= adjoining * a, f, c, process, cross,
+            )  # fmt: skip
+            for j in range(size):
+                decay[now, j] = f[j]
+                reading[now, j] = c[j]
+        total = own
+        for j in range(size):
+            seen[j] = 0.0
+            for k in range(size):
+                seen[j] += spread[j, k] * c[k]
+            total += c[j] * seen[j]
+        gain = gains[i]
+        for j in range(size):
+            gain[j] = (f[j] * seen[j] + cross[j]) / total
+        for j in range(size):
+            for k in range(j + 1):
+                value = f[j] * spread[j, k] * f[k] - gain[j] * gain[k] * total
+                spread[j, k] = value
+                spread[k, j] = value
+            spread[j, j] += process[j]
+        deviation[i] = math.sqrt(total)
+
+
+@njit(cache=True, nogil=True)
+def whiten_kernel(
+    values: FloatArray,
+    kind: IntArray,
+    decay: FloatArray,
+    reading: FloatArray,
+    gains: FloatArray,
+    deviation: FloatArray,
+    states: FloatArray,
+    inverse: bool,
+) -> None:
+    """Turn columns (n, k) into innovations over their deviations, in place; or back with `inverse`.
+
+    `states`, shape (s, k), are overwritten with those after the last sample. Columns go in tiles
+    that stay in the fastest cache with their states.
+    """
+    n, columns = values.shape
+    size = len(states)
+    for left in range(0, columns, _TILE):
+        right = min(left + _TILE, columns)
+        width = right - left
+        z = states[:, left:right].copy()
+        error = np.empty(width)
+        predicted = np.empty(width)
+        for i in range(n):
+            row = values[i, left:right]
+            f, c, g = decay[kind[i]], reading[kind[i]], gains[i]
+            for q in range(width):
+                predicted[q] = 0.0
+            for j in range(size):
+                weight = c[j]
+                for q in range(width):
+                    predicted[q] += weight * z[j, q]
+            if inverse:
+                scale = deviation[i]
+                for q in range(width):
+                    error[q] = row[q] * scale
+                    row[q] = predicted[q] + error[q]
+            else:
+                scale = 1.0 / deviation[i]
+                for q in range(width):
+                    error[q] = row[q] - predicted[q]
+                    row[q] = error[q] * scale
+            for j in range(size):
+                kept, taken = f[j], g[j]
+                for q in range(width):
+                    z[j, q] = kept * z[j, q] + taken * error[q]
+        states[:, left:right] = z
