@@ -114,6 +114,17 @@ def read_blocks(
         raise too_short(path.name, assembler.samples)
 
 
+def read_table(path: Path) -> RawTable:
+    """The table in a file of any format as it stands, whatever its columns; nothing is repaired.
+
+    Raises
+    ------
+    InputError
+        Naming the fault.
+    """
+    return _read_table(path, file_format(path), repair=False)
+
+
 def file_format(path: Path) -> Format:
     """Which of the formats a file has, told by its first bytes.
 
