@@ -145,6 +145,13 @@ class NoiseModel:
         flicker = self.state_variance(ladder) * lags.sum(axis=-1)
         return np.asarray(2.0 * self.fast_density(ladder) + flicker + walk)
 
+    def allan_variance(self, averaging_s: ArrayLike) -> FloatArray:
+        """Allan variance of means over times [s], of the power laws [(deg/h)^2]."""
+        tau = np.asarray(averaging_s, dtype=np.float64)
+        quantisation = 3.0 * (3600.0 * self.Q / tau) ** 2
+        flicker = 2.0 * math.log(2.0) / math.pi * self.B**2
+        return np.asarray(quantisation + self.white_density / tau + flicker + self.walk_rate * tau / 3.0)
+
     def variances(self, time: ArrayLike, averaging_s: ArrayLike, ladder: Ladder) -> FloatArray:
         """Variance of each mean over `averaging_s` that ends at `time` [s], shape (n,) [(deg/h)^2].
 

@@ -1,0 +1,219 @@
+"""Noise coefficients of greatest posterior probability, from static runs or soaks, with uncertainty.
+
+Restricted likelihood: the constants of given columns are integrated out. A long series is split
+into averages, whose likelihood is exact, and the differences inside them, level by level (Haar's
+wavelets, in which flicker and white noise are nearly independent: G. W. Wornell and A. V. Oppenheim,
+IEEE Trans. SP-40 (1992) 611), so that an evaluation takes the same time at any length.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+from fogml.signals.noise_fit_data import FitData, Level, fit_data
+from fogml.signals.noise_model import NoiseModel
+from fogml.signals.whitening import Whitener
+
+FloatArray = NDArray[np.float64]
+
+NAMES = ("N", "B", "K")
+"""The fitted coefficients, in the order of `NoiseFit.covariance`."""
+_WIDE = 10.0
+_STEP = 0.05
+"""Step of the second differences, in the logarithm."""
+
+
+@dataclass(frozen=True)
+class NoisePrior:
+    """Log-normal priors of N, B and K.
+
+    Attributes
+    ----------
+    centre
+        Medians. One that is zero holds its coefficient at zero; Q is held at the centre's.
+    factor
+        One standard deviation is a factor of this, above 1; one number or one each.
+    """
+
+    centre: NoiseModel
+    factor: float | tuple[float, float, float] = 3.0
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Standard deviations of the logarithms, shape (3,)."""
+        return np.log(np.broadcast_to(np.asarray(self.factor, dtype=np.float64), (3,)))
+
+    def __post_init__(self) -> None:
+        if not np.all(self.deviations > 0.0):
+            raise InputError(f"noise prior: a factor above 1 was expected, not {self.factor}")
+
+
+@dataclass(frozen=True)
+class NoiseFit:
+    """Fitted noise.
+
+    Attributes
+    ----------
+    model
+        Coefficients of greatest posterior density in their logarithms.
+    covariance
+        Of log N, log B and log K, shape (3, 3), from the curvature; zero for one that is held.
+    prior
+        What was assumed.
+    log_posterior
+        At `model`, up to a constant of the data.
+    evaluations
+        Of the likelihood.
+    """
+
+    model: NoiseModel
+    covariance: FloatArray
+    prior: NoisePrior
+    log_posterior: float
+    evaluations: int
+
+    @property
+    def standard_errors(self) -> FloatArray:
+        """Of log N, log B and log K, shape (3,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    def draw(self, rng: np.random.Generator, count: int) -> list[NoiseModel]:
+        """Models from the posterior, normal in the logarithms."""
+        values, vectors = np.linalg.eigh(self.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        factors = np.exp(rng.standard_normal((count, 3)) @ root.T)
+        return [_scaled(self.model, row) for row in factors]
+
+
+def fit_noise(
+    time: Sequence[ArrayLike],
+    series: Sequence[ArrayLike],
+    columns: Sequence[ArrayLike] | None = None,
+    *,
+    prior: NoisePrior | None = None,
+    deviations: ArrayLike | None = None,
+    averaging_s: float | None = None,
+    most: int = 4096,
+) -> NoiseFit:
+    """Fit N, B and K to one or several series.
+
+    Each series has a free constant of its own; so stretches of one run, its soaks for instance,
+    go as series each.
+
+    Parameters
+    ----------
+    time, series
+        Sample times [s] and values [deg/h] of each series, shape (n,) each.
+    columns
+        Regressors of each series, shape (n, p), whose constants all series share.
+    prior
+        None: wide log-normal priors, a factor of 10 about what the Allan variance shows at a glance.
+    deviations
+        Prior standard deviations of the constants of `columns`, shape (p,); infinite for free ones,
+        as all are if None.
+    averaging_s
+        What samples are means over [s]; the median step of the first series if None.
+    most
+        Longest series whose likelihood is exact; longer ones are averaged to at most as many.
+
+    Raises
+    ------
+    InputError
+        If shapes do not agree, values are not finite, or no series has 16 samples.
+
+    Notes
+    -----
+    Inside averages the columns are regressed on level by level. Spikes and steps count as noise:
+    leave them out before. Where the data show no B or K, the prior decides on its size, and its
+    standard error says so.
+    """
+    from scipy.optimize import minimize
+
+    data = fit_data(time, series, columns, deviations, averaging_s, most)
+    prior = _glance(data) if prior is None else prior
+    centre = np.array([getattr(prior.centre, name) for name in NAMES])
+    free = np.flatnonzero(centre > 0.0)
+    spread = prior.deviations[free]
+
+    def objective(units: FloatArray) -> float:
+        """Negative log posterior at so many prior standard deviations from the centre."""
+        factors = np.ones(3)
+        factors[free] = np.exp(np.clip(units * spread, -30.0, 30.0))
+        return 0.5 * float(units @ units) - _log_likelihood(data, _scaled(prior.centre, factors))
+
+    found = minimize(objective, np.zeros(len(free)), method="BFGS", options={"gtol": 1e-3})
+    curvature = _curvature(objective, found.x, _STEP / spread)
+    # Curvature below the prior's, of a likelihood that bends the other way, is no knowledge.
+    values, vectors = np.linalg.eigh(curvature)
+    inverse = (vectors / np.maximum(values, 1.0)) @ vectors.T
+    covariance = np.zeros((3, 3))
+    covariance[np.ix_(free, free)] = inverse * np.outer(spread, spread)
+    factors = np.ones(3)
+    factors[free] = np.exp(found.x * spread)
+    return NoiseFit(_scaled(prior.centre, factors), covariance, prior, -float(found.fun), int(found.nfev))
+
+
+def _scaled(model: NoiseModel, factors: FloatArray) -> NoiseModel:
+    n, b, k = (float(v) for v in factors)
+    return replace(model, N=model.N * n, B=model.B * b, K=model.K * k)
+
+
+def _log_likelihood(data: FitData, model: NoiseModel) -> float:
+    """Restricted log-likelihood up to a constant."""
+    total = _levels_log_likelihood(data.levels, model)
+    whitened = []
+    for part in data.parts:
+        whitener = Whitener(model, part.time, part.averaging_s, part.ladder)
+        whitened.append(whitener.whiten(part.table))
+        total -= whitener.log_det
+    # Rows that the priors of the constants add, and the columns' own root.
+    root = np.linalg.qr(np.vstack((*whitened, data.prior_rows)), mode="r")
+    diagonal = np.abs(np.diag(root))
+    return total - 0.5 * float(diagonal[-1] ** 2) - float(np.sum(np.log(diagonal[:-1])))
+
+
+def _levels_log_likelihood(levels: Sequence[Level], model: NoiseModel) -> float:
+    total = 0.0
+    for level in levels:
+        variance = float(model.allan_variance(level.averaging_s))
+        total -= 0.5 * (level.freedom * math.log(variance) + level.squares / variance)
+    return total
+
+
+def _curvature(function, at: FloatArray, steps: FloatArray) -> FloatArray:  # type: ignore[no-untyped-def]
+    """Second derivatives by central differences, shape (k, k)."""
+    k = len(at)
+    offsets = np.diag(steps)
+    middle = function(at)
+    matrix = np.empty((k, k))
+    for i in range(k):
+        up, down = function(at + offsets[i]), function(at - offsets[i])
+        matrix[i, i] = (up - 2.0 * middle + down) / steps[i] ** 2
+        for j in range(i):
+            mixed = (
+                function(at + offsets[i] + offsets[j])
+                - function(at + offsets[i] - offsets[j])
+                - function(at - offsets[i] + offsets[j])
+                + function(at - offsets[i] - offsets[j])
+            )
+            matrix[i, j] = matrix[j, i] = mixed / (4.0 * steps[i] * steps[j])
+    return matrix
+
+
+def _glance(data: FitData) -> NoisePrior:
+    """Wide priors about the shortest, the least and the longest of the Allan variances."""
+    seen = [level for level in data.glance if level.squares > 0.0]
+    if not seen:
+        raise InputError("noise fit: the series are constant, there is no noise to fit")
+    tau = np.array([level.averaging_s for level in seen])
+    variance = np.array([level.squares / level.freedom for level in seen])
+    white = math.sqrt(variance[0] * tau[0]) / 60.0
+    flicker = math.sqrt(variance.min() * math.pi / (2.0 * math.log(2.0)))
+    walk = 60.0 * math.sqrt(3.0 * variance[-1] / tau[-1])
+    return NoisePrior(NoiseModel(white, 0.5 * flicker, 0.5 * walk), _WIDE)
