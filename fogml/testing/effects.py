@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -10,6 +10,14 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
+from fogml.testing.effect_amplitudes import (
+    check_amplitude,
+    hooks,
+    in_block,
+    rms,
+    same,
+    signature,
+)
 from fogml.testing.effect_declarations import check_declaration, check_priors, check_values
 from fogml.testing.effect_inputs import (
     BLOCK_EDGES,
@@ -21,21 +29,11 @@ from fogml.testing.effect_inputs import (
     without_rows,
 )
 from fogml.twin import registry
-from fogml.twin.effect import (
-    Effect,
-    LoggerEffect,
-    LoopEffect,
-    NoiseEffect,
-    ScaleFactorEffect,
-    SensorEffect,
-    ThermalEffect,
-)
+from fogml.twin.effect import Effect, NoiseEffect, ThermalEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.quantities import GRADES
 
-AGREEMENT = 1e-9
-"""Greatest difference between two ways to the same value, relative to the values' size."""
 BLOCK_AGREEMENT = 1e-12
 """The same for block by block against the whole."""
 SMOOTHNESS = 0.05
@@ -47,11 +45,11 @@ def check_effect(effect: Effect | type[Effect]) -> None:
 
     The checks: the declaration is whole, with units, ranges, priors, equation and source; the
     signature is finite on simulated inputs and on recordings that lack what is optional, and leaves
-    its inputs alone; amplitude 0 changes nothing and the response is linear in the amplitude; no
-    value depends on later samples, nor on anything outside `needs`, and everything in `needs` and
-    every shape parameter matters; samples that are missing while nothing moves leave no trace;
-    block by block gives what the whole run gives; slopes against the shape parameters by finite
-    differences are finite and smooth; it registers and unregisters.
+    its inputs alone; amplitude 0 changes nothing, and a small one what the signature says; no value
+    depends on later samples, nor on anything outside `needs`, and everything in `needs` and every
+    shape parameter matters; samples that are missing while nothing moves leave no trace; block by
+    block gives what the whole run gives; slopes against the shape parameters by finite differences
+    are finite and smooth; it registers and unregisters.
 
     Parameters
     ----------
@@ -69,13 +67,13 @@ def check_effect(effect: Effect | type[Effect]) -> None:
     check_priors(checked)
     check_values(checked)
     _check_finite(checked, inputs)
+    _check_needs(checked, inputs)
+    _check_causality(checked, inputs["programme"])
+    _check_blocks(checked, inputs["programme"])
     if not isinstance(checked, NoiseEffect):
-        _check_needs(checked, inputs)
-        _check_causality(checked, inputs["programme"])
-        _check_blocks(checked, inputs["programme"])
         _check_gap(checked, inputs["programme"])
         _check_shape(checked, inputs)
-    _check_amplitude(checked, inputs["programme"])
+    check_amplitude(checked, inputs["programme"])
     _check_registry(checked)
 
 
@@ -85,26 +83,26 @@ def _check_finite(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
         for name, given in inputs.items():
             before = _columns(given)
             copies = {key: values.copy() for key, values in before.items()}
-            signature = _signature(effect, given, shape)
-            assert isinstance(signature, np.ndarray) and signature.dtype == np.float64, (
+            found = signature(effect, given, shape)
+            assert isinstance(found, np.ndarray) and found.dtype == np.float64, (
                 f"{effect.id}: the signature on '{name}' is no float64 array"
             )
-            shape_told = f"{effect.id}: the signature on '{name}' has shape {signature.shape}"
-            assert signature.shape == (len(given),), f"{shape_told}, not ({len(given)},)"
-            assert np.isfinite(signature).all(), f"{effect.id}: not finite everywhere on '{name}'"
-            again = _signature(effect, given, shape)
-            assert np.array_equal(signature, again), f"{effect.id}: a second call on '{name}' differs"
+            shape_told = f"{effect.id}: the signature on '{name}' has shape {found.shape}"
+            assert found.shape == (len(given),), f"{shape_told}, not ({len(given)},)"
+            assert np.isfinite(found).all(), f"{effect.id}: not finite everywhere on '{name}'"
+            again = signature(effect, given, shape)
+            assert np.array_equal(found, again), f"{effect.id}: a second call on '{name}' differs"
             for key, values in copies.items():
                 assert np.array_equal(values, before[key]), f"{effect.id}: the signature changed {key}"
-            empty = _signature(effect, block(given, 0, 0), shape)
+            empty = signature(effect, block(given, 0, 0), shape)
             assert empty.shape == (0,), f"{effect.id}: no samples do not give an empty signature"
 
 
 def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
     shape = _off_default(effect)
     given = inputs["programme"]
-    whole = _signature(effect, given, shape)
-    alone = _signature(effect, scrambled(given, keep=effect.needs), shape)
+    whole = signature(effect, given, shape)
+    alone = signature(effect, scrambled(given, keep=effect.needs), shape)
     assert np.array_equal(whole, alone), (
         f"{effect.id}: its signature depends on inputs outside {effect.needs}"
     )
@@ -113,8 +111,8 @@ def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
         others = [name for name in SCRAMBLED if name != need]
         touched = any(
             not np.array_equal(
-                _signature(effect, base, shape),
-                _signature(effect, scrambled(base, keep=others, value=3.0), shape),
+                signature(effect, base, shape),
+                signature(effect, scrambled(base, keep=others, value=3.0), shape),
             )
             for base in (given, bare)
         )
@@ -124,38 +122,36 @@ def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
 def _check_causality(effect: Effect, inputs: Inputs) -> None:
     shape = _off_default(effect)
     half = len(inputs) // 2 + 7
-    whole = _signature(effect, inputs, shape)
-    first = _signature(effect, block(inputs, 0, half), shape)
-    _same(whole[:half], first, f"{effect.id}: a value depends on whether later samples exist")
+    whole = signature(effect, inputs, shape)
+    first = signature(effect, block(inputs, 0, half), shape)
+    same(whole[:half], first, f"{effect.id}: a value depends on whether later samples exist")
 
 
 def _check_blocks(effect: Effect, inputs: Inputs) -> None:
     shape = _off_default(effect)
     memory = Memory()
     edges = [0, *(int(share * len(inputs)) for share in BLOCK_EDGES), len(inputs)]
-    pieces = [
-        effect.signature(block(inputs, start, stop, memory), **shape) for start, stop in pairwise(edges)
-    ]
-    whole = _signature(effect, inputs, shape)
+    pieces = [in_block(effect, block(inputs, start, stop, memory), shape) for start, stop in pairwise(edges)]
+    whole = signature(effect, inputs, shape)
     what = f"{effect.id}: block by block and the whole run"
-    _same(whole, np.concatenate(pieces), what, agreement=BLOCK_AGREEMENT)
+    same(whole, np.concatenate(pieces), what, agreement=BLOCK_AGREEMENT)
 
 
 def _check_gap(effect: Effect, inputs: Inputs) -> None:
     """Samples that are missing in a soak, where nothing moves, must leave no trace beyond a window."""
     shape = _off_default(effect)
     still, (first, last) = still_stretch(inputs)
-    whole = _signature(effect, still, shape)
-    cut = _signature(effect, without_rows(still, first, last), shape)
+    whole = signature(effect, still, shape)
+    cut = signature(effect, without_rows(still, first, last), shape)
     assert np.isfinite(cut).all(), f"{effect.id}: not finite after a gap"
     later = last + int(3.0 * inputs.rate_window_s / (inputs.time[1] - inputs.time[0])) + 1
     size = float(np.abs(whole).max())
     worst = float(np.abs(whole[later:] - cut[later - (last - first) :]).max(initial=0.0))
     assert worst <= 1e-6 * size, f"{effect.id}: a gap in a soak leaves a trace of {worst:.2g} of {size:.2g}"
     # In motion, a gap may cost accuracy but must not make a spike.
-    moving = _signature(effect, without_rows(inputs, len(inputs) // 4, len(inputs) // 4 + 60), shape)
+    moving = signature(effect, without_rows(inputs, len(inputs) // 4, len(inputs) // 4 + 60), shape)
     assert np.isfinite(moving).all() and np.abs(moving).max() <= 2.0 * np.abs(
-        _signature(effect, inputs, shape)
+        signature(effect, inputs, shape)
     ).max(initial=1e-300), f"{effect.id}: a gap in a ramp makes a spike"
 
 
@@ -174,7 +170,7 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
             coarse = _slope(effect, inputs[name], shape, quantity.name, step)
             fine = _slope(effect, inputs[name], shape, quantity.name, 0.5 * step)
             assert np.isfinite(coarse).all(), f"{effect.id}: slope against {quantity.name} is not finite"
-            size, rough = _rms(fine), _rms(coarse - fine)
+            size, rough = rms(fine), rms(coarse - fine)
             matters = matters or size > 0.0
             assert rough <= SMOOTHNESS * size, (
                 f"{effect.id}: slope against {quantity.name} changes by {rough / size:.0%} with half the step"
@@ -190,12 +186,12 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
 def _forward(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
     """What the forward hooks of an effect give at a usual amplitude."""
     amplitude = effect.amplitude.typical()
-    return np.concatenate([apply(amplitude) for _, apply, _ in _hooks(effect, inputs, shape)])
+    return np.concatenate([apply(amplitude) for _, apply, _ in hooks(effect, inputs, shape)])
 
 
 def _slope(effect: Effect, inputs: Inputs, shape: Mapping[str, float], name: str, step: float) -> FloatArray:
-    above = _signature(effect, inputs, {**shape, name: shape[name] + step})
-    below = _signature(effect, inputs, {**shape, name: shape[name] - step})
+    above = signature(effect, inputs, {**shape, name: shape[name] + step})
+    below = signature(effect, inputs, {**shape, name: shape[name] - step})
     return (above - below) / (2.0 * step)
 
 
@@ -207,82 +203,6 @@ def _off_default(effect: Effect) -> dict[str, float]:
         moved = shape[quantity.name] + 0.13 * (high - low)
         shape[quantity.name] = float(np.clip(moved, *quantity.limits))
     return shape
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.mean(values * values)))
-
-
-def _check_amplitude(effect: Effect, inputs: Inputs) -> None:
-    shape = effect.default_shape()
-    response = effect.response(_fresh(inputs), **shape)
-    assert response.shape == (len(inputs),) and np.isfinite(response).all(), (
-        f"{effect.id}: response has wrong shape or is not finite"
-    )
-    if isinstance(effect, ScaleFactorEffect):
-        wanted = 1e-6 * inputs.input_rate_deg_h * _signature(effect, inputs, shape)
-        _same(wanted, response, f"{effect.id}: response is not the input rate times the ppm")
-    for name, apply, untouched in _hooks(effect, inputs, shape):
-        _same(untouched, apply(0.0), f"{effect.id}: {name} with amplitude 0 changes something", agreement=0.0)
-        changed = apply(effect.amplitude.typical())
-        assert changed.shape == untouched.shape and np.isfinite(changed).all(), (
-            f"{effect.id}: {name} gives a wrong shape or values that are not finite"
-        )
-    if isinstance(effect, LoopEffect):
-        output = inputs.output
-        assert output is not None
-        step = 1e-3 * effect.amplitude.typical("navigation")
-        change = effect.apply(output, _fresh(inputs), step, **shape) - output
-        wanted = step * _signature(effect, inputs, shape)
-        slack = 0.02 * _rms(wanted) + 1e-14 * float(np.abs(output).max())
-        assert _rms(change - wanted) <= slack, (
-            f"{effect.id}: apply is not the amplitude times the signature for a small amplitude"
-        )
-
-
-def _hooks(
-    effect: Effect, inputs: Inputs, shape: Mapping[str, float]
-) -> Iterator[tuple[str, Callable[[float], FloatArray], FloatArray]]:
-    """Each forward hook of an effect as a function of the amplitude, with what it starts from."""
-    assert inputs.output is not None
-    output = inputs.output
-    if isinstance(effect, LoopEffect):
-        yield "apply", lambda a: effect.apply(output, _fresh(inputs), a, **shape), output
-    if isinstance(effect, SensorEffect):
-        for name in ("T", "T_in", "T_out", "T_electronics"):
-            true = inputs.temperatures[name]
-
-            def sensed(a: float, name: str = name, true: FloatArray = true) -> FloatArray:
-                return effect.sense(name, true, _fresh(inputs), a, **shape)
-
-            yield "sense", sensed, true
-    if isinstance(effect, LoggerEffect):
-        yield "record", lambda a: effect.record(output, _fresh(inputs), a, **shape), output
-    if isinstance(effect, ThermalEffect):
-        from fogml.twin.plant.standard import standard_network
-
-        chamber, plant = inputs.temperatures["T_chamber"], standard_network()
-        yield "change_chamber", lambda a: effect.change_chamber(chamber, _fresh(inputs), a, **shape), chamber
-
-        def solved(a: float) -> FloatArray:
-            nodes = effect.change_plant(plant, a, **shape).temperatures(
-                inputs.time,
-                chamber,
-                powered=((0.0, inputs.power_ons_s[0] - 600.0), (inputs.power_ons_s[0], np.inf)),
-                fan=inputs.drives["fan"],
-                table_rate=inputs.table_rate,
-            )
-            return np.concatenate([nodes[name] for name in plant.nodes])
-
-        start = plant.temperatures(inputs.time, chamber)
-        yield "change_plant", solved, np.concatenate([start[name] for name in plant.nodes])
-    if isinstance(effect, NoiseEffect):
-
-        def drawn(a: float) -> FloatArray:
-            return effect.draw(np.random.default_rng(1), len(inputs), 10.0, a, **shape)
-
-        yield "draw", drawn, np.zeros(len(inputs))
-        assert np.array_equal(drawn(1.0), drawn(1.0)), f"{effect.id}: the same seed draws other numbers"
 
 
 def _check_registry(effect: Effect) -> None:
@@ -307,24 +227,9 @@ def _check_registry(effect: Effect) -> None:
             registry.register(held)
 
 
-def _fresh(inputs: Inputs) -> Inputs:
-    return replace(inputs, memory=Memory(), cache={})
-
-
-def _signature(effect: Effect, inputs: Inputs, shape: Mapping[str, float]) -> FloatArray:
-    return effect.signature(_fresh(inputs), **shape)
-
-
 def _columns(inputs: Inputs) -> dict[str, FloatArray]:
     columns = {**inputs.temperatures, **inputs.drives, **{f"slope {k}": v for k, v in inputs.slopes.items()}}
     columns |= {"time": inputs.time, "table_rate": inputs.table_rate}
     if inputs.output is not None:
         columns["output"] = inputs.output
     return columns
-
-
-def _same(wanted: FloatArray, found: FloatArray, what: str, *, agreement: float = AGREEMENT) -> None:
-    assert wanted.shape == found.shape, f"{what}: shapes {wanted.shape} and {found.shape}"
-    size = float(np.abs(wanted).max(initial=0.0))
-    worst = float(np.abs(wanted - found).max(initial=0.0))
-    assert worst <= agreement * size, f"{what}: they differ by {worst:.2g}, size {size:.2g}"

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
+from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import (
     BiasEffect,
@@ -31,6 +31,7 @@ from fogml.twin.effect import (
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import bias_deg_h, scale_factor_ppm, temperature_slopes
+from fogml.twin.responses import heading_change
 from fogml.twin.twin import EffectSetting, Twin
 
 Signature = Callable[[Effect, EffectSetting, Inputs], FloatArray]
@@ -97,7 +98,8 @@ def through_chain(
     table_rate = rate
     for declared, setting in twin.on:
         if isinstance(declared, RigEffect):
-            rig[declared.id] = setting.amplitude * signature(declared, setting, inputs)
+            small = signature(declared, setting, inputs)
+            rig[declared.id] = declared.added_rate(small, inputs, setting.amplitude, **setting.shape)
             rate = rate + rig[declared.id]
         elif isinstance(declared, ScaleFactorEffect):
             ppm = setting.amplitude * signature(declared, setting, inputs)
@@ -160,11 +162,14 @@ def sensor_shares(twin: Twin, inputs: Inputs) -> dict[str, FloatArray]:
     return {d.id: s.amplitude * d.signature(given, **s.shape) for d, s in found}
 
 
-def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> FloatArray:
-    """The output as it is recorded [deg/h], shape (n,)."""
+def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> ChainOutput:
+    """The output as it is recorded [deg/h], and what each logger effect changes in it."""
+    parts: dict[str, FloatArray] = {}
     for declared, setting in twin.logging:
-        output = declared.record(output, inputs.with_output(output), setting.amplitude, **setting.shape)
-    return output
+        before = output
+        output = declared.record(before, inputs.with_output(before), setting.amplitude, **setting.shape)
+        parts[declared.id] = output - before
+    return ChainOutput(output, parts)
 
 
 def sensed(
@@ -192,15 +197,6 @@ def heading_of(facts: Facts, angle: FloatArray) -> FloatArray | None:
     if axis is None or axis in ("up", "down"):
         return None
     return (axis.heading if isinstance(axis, Heading) else _AXES[axis]) - angle
-
-
-def heading_change(inputs: Inputs) -> FloatArray | float:
-    """Change of Earth rate with the heading [deg/h], shape (n,), where one is given; else 0."""
-    if "heading" not in inputs.drives or inputs.facts.latitude is None:
-        return 0.0
-    horizontal = EARTH_RATE_DEG_H * np.cos(np.radians(inputs.facts.latitude))
-    projected = horizontal * np.cos(np.radians(inputs.drives["heading"]))
-    return np.asarray(projected - inputs.earth_deg_h)
 
 
 def fresh(inputs: Inputs) -> Inputs:

@@ -119,9 +119,19 @@ class BiasEffect(Effect):
 
 
 class RigEffect(Effect):
-    """Adds to the rate about the input axis [deg/h], before the scale factor."""
+    """Adds to the rate about the input axis [deg/h], before the scale factor.
+
+    `signature` is what it adds per unit of a small amplitude; one that is not linear in its amplitude
+    states all of it in `added_rate`.
+    """
 
     stage: ClassVar[Stage] = "rig"
+
+    def added_rate(
+        self, signature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
+    ) -> FloatArray:
+        """What it adds to the rate about the input axis [deg/h], shape (n,), given its signature there."""
+        return amplitude * signature
 
 
 class ScaleFactorEffect(Effect):
@@ -193,7 +203,11 @@ class ThermalEffect(Effect):
 
 
 class NoiseEffect(Effect):
-    """A random error; its mean response is zero, `draw` gives one realisation."""
+    """A random error; its mean response is zero, `draw` gives one realisation.
+
+    Where its size goes with the inputs, `strength` says how, sample by sample; what acts on the gyro
+    is the realisation times that.
+    """
 
     stage: ClassVar[Stage] = "noise"
     candidate = False
@@ -206,4 +220,8 @@ class NoiseEffect(Effect):
     def draw(
         self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
     ) -> FloatArray:
-        """One realisation [deg/h], shape (count,)."""
+        """One realisation [deg/h], of strength 1 throughout; shape (count,)."""
+
+    def strength(self, inputs: Inputs, **shape: float) -> FloatArray | float:
+        """Size of the noise over that of `draw`, shape (n,) or one number; no memory of other samples."""
+        return 1.0

@@ -106,12 +106,14 @@ class NoiseSource:
         The same seed gives the same noise, whatever the blocks.
     sample_s
         Sample interval [s]; samples are averages over it.
+    source
+        What makes the noise; sources of other names are independent of it.
     """
 
-    def __init__(self, constants: NoiseConstants, seed: int, sample_s: float) -> None:
+    def __init__(self, constants: NoiseConstants, seed: int, sample_s: float, source: str = "noise") -> None:
         self.constants = constants
         self._sample_s = sample_s
-        self._rng = {name: stream(seed, f"noise {name}") for name in NAMES}
+        self._rng = {name: stream(seed, f"{source} {name}") for name in NAMES}
         self._walked, self._passed = 0.0, 0
         self._angle = float(self._rng["Q"].uniform(-0.5, 0.5))
         self._flicker = None

@@ -12,9 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import TypeVar
 
 from fogml.errors import InputError
+from fogml.runs.run import FloatArray
 
+_Power = TypeVar("_Power", float, FloatArray)
 LIGHT_M_S = 299_792_458.0
 ELECTRON_C = 1.602176634e-19
 BOLTZMANN_J_K = 1.380649e-23
@@ -148,8 +151,11 @@ class Receiver:
         """
         return phase_noise_to_walk(self.phase_density(coil, power, modulation_depth), coil)
 
-    def phase_density(self, coil: Coil, power: float, modulation_depth: float) -> float:
-        """One-sided density of the phase noise S [rad**2/Hz]; parameters as `angle_random_walk`."""
+    def phase_density(self, coil: Coil, power: _Power, modulation_depth: float) -> _Power:
+        """One-sided density of the phase noise S [rad**2/Hz]; parameters as `angle_random_walk`.
+
+        A power of shape (n,) gives a density of shape (n,).
+        """
         current = 0.5 * self.responsivity * power * (1.0 + math.cos(modulation_depth))
         slope = 0.5 * self.responsivity * power * math.sin(modulation_depth)
         shot = 2.0 * ELECTRON_C * current

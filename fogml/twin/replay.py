@@ -155,7 +155,7 @@ class Replayer:
             signature=signature,
             trusting=self.truth is None,
         )
-        return logged(twin, chain.output, given.inputs.afresh())
+        return logged(twin, chain.output, given.inputs.afresh()).output
 
     def difference(self, twin: Twin, id: str) -> FloatArray:
         """What an effect changes in the output [deg/h], shape (n,).

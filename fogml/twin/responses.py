@@ -86,6 +86,15 @@ def tilt_response(inputs: Inputs, key: str, direction_deg: float) -> FloatArray:
     return EARTH_RATE_DEG_H * (upwards - sideways * course)
 
 
+def heading_change(inputs: Inputs) -> FloatArray | float:
+    """Change of Earth rate with the heading [deg/h], shape (n,), where one is given; else 0."""
+    if "heading" not in inputs.drives or inputs.facts.latitude is None:
+        return 0.0
+    horizontal = EARTH_RATE_DEG_H * np.cos(np.radians(inputs.facts.latitude))
+    projected = horizontal * np.cos(np.radians(inputs.drives["heading"]))
+    return np.asarray(projected - inputs.earth_deg_h)
+
+
 def heading_deg(facts: Facts) -> float | None:
     """Heading of a horizontal input axis [deg clockwise from north]; None where it is not one."""
     if isinstance(facts.input_axis, Heading):

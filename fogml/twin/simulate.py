@@ -249,13 +249,14 @@ def _recorded(
     if not world.truth:
         return recorded, None
     free = world.noise_free(samples, chain.output)
+    others = world.other_contributions(samples, chain.output)
     return recorded, Truth(
         inputs.time,
         inputs.temperatures,
         inputs.table_rate,
         inputs.drives,
         inputs.time_on_s,
-        free,
+        free.output,
         samples.noise,
-        {**chain.contributions, **world.other_contributions(samples, chain.output, free)},
+        {**chain.contributions, **free.contributions, **others},
     )

@@ -37,10 +37,13 @@ class Truth:
     noise
         The noise before the logger [deg/h].
     contributions
-        What each effect makes of the output [deg/h], and ``nominal`` for the nominal gyro. Effects
-        from rig to read-out and ``nominal`` add to the output before the logger. A thermal effect's
-        is the difference that it makes by way of the nodes, a sensor effect's what a replay lacks
-        that trusts the sensors, a logger effect's what it changes. Empty unless asked for.
+        What each effect makes of the output [deg/h], and ``nominal`` for the nominal gyro. Those of
+        ``nominal`` and of the effects from rig to read-out add to the output before the logger, and with
+        those of the logger, each what it changes in what it meets, to `noise_free`. A random effect's
+        is its part of `noise`, the rest of which are the twin's own noise terms. Two kinds stand
+        beside the sums: a thermal effect's is the difference that it makes by way of the nodes, which
+        the others hold already, and a sensor effect's is what a replay lacks that trusts the
+        sensors. Empty unless asked for.
     """
 
     time: FloatArray

@@ -14,9 +14,10 @@ from fogml.runs.run import FloatArray
 from fogml.twin.chain import ChainOutput, heading_of, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
-from fogml.twin.noise import TERM_EFFECTS, NoiseSource, stream
+from fogml.twin.noise import stream
 from fogml.twin.plant.network import AIR, PlantState
 from fogml.twin.programme import Programme
+from fogml.twin.random_errors import RandomErrors
 from fogml.twin.timeline import TimelineBlock, timeline
 from fogml.twin.twin import RATE_WINDOW_S, Twin
 
@@ -39,11 +40,13 @@ _ALL_DRIVES = (
 class Samples:
     """Recorded samples of a block: what acts on the gyro, and the noise that comes on top [deg/h].
 
-    `without` holds, for each thermal effect, the inputs as they would be without it.
+    `random` holds each random effect's part of the noise, where contributions are asked for, and
+    `without`, for each thermal effect, the inputs as they would be without it.
     """
 
     inputs: Inputs
     noise: FloatArray
+    random: dict[str, FloatArray]
     without: dict[str, Inputs]
 
 
@@ -111,9 +114,7 @@ class World:
             thermal = [declared.id for declared, _ in twin.thermal if not hidden(declared)]
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
-        terms = {declared.id: setting.amplitude for declared, setting in twin.random}
-        self._noise = NoiseSource(twin.noise.with_effects(terms), seed, sample_s)
-        self._drawn, self._passed = self._other_noise(seed), 0
+        self._noise = RandomErrors(twin, seed, len(self.timeline), sample_s, apart=truth)
         self._sensor_rng = {name: stream(seed, f"sensor {name}") for name in columns}
         self._sensor_memory, self._share_memory = Memory(), Memory()
         self._log_memory, self._free_memory = Memory(), Memory()
@@ -135,10 +136,10 @@ class World:
 
     def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
         """The output as recorded."""
-        return logged(self.twin, output, replace(samples.inputs, memory=self._log_memory))
+        return logged(self.twin, output, replace(samples.inputs, memory=self._log_memory)).output
 
-    def noise_free(self, samples: Samples, output: FloatArray) -> FloatArray:
-        """The output as it would be recorded without noise."""
+    def noise_free(self, samples: Samples, output: FloatArray) -> ChainOutput:
+        """The output as it would be recorded without noise, and what each logger effect changes in it."""
         return logged(self.twin, output, replace(samples.inputs, memory=self._free_memory))
 
     def sensed(self, name: str, samples: Samples) -> FloatArray:
@@ -153,22 +154,14 @@ class World:
             )
         return sensed(self.twin, name, temperature, inputs, self._sensor_rng[name])
 
-    def other_contributions(
-        self, samples: Samples, output: FloatArray, noise_free: FloatArray
-    ) -> dict[str, FloatArray]:
-        """Contributions of the effects before and after the chain [deg/h]."""
-        parts: dict[str, FloatArray] = {}
+    def other_contributions(self, samples: Samples, output: FloatArray) -> dict[str, FloatArray]:
+        """Contributions of the effects that are neither in the chain nor of the logger [deg/h]."""
+        parts = dict(samples.random)
         for id, inputs in samples.without.items():
             parts[id] = output - through_chain(self._without[id].twin, inputs, inputs).output
-        parts |= sensor_shares(
+        return parts | sensor_shares(
             self.twin, replace(samples.inputs, memory=self._share_memory).with_output(output)
         )
-        loggers = self.twin.logging
-        if loggers:
-            # One logger is the rule; what several change together is told of the first.
-            parts |= {declared.id: np.zeros(len(output)) for declared, _ in loggers}
-            parts[loggers[0][0].id] = noise_free - output
-        return parts
 
     def _samples(self, block: TimelineBlock) -> Samples:
         facts = self.facts
@@ -177,10 +170,6 @@ class World:
         rate = block.table_rate if heading is None else np.zeros(len(block))
         rate = -rate if facts.input_axis == "down" else rate
         drives = self._block_drives(block, angle, heading)
-        noise = self._noise.block(len(block))
-        if self._drawn is not None:
-            noise += self._drawn[self._passed : self._passed + len(block)]
-        self._passed += len(block)
         on = block.powered > 0.0
         rows = slice(None) if on.all() else on
         drives_on = {name: values[rows] for name, values in drives.items()}
@@ -201,18 +190,9 @@ class World:
             )
 
         without = {id: inputs(branch) for id, branch in self._without.items()}
-        return Samples(inputs(self._main), noise[rows], without)
-
-    def _other_noise(self, seed: int) -> FloatArray | None:
-        """Random errors that are no term of the standard, drawn for the whole programme at once."""
-        total = None
-        for declared, setting in self.twin.random:
-            if declared.id not in TERM_EFFECTS:
-                rng = stream(seed, f"effect {declared.id}")
-                count, sample_s = len(self.timeline), self.timeline.sample_s
-                drawn = declared.draw(rng, count, sample_s, setting.amplitude, **setting.shape)
-                total = drawn if total is None else np.add(total, drawn, out=total)
-        return total
+        given = inputs(self._main)
+        noise, random = self._noise.block(len(block), rows, given)
+        return Samples(given, noise, random, without)
 
     def _needed_drives(self) -> set[str]:
         """Drives that are recorded, or that an effect reads; all of them for the truth."""

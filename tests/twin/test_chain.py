@@ -9,11 +9,12 @@ import pytest
 
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.testing.effect_inputs import block, standard_inputs
-from fogml.twin.chain import heading_change, heading_of, sensed, through_chain
+from fogml.twin.chain import heading_of, sensed, through_chain
 from fogml.twin.effect import BiasEffect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effects
+from fogml.twin.responses import heading_change
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.twin import Twin
 

@@ -12,6 +12,7 @@ from fogml.twin.effect import (
     LoggerEffect,
     LoopEffect,
     NoiseEffect,
+    RigEffect,
     ScaleFactorEffect,
     SensorEffect,
 )
@@ -164,7 +165,14 @@ def test_faulty_responses_and_hooks_are_found() -> None:
         check_effect(make(SensorEffect, sense=lambda self, n, t, i, a, **s: t + 0.1))
     with pytest.raises(AssertionError, match="record gives a wrong shape"):
         check_effect(make(LoggerEffect, record=lambda self, o, i, a, **s: o if a == 0.0 else o[1:]))
+    check_effect(make(RigEffect, added_rate=lambda self, b, i, a, **s: np.sin(a) * b))
+    with pytest.raises(AssertionError, match="slope of added_rate"):
+        check_effect(make(RigEffect, added_rate=lambda self, b, i, a, **s: 1.01 * a * b))
     noise = {"signature": NoiseEffect.signature, "shape": (), "needs": ()}
     with pytest.raises(AssertionError, match="same seed"):
         drawn = lambda self, r, n, dt, a, **s: a * np.random.default_rng().standard_normal(n)  # noqa: E731
         check_effect(make(NoiseEffect, **noise, draw=drawn))
+    steady = {**noise, "draw": lambda self, r, n, dt, a, **s: a * r.standard_normal(n)}
+    check_effect(make(NoiseEffect, **steady))
+    with pytest.raises(AssertionError, match="inputs outside"):
+        check_effect(make(NoiseEffect, **steady, strength=lambda self, i, **s: 1.0 + np.square(i.u("T"))))

@@ -85,7 +85,8 @@ def test_misaligned_axis_sees_the_projection_of_all_rates(delta: float) -> None:
     tilt, psi = 1e-3 * delta, np.radians(40.0 + angle)
     axis = np.stack([np.sin(tilt) * np.cos(psi), np.sin(tilt) * np.sin(psi), np.full(N, np.cos(tilt))])
     wanted = axis[2] * (3600.0 * rate) + axis[0] * earth(30.0)[0] - 3600.0 * rate
-    found = InputAxisMisalignment().added_rate(given, delta, direction=40.0)
+    small = signature("input_axis_misalignment", given, direction=40.0)
+    found = InputAxisMisalignment().added_rate(small, given, delta, direction=40.0)
     # Samples are means over 1.5 deg of turn each.
     assert found[1:] - wanted[1:] == pytest.approx(0.0, abs=0.02 * tilt * 15.0)
 

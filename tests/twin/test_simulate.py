@@ -9,10 +9,10 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.reading import read_run
 from fogml.twin import simulate as simulating
-from fogml.twin.effect import LoggerEffect, SensorEffect, ThermalEffect
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effects
+from fogml.twin.replay import replay
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.simulate import simulate, simulate_to_file
 from fogml.twin.truth import read_truth
@@ -89,23 +89,92 @@ def test_nothing_is_recorded_while_the_unit_is_off():
 
 
 def test_truth_adds_up():
-    twin = everything(noise=NoiseConstants(N=0.02))
-    loggers = [id for id in twin.settings if isinstance(effects()[id], LoggerEffect)]
-    twin = twin.without_effect(*loggers)
-    result = simulate(QUICK, twin, sample_s=2.0, truth=True)
-    true = result.truth
-    np.testing.assert_allclose(true.noise_free + true.noise, result.run.gyro, rtol=1e-13, atol=1e-9)
-    beside = {
-        id
-        for id in twin.settings
-        if isinstance(effects()[id], SensorEffect)
-        or (isinstance(effects()[id], ThermalEffect) and id != "hidden_thermal_node")
-    }
-    inside = [values for id, values in true.contributions.items() if id not in beside]
-    np.testing.assert_allclose(np.sum(inside, axis=0), true.noise_free, rtol=0.0, atol=1e-8)
-    assert set(true.contributions) == {"nominal", *twin.settings} - {
-        id for id in twin.settings if effects()[id].stage == "noise"
-    }
+    result = simulate(QUICK, everything(noise=NoiseConstants(N=0.02)), sample_s=2.0, truth=True)
+    true, gyro = result.truth, result.run.gyro
+    parts, stage = true.contributions, {id: declared.stage for id, declared in effects().items()}
+    beside = {id for id in parts if stage.get(id) in ("thermal", "sensor") and id != "hidden_thermal_node"}
+    random = {id for id in parts if stage.get(id) == "noise"}
+    added = np.sum([values for id, values in parts.items() if id not in beside | random], axis=0)
+    np.testing.assert_allclose(added, true.noise_free, rtol=0.0, atol=1e-8)
+    assert set(parts) == {"nominal", *everything().settings}
+    assert all(np.isfinite(values).all() for values in parts.values())
+    # Loggers move the noise as well; without them it is on top.
+    bare = everything(noise=NoiseConstants(N=0.02))
+    bare = bare.without_effect(*(id for id in bare.settings if stage[id] == "logger"))
+    result = simulate(QUICK, bare, sample_s=2.0, truth=True)
+    total = result.truth.noise_free + result.truth.noise
+    np.testing.assert_allclose(total, result.run.gyro, rtol=1e-13, atol=1e-9)
+    assert not np.array_equal(gyro, result.run.gyro)
+
+
+def test_each_logger_effect_has_its_own_contribution():
+    """A delay, then a mean: each against the two made by hand from the output before the logger."""
+    both = Twin(nominal=NominalConstants(m=2.0)).with_effect("logger_skew", 2.0, growth=0.0)
+    both = both.with_effect("averaging", 4.0)
+    parts = simulate(QUICK, both, truth=True).truth.contributions
+    delayed = np.concatenate([parts["nominal"][:1], parts["nominal"][:1], parts["nominal"][:-2]])
+    rows = slice(130, 1000)
+    np.testing.assert_allclose(parts["logger_skew"][rows], (delayed - parts["nominal"])[rows], atol=1e-9)
+    # Trapezes over the 4 s before.
+    mean = sum(w * np.roll(delayed, k) for k, w in enumerate((0.125, 0.25, 0.25, 0.25, 0.125)))
+    np.testing.assert_allclose(parts["averaging"][rows], (mean - delayed)[rows], atol=1e-7)
+    assert np.abs(parts["logger_skew"][rows]).max() > 1.0 < np.abs(parts["averaging"][rows]).max()
+
+
+def test_each_random_effect_has_its_own_part_of_the_noise():
+    ids = {"angle_random_walk": 0.03, "bias_instability": 0.5, "gauss_markov": 0.4, "sinusoidal": 0.2}
+    twin = Twin(noise=NoiseConstants(N=0.02))
+    for id, amplitude in ids.items():
+        twin = twin.with_effect(id, amplitude)
+    true = simulate(QUICK, twin, seed=3, truth=True).truth
+    rest = true.noise - np.sum([true.contributions[id] for id in ids], axis=0)
+    own = simulate(QUICK, twin.without_effect(*ids), seed=3, truth=True).truth.noise
+    np.testing.assert_allclose(rest, own, atol=1e-12)
+    for id in ids:
+        # A source of its own: the others don't matter to it.
+        single = Twin().with_effect(id, ids[id], **twin.settings[id].shape)
+        alone = simulate(QUICK, single, seed=3, truth=True)
+        np.testing.assert_array_equal(alone.truth.noise, true.contributions[id], err_msg=id)
+    assert np.std(true.contributions["angle_random_walk"]) == pytest.approx(0.03 * 60.0, rel=0.05)
+    plain = simulate(QUICK, twin, seed=3).run
+    np.testing.assert_array_equal(plain.gyro, simulate(QUICK, twin, seed=3, truth=True).run.gyro)
+
+
+def test_photon_noise_rises_with_the_light_that_is_lost():
+    """Closed form of the catalogue with P0 falling by 0.05 dB per degC off 25 degC."""
+    shape = {"power": 10.0, "modulation_depth": 2.4, "power_loss": 0.05}
+    twin = Twin().with_effect("arw_physics", 1.0, **shape)
+    hot = [{"soak at 85 degC for 5 h": ["power on at minute 60"]}]
+    found = simulate(hot, twin, truth=True, seed=2).truth
+    # Past the heating of the electronics after power-on.
+    rows = slice(7200, None)
+    away = np.mean(found.nodes["T_electronics"][rows]) - 25.0
+    assert away > 55.0
+
+    def walk(power: float) -> float:
+        current = 0.9 * power * (1.0 + np.cos(2.4)) / 2.0
+        excess = 1550e-9**2 / (299_792_458.0 * 10e-9)
+        density = 2 * 1.602176634e-19 * current + 4 * 1.380649e-23 * 300.0 / 100e3 + current**2 * excess
+        density /= (0.9 * power * np.sin(2.4) / 2.0) ** 2
+        return np.degrees(np.sqrt(density / 2.0) / 1.352) * 60.0
+
+    wanted = walk(10e-6 * 10 ** (-0.005 * away))
+    assert wanted > 1.2 * walk(10e-6)
+    assert np.std(found.noise[rows]) / 60.0 == pytest.approx(wanted, rel=0.02)
+
+
+def test_misalignment_costs_12_5_ppm_of_the_rate_in_simulation_and_replay():
+    twin = Twin().with_effect("input_axis_misalignment", 5.0, direction=90.0)
+    facts = Facts(latitude=90.0, input_axis="up")
+    found = simulate(QUICK, twin, facts=facts, truth=True)
+    rate = 3600.0 * found.run.rate + found.run.facts.earth_rate_deg_h
+    wanted = -12.5e-6 * rate
+    part = found.truth.contributions["input_axis_misalignment"]
+    # At the pole the Earth turns about the upright table: no rate across it.
+    np.testing.assert_allclose(part, wanted, rtol=1e-5, atol=1e-12)
+    replayed = replay(twin, found.run, only="input_axis_misalignment")
+    np.testing.assert_allclose(replayed, wanted, rtol=1e-5, atol=1e-9)
+    assert np.abs(wanted).max() == pytest.approx(12.5e-6 * 18000.0, rel=1e-2)
 
 
 def test_thermal_contribution_is_the_difference_of_two_simulations():

@@ -6,6 +6,7 @@ import numpy as np
 
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
+from fogml.twin.inputs import Inputs
 from fogml.twin.optics import REFERENCE_COIL, Receiver
 from fogml.twin.quantities import Quantity
 
@@ -18,10 +19,10 @@ class ArwPhysics(NoiseEffect):
         S = (2 e I + 4 k T / R_f + I**2 RIN) / (R P_0 sin(phi_m) / 2)**2,      I = R P_0 (1 + cos phi_m) / 2
         RIN = lambda**2 / (c dlambda),      N = A sqrt(S / 2) / K_S
 
-    for the reference coil and receiver of `fogml.twin.optics`; ``power`` is P_0 and ``modulation_depth``
-    phi_m. The amplitude A is the noise over that of physics. At 20 uW N is 1.65e-3, 7.2e-4 and 4.6e-4
-    deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8. Light that falls by 0.02 to 0.05 dB per degC off room
-    temperature raises N where shot or thermal noise leads, and not where excess noise does.
+    with P_0 = power 10**(-power_loss |T_electronics - 25| / 10), for the reference coil and receiver of
+    `fogml.twin.optics`; ``modulation_depth`` is phi_m and the amplitude A the noise over that of physics.
+    At 20 uW N is 1.65e-3, 7.2e-4 and 4.6e-4 deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8. Light that falls off
+    room temperature raises N where shot or thermal noise leads, and not where excess noise does.
 
     Source: Lefevre (literature); numbers derived; ranges are engineering ones.
     """
@@ -31,15 +32,17 @@ class ArwPhysics(NoiseEffect):
     title = "Angle random walk from photon noise"
     amplitude = Quantity("amplitude", "1", (1.0, 3.0), (1.0, 1.5), "over photon noise", (0.0, 1e4))
     shape = (
-        Quantity("power", "uW", (5.0, 50.0), (10.0, 100.0), "P_0 at the receiver", (1e-3, 1e6)),
+        Quantity("power", "uW", (5.0, 50.0), (10.0, 100.0), "P_0 at the receiver at 25 degC", (1e-3, 1e6)),
         Quantity("modulation_depth", "rad", (1.57, 2.75), (1.57, 2.75), "phi_m", (0.01, 3.13)),
+        Quantity("power_loss", "dB/degC", (0.02, 0.05), (0.02, 0.05), "of the light off 25 degC", (0.0, 1.0)),
     )
+    needs = ("T_electronics",)
     conflicts = ("angle_random_walk",)
     sources = (
         "H. C. Lefevre, The Fiber-Optic Gyroscope",
         "arXiv 2208.11213",
     )
-    shows = "the Allan deviation at middle times, with slope -1/2; more of it with less light"
+    shows = "the Allan deviation at middle times, with slope -1/2; more of it far from room temperature"
     confused_with = {
         "angle_random_walk": "not apart: this one says where that one comes from",
     }
@@ -48,10 +51,17 @@ class ArwPhysics(NoiseEffect):
     def draw(
         self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
     ) -> FloatArray:
-        """One realisation [deg/h], shape (count,)."""
+        """One realisation at 25 degC [deg/h], shape (count,)."""
         from fogml.signals.random_noise import white_noise
 
         receiver, power = Receiver(), 1e-6 * shape["power"]
         walk = receiver.angle_random_walk(REFERENCE_COIL, power, shape["modulation_depth"])
         # From deg/sqrt(h) to deg/h sqrt(s).
         return white_noise(rng, count, sample_s, 60.0 * amplitude * walk)
+
+    def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Angle random walk over that at 25 degC, shape (n,)."""
+        receiver, depth, power = Receiver(), shape["modulation_depth"], 1e-6 * shape["power"]
+        dimmed = power * np.power(10.0, -0.1 * shape["power_loss"] * np.abs(inputs.u("T_electronics")))
+        density = receiver.phase_density(REFERENCE_COIL, dimmed, depth)
+        return np.sqrt(density / receiver.phase_density(REFERENCE_COIL, power, depth))

@@ -8,7 +8,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import RigEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
-from fogml.twin.responses import tilt_response
+from fogml.twin.responses import heading_change, tilt_response
 
 
 class InputAxisMisalignment(RigEffect):
@@ -16,12 +16,12 @@ class InputAxisMisalignment(RigEffect):
 
     ::
 
-        w = sin(delta) E(direction, table angle) + (cos(delta) - 1) 3600 rate
+        w = sin(delta) E(direction, table angle) + (cos(delta) - 1) (3600 rate + earth)
 
     delta is the amplitude and E the Earth rate that a tilt picks up, as in ``mount_tilt``. The signature is
-    that pick-up, which is linear in delta; `added_rate` is all of it. The loss of scale factor
-    delta**2 / 2, 12.5 ppm at 5 mrad, is one with the nominal scale factor, and changes with temperature of
-    0.1 to 5 urad/degC are one with its slope.
+    that pick-up for a small delta; `added_rate` is all of it. The loss of scale factor delta**2 / 2,
+    12.5 ppm at 5 mrad, can't be told from the nominal scale factor, nor changes with temperature of
+    0.1 to 5 urad/degC from its slope.
 
     Source: geometry (derived); 0.5 to 20 mrad (tactical) and 0.05 to 0.5 mrad (navigation) are engineering
     ranges.
@@ -48,10 +48,13 @@ class InputAxisMisalignment(RigEffect):
         """Response per mrad [deg/h], shape (n,)."""
         return 1e-3 * tilt_response(inputs, self.id, shape["direction"])
 
-    def added_rate(self, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+    def added_rate(
+        self, signature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
+    ) -> FloatArray:
         """What the misalignment adds to the rate about the input axis [deg/h], exactly; shape (n,)."""
-        pick_up = 1e3 * math.sin(1e-3 * amplitude) * self.signature(inputs, **shape)
-        return pick_up + 3600.0 * inputs.table_rate * 1e-6 * scale_factor_loss_ppm(amplitude)
+        pick_up = 1e3 * math.sin(1e-3 * amplitude) * signature
+        along = inputs.input_rate_deg_h + heading_change(inputs)
+        return pick_up + 1e-6 * scale_factor_loss_ppm(amplitude) * along
 
 
 def scale_factor_loss_ppm(misalignment: float) -> float:
