@@ -94,6 +94,31 @@ class LimitSettings(Settings):
         return limits
 
 
+def named_values(texts: list[Any]) -> dict[str, Any]:
+    """``["name=value", ...]`` as flags give them, each value read as YAML reads it.
+
+    Raises
+    ------
+    ValueError
+        If one is not of that form.
+    """
+    values = {}
+    for text in texts:
+        name, equals, value = str(text).partition("=")
+        if not (equals and name.strip()):
+            raise ValueError(f"'{text}' sets nothing; write NAME=VALUE, e.g. centres=16")
+        values[name.strip()] = number_or_text(yaml.safe_load(value))
+    return values
+
+
+def number_or_text(value: Any) -> Any:
+    """A value that YAML read, and ``1e-4``, which it takes for text, as a number."""
+    try:
+        return float(value) if isinstance(value, str) else value
+    except ValueError:
+        return value
+
+
 def read_config(path: Path) -> dict[str, Any]:
     """The mapping in a YAML file.
 

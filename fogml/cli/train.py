@@ -18,6 +18,10 @@ def train(
     test: options.Tests = None,
     model: Annotated[str | None, typer.Option("--model", help="Name of the model (auto).")] = None,
     features: options.Features = None,
+    parameters: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="NAME=VALUE", help="Parameter of the model; may be repeated."),
+    ] = None,
     design_index: options.DesignIndex = None,
     limit: options.Limits = None,
     train_again: Annotated[
@@ -51,6 +55,7 @@ def train(
             "test": test,
             "model": model,
             "features": features,
+            "parameters": parameters,
             "design_index": design_index,
             "limits": limit,
             "train_again": train_again,

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from pydantic import field_validator
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings
+from fogml.cli.settings import LimitSettings, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -31,11 +33,17 @@ class TrainSettings(LimitSettings):
     test: list[str] = []
     model: str = "auto"
     features: str | None = None
+    parameters: dict[str, Any] = {}
     train_again: bool = False
     repair: bool = False
     strict: bool = False
     any_unit: bool = False
     out: str = "train-results"
+
+    @field_validator("parameters", mode="before")
+    @classmethod
+    def _set_by_flags(cls, value: object) -> object:
+        return named_values(value) if isinstance(value, list) else value
 
 
 def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
@@ -108,7 +116,8 @@ def fit_and_judge(
             model = found.model
             notes.append(found.summary())
         else:
-            model = fit(make_model(settings.model, settings.features, settings.seed), train_runs, work)
+            unfitted = make_model(settings.model, settings.features, settings.seed, settings.parameters)
+            model = fit(unfitted, train_runs, work)
         work.doing("judging")
         judgement = judge(
             model,

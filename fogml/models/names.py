@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError
 
@@ -50,7 +52,13 @@ MODEL_NAMES = (
 """Every name that `make_model` knows beside dotted names of scikit-learn's regressors."""
 
 
-def make_model(name: str, features: str | None = None, seed: int = 0) -> DriftModel:
+PARAMETRIC = ("polynomial", "rbf", "rbf-patent")
+"""Names of `MODEL_NAMES` whose regressor takes parameters."""
+
+
+def make_model(
+    name: str, features: str | None = None, seed: int = 0, parameters: Mapping[str, Any] | None = None
+) -> DriftModel:
     """An unfitted drift model by its name.
 
     Parameters
@@ -61,17 +69,26 @@ def make_model(name: str, features: str | None = None, seed: int = 0) -> DriftMo
         Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent`` and dotted names.
     seed
         Seed of whatever is random.
+    parameters
+        Parameters of the regressor, for ``polynomial``, ``rbf``, ``rbf-patent`` and dotted names, e.g.
+        ``{"ridge": 1e-4}`` or ``{"centres": 16}``.
 
     Raises
     ------
     InputError
-        If the name is not known, or features are stated for a model that fixes its own.
+        If the name is not known, or features or parameters are stated for a model that fixes its own.
     """
+    if parameters and "." not in name and name not in PARAMETRIC:
+        raise InputError(
+            f"model '{name}' takes no parameters (found '{next(iter(parameters))}'); models that do are "
+            f"{', '.join(PARAMETRIC)} and scikit-learn's regressors by their dotted names"
+        )
     if "." in name:
         from fogml.models.sklearn_model import SklearnModel, sklearn_regressor_class
 
         sklearn_regressor_class(name)
-        return SklearnModel(name, _understood(features or RBF_FEATURES), seed=seed)
+        options = dict(parameters) if parameters else None
+        return SklearnModel(name, _understood(features or RBF_FEATURES), options, seed=seed)
     if name not in MODEL_NAMES:
         raise InputError(_unknown(name))
     if name == "auto":
@@ -79,16 +96,16 @@ def make_model(name: str, features: str | None = None, seed: int = 0) -> DriftMo
 
         return AutoModel(features=features, seed=seed)
     if name == "polynomial":
-        return _linear(name, features or POLYNOMIAL_FEATURES, "auto")
+        return _linear(name, features or POLYNOMIAL_FEATURES, {"ridge": "auto", **(parameters or {})})
     if name in ("rbf", "rbf-patent"):
-        return _rbf(name, features, seed)
+        return _rbf(name, features, {"seed": seed, **(parameters or {})})
     if features is not None:
         raise InputError(
             f"model '{name}' has its own columns, so features can't be stated for it; "
             "use --model polynomial with these features, or leave them out"
         )
     if name in PRESETS:
-        return _linear(name, PRESETS[name].features, 0.0)
+        return _linear(name, PRESETS[name].features, {"ridge": 0.0})
     if name in ("joint", "joint-patent"):
         from fogml.models.joint import JointModel
 
@@ -98,21 +115,30 @@ def make_model(name: str, features: str | None = None, seed: int = 0) -> DriftMo
     return MeanModel() if name == "mean" else NoCompensation()
 
 
-def _linear(kind: str, features: str, ridge: float | str) -> DriftModel:
+def _linear(kind: str, features: str, parameters: Mapping[str, Any]) -> DriftModel:
     from fogml.models.feature_model import FeatureModel
     from fogml.models.linear import LinearRegressor
 
-    return FeatureModel(_understood(features), LinearRegressor(ridge=ridge), kind=kind)  # type: ignore[arg-type]
+    return FeatureModel(_understood(features), _configured(LinearRegressor, kind, parameters), kind=kind)
 
 
-def _rbf(kind: str, features: str | None, seed: int) -> DriftModel:
+def _rbf(kind: str, features: str | None, parameters: Mapping[str, Any]) -> DriftModel:
     from fogml.models.feature_model import FeatureModel
     from fogml.models.rbf import PatentRBFRegressor, RBFRegressor
 
     patent = kind == "rbf-patent"
     text = _understood(features or (RBF_PATENT_FEATURES if patent else RBF_FEATURES))
-    regressor = PatentRBFRegressor(seed=seed) if patent else RBFRegressor(seed=seed)
+    regressor = _configured(PatentRBFRegressor if patent else RBFRegressor, kind, parameters)
     return FeatureModel(text, regressor, kind=kind)
+
+
+def _configured(regressor: Any, kind: str, parameters: Mapping[str, Any]) -> Any:
+    """A regressor of a class with these parameters, each of which the class has to know."""
+    known = list(inspect.signature(regressor).parameters)
+    for name in parameters:
+        if name not in known:
+            raise InputError(f"{kind}: no parameter '{name}'; parameters are {', '.join(known)}")
+    return regressor(**parameters)
 
 
 def _understood(features: str) -> str:

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
-from fogml.models.box import learn_box, limit_atoms
+from fogml.models.box import learn_box
 from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
 from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
@@ -75,9 +76,9 @@ class Trial:
         union = union_of(self.candidates)
         self._column = {atom.text: column for column, atom in enumerate(union.atoms)}
         rows = [run_rows(run, union) for run in runs]
-        averaged = _averaged(rows)
+        averaged = averaged_rows(rows)
         self._atoms = np.concatenate([part.atoms for part in averaged])
-        self._table = _table(averaged)
+        self._table = bare_table(averaged)
         self.folds_are_runs = len(runs) > 1
         self._folds: list[Fold] = (
             run_folds(self._table)
@@ -95,23 +96,59 @@ class Trial:
                 predicted[held] = table.y[fitted].mean()
                 continue
             predicted[held], parameters = self._predicted(candidate, fitted, held)
-        squares = (table.y - predicted) ** 2
-        starts = np.flatnonzero(np.diff(table.block, prepend=-1))
-        counts = np.diff(starts, append=len(table))
-        return Score(candidate, parameters, np.add.reduceat(squares, starts) / counts, counts)
+        return Score(candidate, parameters, *squares_by_block(table, predicted))
 
     def _predicted(
         self, candidate: Candidate, fitted: IndexArray, held: IndexArray
     ) -> tuple[FloatArray, int]:
         features = parse_features(candidate.features)
         atoms = self._atoms[:, [self._column[atom.text] for atom in features.atoms]]
-        learn_box(features, [atoms[fitted]])
-        table = replace(self._table.take(fitted), X=features.compose(atoms[fitted]))
-        regressor = for_features(regressor_for(candidate, self.seed), features, [atoms[fitted]])
-        regressor = fit_regressor(regressor, table)
-        full = np.ones(len(held), dtype=np.bool_)
-        limited, _ = limit_atoms(features, atoms[held], full, linear=goes_on_linearly(regressor))
-        return predict_rows(regressor, features.compose(limited)), parameter_count(regressor)
+        return held_out_prediction(
+            regressor_for(candidate, self.seed), features, atoms, self._table, fitted, held
+        )[:2]
+
+
+def held_out_prediction(
+    regressor: Any,
+    features: Features,
+    atoms: FloatArray,
+    table: TrainingTable,
+    fitted: IndexArray,
+    held: IndexArray,
+) -> tuple[FloatArray, int, Any]:
+    """A regressor fitted to some rows and evaluated on others, which are limited to the box of the first.
+
+    Parameters
+    ----------
+    regressor
+        Unfitted.
+    features
+        What its columns are.
+    atoms
+        Values of the features' atoms, shape (n, a).
+    table
+        The n rows, without features.
+    fitted, held
+        Indices of the rows fitted to, and of those held out.
+
+    Returns
+    -------
+    (values at the rows held out [deg/h], number of parameters, the fitted regressor)
+    """
+    learn_box(features, [atoms[fitted]])
+    rows = replace(table.take(fitted), X=features.compose(atoms[fitted]))
+    regressor = fit_regressor(for_features(regressor, features, [atoms[fitted]]), rows)
+    full = np.ones(len(held), dtype=np.bool_)
+    limited, _ = features.limit(atoms[held], full, linear=goes_on_linearly(regressor))
+    return predict_rows(regressor, features.compose(limited)), parameter_count(regressor), regressor
+
+
+def squares_by_block(table: TrainingTable, predicted: FloatArray) -> tuple[FloatArray, IndexArray]:
+    """Mean squared error [(deg/h)**2] and number of rows of each of a table's b blocks, shapes (b,)."""
+    squares = (table.y - predicted) ** 2
+    starts = np.flatnonzero(np.diff(table.block, prepend=-1))
+    counts = np.diff(starts, append=len(table))
+    return np.add.reduceat(squares, starts) / counts, counts
 
 
 def regressor_for(candidate: Candidate, seed: int) -> Any:
@@ -144,7 +181,7 @@ def _temperatures_and_rates(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray
     return temperature, rate
 
 
-def _averaged(rows: Sequence[RunRows]) -> list[RunRows]:
+def averaged_rows(rows: Sequence[RunRows]) -> list[RunRows]:
     """Rows averaged over time down to `SCORED_ROWS` in all; as they are where there are fewer."""
     if sum(len(part.y) for part in rows) <= SCORED_ROWS:
         return list(rows)
@@ -156,7 +193,7 @@ def _averaged(rows: Sequence[RunRows]) -> list[RunRows]:
     return averaged
 
 
-def _table(rows: Sequence[RunRows]) -> TrainingTable:
+def bare_table(rows: Sequence[RunRows]) -> TrainingTable:
     """A table without features: those are composed for each candidate."""
     blocks = [dealt_blocks(len(part.y)) for part in rows]
     first = np.cumsum([0, *(int(block[-1]) + 1 if len(block) else 0 for block in blocks)])
