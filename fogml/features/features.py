@@ -13,6 +13,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import Atom, evaluate
 from fogml.features.box import Box
 from fogml.features.grammar import parse_terms
+from fogml.features.reach import reaching_box
 from fogml.features.terms import Term, compose, composition_plan, unique_terms
 from fogml.runs.run import Run
 
@@ -244,11 +245,14 @@ class Features:
         """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
         return compose(self._plan, self._checked(atom_values))
 
-    def limit(self, atom_values: ArrayLike, full: ArrayLike | None = None) -> tuple[FloatArray, BoolArray]:
+    def limit(
+        self, atom_values: ArrayLike, full: ArrayLike | None = None, *, linear: bool = False
+    ) -> tuple[FloatArray, BoolArray]:
         """Limit atom values smoothly to the learned box.
 
         Inside the box they stay as they are; beyond it they level off, with a continuous first
-        derivative, before 5 % of the span, so that models fall back smoothly.
+        derivative, before 5 % of the span, so that models fall back smoothly. For a model that is
+        linear, rates and gradients are followed further: see `fogml.features.reach`.
 
         Parameters
         ----------
@@ -257,6 +261,8 @@ class Features:
         full
             Where the windows are full, as `atom_values` tells, shape (n,). Elsewhere windowed
             atoms stay 0 and don't count as outside. None takes all as full.
+        linear
+            Whether the model goes on linearly beyond its training rows.
 
         Returns
         -------
@@ -267,9 +273,13 @@ class Features:
         """
         in_full = None if full is None else np.asarray(full, dtype=np.bool_)
         heeded = [None if atom.window is None else in_full for atom in self._atoms]
-        return self._learned_box().limit(self._checked(atom_values), heeded)
+        values, box = self._checked(atom_values), self._learned_box()
+        limited, outside = box.limit(values, heeded)
+        if linear and limited is not values:
+            limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)
+        return limited, outside
 
-    def transform(self, run: Run, *, limited: bool = False) -> FloatArray:
+    def transform(self, run: Run, *, limited: bool = False, linear: bool = False) -> FloatArray:
         """Feature columns of a run, shape (n, k).
 
         Parameters
@@ -278,15 +288,17 @@ class Features:
             A run with the temperatures in `sensors`.
         limited
             Whether atoms are limited to the learned box first.
+        linear
+            If so, as for a model that goes on linearly.
         """
         values, full = self.atom_values(run)
-        return self.compose(self.limit(values, full)[0] if limited else values)
+        return self.compose(self.limit(values, full, linear=linear)[0] if limited else values)
 
     def fit_transform(self, run: Run, y: object = None) -> FloatArray:
         """`fit` to one run, then its feature columns, shape (n, k)."""
         return self.fit(run).transform(run)
 
-    def stream(self, sample_s: float, *, limited: bool = False) -> FeatureStream:
+    def stream(self, sample_s: float, *, limited: bool = False, linear: bool = False) -> FeatureStream:
         """The same features sample by sample, in bounded memory.
 
         Parameters
@@ -295,10 +307,12 @@ class Features:
             Nominal sample interval [s].
         limited
             Whether atoms are limited to the learned box first.
+        linear
+            If so, as for a model that goes on linearly.
         """
         from fogml.features.stream import FeatureStream
 
-        return FeatureStream(self, sample_s, limited=limited)
+        return FeatureStream(self, sample_s, limited=limited, linear=linear)
 
     def blocks(self, sample_s: float) -> FeatureBlocks:
         """The same atom values block by block of a long run, in bounded memory.

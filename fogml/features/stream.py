@@ -49,6 +49,8 @@ class FeatureStream:
         Nominal sample interval [s].
     limited
         Whether atoms are limited to the learned box before features are composed.
+    linear
+        If so, as for a model that goes on linearly.
 
     Raises
     ------
@@ -56,9 +58,12 @@ class FeatureStream:
         If a window is shorter than the sample interval, or `limited` without a box.
     """
 
-    def __init__(self, features: Features, sample_s: float, *, limited: bool = False) -> None:
+    def __init__(
+        self, features: Features, sample_s: float, *, limited: bool = False, linear: bool = False
+    ) -> None:
         self._features = features
         self._limited = limited
+        self._linear = linear
         self._judged = limited or features.fitted
         if limited:
             _ = features.box
@@ -110,7 +115,9 @@ class FeatureStream:
             elif full:
                 value = steps[key][0]
                 atoms[0, column] = direction(np.array(value)) if atom.operator == "sign" else value
-        heeded, outside = self._features.limit(atoms, [full]) if self._judged else (atoms, np.array([False]))
+        heeded, outside = atoms, np.array([False])
+        if self._judged:
+            heeded, outside = self._features.limit(atoms, [full], linear=self._linear)
         values = self._features.compose(heeded if self._limited else atoms)
         return StreamStep(values[0], atoms[0], full, bool(outside[0]))
 

@@ -16,8 +16,9 @@ from sklearn.base import clone
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.stream import FeatureStream
 from fogml.models.base import DriftModel, Evaluation
-from fogml.models.box import distance_outside, learn_box, limit_atoms
+from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
@@ -132,7 +133,7 @@ class FeatureModel(DriftModel):
         learn_box(features, [fitted.X])
         regressor = self._refitted(replace(fitted, X=features.compose(fitted.X)))
         full = np.ones(len(held), dtype=np.bool_)
-        limited, _ = limit_atoms(features, held.X, full, linear=goes_on_linearly(regressor))
+        limited, _ = features.limit(held.X, full, linear=goes_on_linearly(regressor))
         return predict_rows(regressor, features.compose(limited))
 
     def _fit_notes(self) -> list[str]:
@@ -142,7 +143,7 @@ class FeatureModel(DriftModel):
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""
         linear = goes_on_linearly(self.regressor_)
-        limited, outside = limit_atoms(self.features_, atoms, full, linear=linear)
+        limited, outside = self.features_.limit(atoms, full, linear=linear)
         drift = np.empty(len(atoms))
         step = max(1, _PREDICTED_VALUES // len(self.features_))
         # Products of a matrix this narrow with a vector gain nothing from threads, but wait for them.
@@ -151,6 +152,19 @@ class FeatureModel(DriftModel):
                 piece = slice(start, start + step)
                 drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
         return Evaluation(drift, full, outside, partial(distance_outside, atoms, outside, self.features_))
+
+    def stream(self, sample_s: float) -> FeatureStream:
+        """The features sample by sample, limited as `evaluate` limits them.
+
+        The regressor's value of a step's features is the drift at that sample.
+
+        Parameters
+        ----------
+        sample_s
+            Nominal sample interval [s].
+        """
+        self._check_fitted()
+        return self.features_.stream(sample_s, limited=True, linear=goes_on_linearly(self.regressor_))
 
     @property
     def feature_names(self) -> list[str]:

@@ -28,7 +28,7 @@ from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
-from fogml.models.box import distance_outside, learn_box, limit_atoms
+from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
@@ -115,7 +115,7 @@ class JointModel(DriftModel):
 
     def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
         """Drift: output as rate less the model's rate; with distance from the trained box."""
-        limited, outside = limit_atoms(self.features_, atoms, full, linear=True)
+        limited, outside = self.features_.limit(atoms, full, linear=True)
         rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
         measure = partial(distance_outside, atoms, outside, self.features_)
         return Evaluation(run.gyro_deg_h - rate, full, outside, measure)
@@ -208,7 +208,7 @@ class JointModel(DriftModel):
         features = parse_features(self.features_.text)
         learn_box(features, [fitted.X[:, 1:]])
         full = np.ones(len(held), dtype=np.bool_)
-        limited, _ = limit_atoms(features, held.X[:, 1:], full, linear=True)
+        limited, _ = features.limit(held.X[:, 1:], full, linear=True)
         regressor = self.regressor_.refitted(self._columns(fitted.X), fitted.y)
         return regressor.predict(self._columns(np.column_stack((held.X[:, 0], limited))))
 

@@ -48,7 +48,7 @@ class Leaky(Features):
 class Hard(Features):
     """Clips at the box's edge."""
 
-    def limit(self, atom_values, full=None):  # type: ignore[no-untyped-def]
+    def limit(self, atom_values, full=None, *, linear=False):  # type: ignore[no-untyped-def]
         bounds = np.array(list(self.box.values()))
         _, outside = super().limit(atom_values, full)
         return np.clip(atom_values, bounds[:, 0], bounds[:, 1]), outside

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from sklearn.neighbors import KNeighborsRegressor
 
 from fogml.errors import InputError
 from fogml.models.compensation import compensate_blocks
@@ -51,6 +52,32 @@ def test_blocks_give_what_the_whole_gives(train, gapped, features, rows):
     np.testing.assert_allclose(compensated, whole.compensated, atol=1e-9)
     assert np.array_equal(flag, whole.flag)
     assert (flag == 2).sum() > 100
+
+
+@pytest.mark.parametrize("kind", ["linear", "levelled"])
+def test_samples_one_by_one_give_what_the_whole_gives_beyond_the_box(train, kind):
+    """A ramp faster, a gradient larger and temperatures further out than in training."""
+    model = make_model("polynomial", "T^1..3, dT, T*dT, T_in-T_out, dT_out^2")
+    if kind == "levelled":
+        model = FeatureModel("T, dT", regressor=KNeighborsRegressor(3))
+    model.fit(train)
+    inner = 25.0 + 3.0 * (train.temperature("T_in") - 25.0)
+    fast = train.with_columns(T_in=inner, T_out=2.0 * train.temperature("T_out"))[:4000]
+    whole = model.compensate(fast)
+    assert 0.1 < (whole.flag == 1).mean() < 1.0
+    stream = model.stream(fast.sample_s)
+    names = fast.temperature_columns
+    steps = [
+        stream.step(time, dict(zip(names, temperatures)))
+        for time, *temperatures in zip(*(fast.columns[name].tolist() for name in ("time", *names)))
+    ]
+    drift = model.regressor_.predict(np.array([step.values for step in steps]))
+    np.testing.assert_allclose(drift, whole.drift, atol=1e-9)
+    assert np.array_equal([int(step.outside) if step.full else 2 for step in steps], whole.flag)
+    # A linear model is followed further than the plain limit goes, any other is not.
+    plain = model.features_.transform(fast, limited=True)
+    followed = np.abs(model.regressor_.predict(plain) - whole.drift).max() > 1e-3
+    assert followed == (kind == "linear")
 
 
 def test_joint_model_too(train):

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.features.atoms import DEAD_BAND, RATE_UNIT_S
-from fogml.models.box import is_rate_or_gradient
+from fogml.features.reach import is_rate_or_gradient
 
 if TYPE_CHECKING:
     from fogml.features.atoms import Atom
