@@ -1,0 +1,436 @@
+"""Scale factor and input-axis misalignment of a gyro, decoupled over four mounting states.
+
+The input axis is a = (sin dx, sin dy, cos d) in gyro coordinates, the table's axis u = (sin t, 0, cos t) at
+tilt t. For each state and tilt the output slope s over the table rate is a least-squares line; over the tilts
+s = c_c cos t + c_s sin t. With a zero error e of the fixture c_c = K (a_z cos e + a_x sin e) and
+c_s = K (a_x cos e - a_z sin e), so that hypot(c_c, c_s) is free of e and atan2(c_s, c_c) = psi_x - e. State 2
+is turned by 180 deg in its plane, states 3 and 4 do the same for y.
+
+Source: the patent on decoupled testing of scale factor and input-axis misalignment (Fang et al., Beihang
+University), with a constant column over the tilts for a fixture that is tilted across, and covariances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import stats
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+
+STATES = (1, 2, 3, 4)
+LEVEL = 0.95
+"""Confidence of intervals and of the region."""
+_CROSS_TILT_TEST = 0.01
+_LEAST_DOF = 4
+_ROUND_OFF = 1e-11
+
+
+@dataclass(frozen=True)
+class TableMeasurements:
+    """Outputs of turns less the rests about them, one element per turn, each array of shape (n,).
+
+    Attributes
+    ----------
+    state
+        Mounting state, 1 to 4.
+    tilt_deg
+        Tilt of the fixture [deg].
+    rate_deg_s
+        Table rate with its sign [deg/s].
+    output
+        Mean while turning less the mean of the rests before and after [`unit`].
+    unit
+        Of the output.
+    source
+        File or run, for messages.
+    """
+
+    state: FloatArray
+    tilt_deg: FloatArray
+    rate_deg_s: FloatArray
+    output: FloatArray
+    unit: str
+    source: str = "measurements"
+
+
+@dataclass(frozen=True)
+class StateFit:
+    """One state's slopes over its tilts.
+
+    ``tilts_deg``, ``slopes`` and ``residuals`` of shape (m,), slopes in output per deg/s;
+    ``coefficients`` c_c, c_s and, with a cross tilt, the constant.
+    """
+
+    state: int
+    tilts_deg: FloatArray
+    slopes: FloatArray
+    residuals: FloatArray
+    coefficients: FloatArray
+    design: FloatArray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Joint confidence region of (dx, dy): an ellipse about the estimate.
+
+    Half-axes [deg], the angle of the longer one from the x axis [deg], the level, and points of the
+    outline, shape (k, 2) [deg].
+    """
+
+    level: float
+    half_axes_deg: tuple[float, float]
+    angle_deg: float
+    outline_deg: FloatArray
+
+
+@dataclass(frozen=True)
+class Misalignment:
+    """Scale factor and misalignment with standard errors.
+
+    Attributes
+    ----------
+    K
+        Scale factor [output per deg/s].
+    delta_x_deg, delta_y_deg, delta_deg
+        Components of the input axis out of the reference axis, and the angle between the two [deg].
+    fixture_error_deg
+        Zero error of the fixture from states 1 and 2, and from 3 and 4 [deg].
+    cross_tilt
+        Whether a constant over the tilts was fitted for a fixture tilted across.
+    cross_tilt_deg
+        Size of that tilt, where the misalignment is large enough to tell it [deg].
+    se
+        Standard errors by the names above (``fixture_error_deg`` two of them); None where nothing is
+        left over to tell them from.
+    dof
+        Degrees of freedom behind them.
+    intervals
+        Confidence intervals at `LEVEL`, by the same names.
+    region
+        Joint region of (dx, dy), None without standard errors.
+    states
+        The fits.
+    rate_noise, tilt_noise
+        Standard deviation of one slope [output per deg/s] as the lines over the rates tell it, and as
+        the fits over the tilts do; None where nothing is left over.
+    notes
+        What to mind.
+    """
+
+    K: float
+    delta_x_deg: float
+    delta_y_deg: float
+    delta_deg: float
+    fixture_error_deg: tuple[float, float]
+    cross_tilt: bool
+    cross_tilt_deg: float | None
+    se: Mapping[str, float | list[float]] | None
+    dof: int
+    intervals: Mapping[str, tuple[float, float]]
+    region: Region | None
+    states: tuple[StateFit, ...]
+    rate_noise: float | None
+    tilt_noise: float | None
+    notes: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Slopes:
+    tilts: FloatArray
+    values: FloatArray
+    squares: float
+    dof: int
+    inverse_spread: float
+
+
+def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Misalignment:
+    """Scale factor and misalignment from all four states.
+
+    Parameters
+    ----------
+    measured
+        What the turns gave.
+    cross_tilt
+        Whether to fit a constant over the tilts; if None, where the data show one.
+
+    Raises
+    ------
+    InputError
+        If a state is missing, or a state's tilts do not tell sine from cosine.
+    """
+    check_states(measured)
+    slopes = {state: _slopes(measured, state) for state in STATES}
+    for state in STATES:
+        _check_tilts(measured.source, state, slopes[state].tilts, bool(cross_tilt))
+    if cross_tilt is None:
+        cross_tilt = _shows_cross_tilt(slopes)
+    fits = tuple(_fit(state, slopes[state], cross_tilt) for state in STATES)
+    c = np.array([fit.coefficients[:2] for fit in fits])
+    values = _solve(c)
+    rate_noise, tilt_noise, variance, dof, notes = _noise(slopes, fits)
+    se, intervals, region = None, {}, None
+    covariance = None
+    if variance is not None:
+        covariance = _covariance(c, fits, variance)
+        se, intervals, region = _errors(values, covariance, dof)
+    across, more = _cross_tilt_angle(fits, values, covariance) if cross_tilt else (None, ())
+    return Misalignment(
+        K=float(values[0]),
+        delta_x_deg=float(values[1]),
+        delta_y_deg=float(values[2]),
+        delta_deg=float(values[3]),
+        fixture_error_deg=(float(values[4]), float(values[5])),
+        cross_tilt=cross_tilt,
+        cross_tilt_deg=across,
+        se=se,
+        dof=dof,
+        intervals=intervals,
+        region=region,
+        states=fits,
+        rate_noise=rate_noise,
+        tilt_noise=tilt_noise,
+        notes=(*notes, *more, *_reversed(values)),
+    )
+
+
+def check_states(measured: TableMeasurements) -> None:
+    """Hold that all four states are there.
+
+    Raises
+    ------
+    InputError
+        Naming those that are missing.
+    """
+    missing = [str(state) for state in STATES if not np.any(measured.state == state)]
+    if missing:
+        raise InputError(
+            f"{measured.source}: no turns in state {', '.join(missing)}; the four-state procedure needs "
+            "states 1, 2, 3 and 4, the second and fourth turned by 180 deg in the mounting plane"
+        )
+
+
+def fit_state(measured: TableMeasurements, state: int, cross_tilt: bool = False) -> StateFit:
+    """The fit of one state alone over its tilts.
+
+    Raises
+    ------
+    InputError
+        If its tilts do not tell sine from cosine.
+    """
+    slopes = _slopes(measured, state)
+    _check_tilts(measured.source, state, slopes.tilts, cross_tilt)
+    return _fit(state, slopes, cross_tilt)
+
+
+def _slopes(measured: TableMeasurements, state: int) -> _Slopes:
+    """Slopes over the table rate per tilt, by least squares with an intercept where rates differ.
+
+    The intercept takes what is even in the rate: the horizontal part of the Earth rate.
+    """
+    chosen = measured.state == state
+    tilts, group = np.unique(np.round(measured.tilt_deg[chosen], 9), return_inverse=True)
+    rate, output = measured.rate_deg_s[chosen], measured.output[chosen]
+    count = np.bincount(group).astype(np.float64)
+
+    def sums(values: FloatArray) -> FloatArray:
+        return np.bincount(group, weights=values)
+
+    mean_rate, mean_output = sums(rate) / count, sums(output) / count
+    centred = rate - mean_rate[group]
+    spread = sums(centred**2)
+    # A tilt with one rate only has a line through the origin.
+    single = spread <= 1e-18 * sums(rate**2)
+    centre = np.where(single, 0.0, mean_rate)
+    centred = rate - centre[group]
+    spread = sums(centred**2)
+    values = sums(centred * output) / spread
+    level = np.where(single, 0.0, mean_output)
+    residuals = output - level[group] - values[group] * centred
+    dof = int((count - np.where(single, 1.0, 2.0)).sum())
+    return _Slopes(tilts, values, float(residuals @ residuals), dof, float(np.mean(1.0 / spread)))
+
+
+def _check_tilts(source: str, state: int, tilts: FloatArray, cross_tilt: bool) -> None:
+    design = _design(tilts, cross_tilt)
+    needed = design.shape[1]
+    if np.linalg.matrix_rank(design, tol=1e-6 * np.sqrt(len(tilts))) < needed:
+        what = f"{needed} tilts that differ (say 0, 30, 60 and 90 deg)"
+        held = ", ".join(f"{tilt:g}" for tilt in tilts[:12])
+        raise InputError(
+            f"{source}, column 'tilt', state {state}: only tilt {held} deg; at least {what} are needed to tell "
+            "scale factor and misalignment apart"
+        )
+
+
+def _design(tilts_deg: FloatArray, cross_tilt: bool) -> FloatArray:
+    tilts = np.radians(tilts_deg)
+    columns = [np.cos(tilts), np.sin(tilts)]
+    if cross_tilt:
+        columns.append(np.ones_like(tilts))
+    return np.column_stack(columns)
+
+
+def _fit(state: int, slopes: _Slopes, cross_tilt: bool) -> StateFit:
+    design = _design(slopes.tilts, cross_tilt)
+    coefficients = np.linalg.lstsq(design, slopes.values, rcond=None)[0]
+    residuals = slopes.values - design @ coefficients
+    return StateFit(state, slopes.tilts, slopes.values, residuals, coefficients, design)
+
+
+def _shows_cross_tilt(slopes: Mapping[int, _Slopes]) -> bool:
+    """Whether constants over the tilts of the four states lower the residuals beyond chance (F test)."""
+    if any(len(np.unique(s.tilts)) < 4 for s in slopes.values()):
+        return False
+    plain = [_fit(state, s, False) for state, s in slopes.items()]
+    wide = [_fit(state, s, True) for state, s in slopes.items()]
+    scale = max(float(np.abs(s.values).max()) for s in slopes.values())
+    if max(abs(float(fit.coefficients[2])) for fit in wide) < _ROUND_OFF * scale:
+        return False
+    before = sum(float(fit.residuals @ fit.residuals) for fit in plain)
+    after = sum(float(fit.residuals @ fit.residuals) for fit in wide)
+    dof = sum(len(fit.residuals) - 3 for fit in wide)
+    if after <= (_ROUND_OFF * scale) ** 2 * dof:
+        return before > (_ROUND_OFF * scale) ** 2 * dof
+    ratio = (before - after) / len(wide) / (after / dof)
+    return bool(stats.f.sf(ratio, len(wide), dof) < _CROSS_TILT_TEST)
+
+
+def _solve(c: FloatArray) -> FloatArray:
+    """K, dx, dy, d, e_x, e_y from c of shape (..., 4, 2); angles in deg, shape (..., 6)."""
+    radius, angle = np.hypot(c[..., 0], c[..., 1]), np.arctan2(c[..., 1], c[..., 0])
+    # Half differences and sums of angles on the circle, free of the cut at 180 deg.
+    psi = np.stack([_half(angle[..., i] - angle[..., i + 1]) for i in (0, 2)], axis=-1)
+    error = np.stack([-(angle[..., i] - psi[..., i // 2]) for i in (0, 2)], axis=-1)
+    error = np.angle(np.exp(1j * error))
+    mean = np.stack([radius[..., i] + radius[..., i + 1] for i in (0, 2)], axis=-1) / 2.0
+    x, y = (mean * np.sin(psi))[..., 0], (mean * np.sin(psi))[..., 1]
+    z = (mean * np.cos(psi)).mean(axis=-1)
+    k = np.sqrt(x**2 + y**2 + z**2)
+    angles = [np.arcsin(x / k), np.arcsin(y / k), np.arctan2(np.hypot(x, y), z), error[..., 0], error[..., 1]]
+    return np.stack([k, *np.degrees(angles)], axis=-1)
+
+
+def _half(angle: FloatArray) -> FloatArray:
+    return np.asarray(np.angle(np.exp(1j * angle)) / 2.0)
+
+
+def _noise(
+    slopes: Mapping[int, _Slopes], fits: tuple[StateFit, ...]
+) -> tuple[float | None, float | None, float | None, int, tuple[str, ...]]:
+    """Noise of a slope by the rates and by the tilts, the variance to use, its degrees of freedom, notes."""
+    dof_rates = sum(s.dof for s in slopes.values())
+    per_output = sum(s.squares for s in slopes.values()) / dof_rates if dof_rates else None
+    by_rates = (
+        per_output * float(np.mean([s.inverse_spread for s in slopes.values()])) if per_output else None
+    )
+    dof_tilts = sum(len(fit.residuals) - fit.design.shape[1] for fit in fits)
+    by_tilts = sum(float(fit.residuals @ fit.residuals) for fit in fits) / dof_tilts if dof_tilts else None
+    told = tuple(np.sqrt(v) if v is not None else None for v in (by_rates, by_tilts))
+    if by_tilts is not None and dof_tilts >= _LEAST_DOF:
+        # These hold errors of the tilt settings too, which no line over the rates can see.
+        notes: tuple[str, ...] = ()
+        scale = max(float(np.abs(fit.slopes).max()) for fit in fits)
+        real = by_tilts > (_ROUND_OFF * scale) ** 2
+        if real and by_rates and by_tilts > stats.f.isf(0.01, dof_tilts, dof_rates) * by_rates:
+            notes = (
+                "slopes scatter over the tilts more than noise explains: errors of the tilt settings, "
+                "or drift between the tilts; the standard errors hold them",
+            )
+        return told[0], told[1], by_tilts, dof_tilts, notes
+    dof = dof_tilts + dof_rates
+    if dof == 0:
+        return (
+            told[0],
+            told[1],
+            None,
+            0,
+            ("no standard errors: nothing is left over; take more tilts or rates",),
+        )
+    variance = ((by_tilts or 0.0) * dof_tilts + (by_rates or 0.0) * dof_rates) / dof
+    note = (
+        "few tilts: standard errors rest on the scatter over the rates and miss errors of the tilt settings"
+    )
+    return told[0], told[1], variance, dof, (note,)
+
+
+def _covariance(c: FloatArray, fits: tuple[StateFit, ...], variance: float) -> FloatArray:
+    """Covariance of what `_solve` gives, by central differences."""
+    jacobian = np.empty((6, 8))
+    step = 1e-6 * float(np.abs(c).max())
+    for i in range(8):
+        moved = np.zeros(8)
+        moved[i] = step
+        up, down = _solve(c + moved.reshape(4, 2)), _solve(c - moved.reshape(4, 2))
+        jacobian[:, i] = (up - down) / (2.0 * step)
+    blocks = np.zeros((8, 8))
+    for i, fit in enumerate(fits):
+        inverse = np.linalg.inv(fit.design.T @ fit.design)
+        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = variance * inverse[:2, :2]
+    return np.asarray(jacobian @ blocks @ jacobian.T)
+
+
+def _errors(
+    values: FloatArray, covariance: FloatArray, dof: int
+) -> tuple[dict[str, float | list[float]], dict[str, tuple[float, float]], Region]:
+    sd = np.sqrt(np.diag(covariance))
+    region = _region(values[1:3], covariance[1:3, 1:3], dof)
+    factor = float(stats.t.isf((1.0 - LEVEL) / 2.0, dof))
+    names = ("K", "delta_x_deg", "delta_y_deg")
+    intervals = {
+        n: (float(values[i] - factor * sd[i]), float(values[i] + factor * sd[i])) for i, n in enumerate(names)
+    }
+    # The angle can't be negative: its interval is what the joint region of dx and dy spans.
+    sines = np.sin(np.radians(region.outline_deg))
+    angles = np.degrees(np.arcsin(np.minimum(np.hypot(sines[:, 0], sines[:, 1]), 1.0)))
+    inside = _holds_zero(values[1:3], covariance[1:3, 1:3], dof)
+    intervals["delta_deg"] = (0.0 if inside else float(angles.min()), float(angles.max()))
+    se: dict[str, float | list[float]] = {n: float(sd[i]) for i, n in enumerate(names)}
+    gradient_free = inside or sd[3] == 0.0
+    se["delta_deg"] = float(np.hypot(sd[1], sd[2]) / np.sqrt(2.0)) if gradient_free else float(sd[3])
+    se["fixture_error_deg"] = [float(sd[4]), float(sd[5])]
+    return se, intervals, region
+
+
+def _holds_zero(centre: FloatArray, covariance: FloatArray, dof: int) -> bool:
+    """Whether the region about an estimate holds zero misalignment."""
+    if not np.linalg.det(covariance) > 0.0:
+        return not centre.any()
+    return bool(centre @ np.linalg.solve(covariance, centre) <= _region_factor(dof))
+
+
+def _region_factor(dof: int) -> float:
+    return 2.0 * float(stats.f.isf(1.0 - LEVEL, 2, dof))
+
+
+def _region(centre: FloatArray, covariance: FloatArray, dof: int) -> Region:
+    squares, axes = np.linalg.eigh(covariance)
+    half = np.sqrt(np.maximum(squares, 0.0) * _region_factor(dof))
+    turn = np.linspace(0.0, 2.0 * np.pi, 121)
+    outline = centre + (np.column_stack([np.cos(turn), np.sin(turn)]) * half) @ axes.T
+    long = axes[:, 1]
+    angle = float(np.degrees(np.arctan2(long[1], long[0]))) % 180.0
+    return Region(LEVEL, (float(half[1]), float(half[0])), angle, outline)
+
+
+def _cross_tilt_angle(
+    fits: tuple[StateFit, ...], values: FloatArray, covariance: FloatArray | None
+) -> tuple[float | None, tuple[str, ...]]:
+    """Size of the fixture's tilt across: the constants of opposite states differ by 2 K sin f a_x or a_y."""
+    note = "a fixture tilted across by f shows; K is low by the factor cos f, the misalignment is not touched"
+    constants = np.array([fit.coefficients[2] for fit in fits])
+    size = np.hypot(constants[0] - constants[1], constants[2] - constants[3]) / 2.0
+    lever = values[0] * np.sin(np.radians(values[3]))
+    told = covariance is None or values[3] > 5.0 * np.sqrt(covariance[3, 3])
+    if not told or size >= abs(lever):
+        return None, (note,)
+    return float(np.degrees(np.arcsin(size / lever))), (note,)
+
+
+def _reversed(values: FloatArray) -> tuple[str, ...]:
+    if values[3] <= 90.0:
+        return ()
+    return ("the input axis points down: the angle to the reference axis is above 90 deg",)

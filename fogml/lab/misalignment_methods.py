@@ -1,0 +1,93 @@
+"""The other ways to a scale factor and a misalignment, for comparison: the classical test, one state alone."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.lab.misalignment import TableMeasurements, decouple, fit_state
+
+_SAME_TILT_DEG = 0.05
+
+
+@dataclass(frozen=True)
+class Method:
+    """What one method says; None where it can't.
+
+    ``K`` in output per deg/s, angles in deg.
+    """
+
+    name: str
+    K: float | None
+    delta_x_deg: float | None
+    delta_y_deg: float | None
+    why: str
+
+
+def compare_methods(measured: TableMeasurements, cross_tilt: bool | None = None) -> tuple[Method, ...]:
+    """The classical test, single state and four states on the same measurements.
+
+    The classical test takes state 1 upright for K (cos d taken as 1) and states 1 and 3 lying at 90 deg for
+    the misalignment (sin d taken as d); it sees the fixture's zero error as misalignment. One state alone
+    gives R = K sqrt(1 - a_y^2) for K and, with the fixture's zero error in it, one angle.
+
+    Raises
+    ------
+    InputError
+        As `decouple`.
+    """
+    four = decouple(measured, cross_tilt)
+    alone = fit_state(measured, 1, four.cross_tilt)
+    cosine, sine = alone.coefficients[:2]
+    return (
+        _classical(measured),
+        Method(
+            "single state",
+            float(np.hypot(cosine, sine)),
+            float(np.degrees(np.arctan2(sine, cosine))),
+            None,
+            "state 1 over its tilts; what lies across its tilt plane stays unseen",
+        ),
+        Method(
+            "four states",
+            four.K,
+            four.delta_x_deg,
+            four.delta_y_deg,
+            "opposite states tell the fixture's zero error from the gyro's",
+        ),
+    )
+
+
+def _classical(measured: TableMeasurements) -> Method:
+    why = "upright for K, lying for the misalignment, small angles"
+    k = _slope_at(measured, 1, 0.0)
+    if k is None:
+        return Method("classical test", None, None, None, f"{why}; no tilt 0 in state 1")
+    lying = [_slope_at(measured, state, 90.0) for state in (1, 3)]
+    x, y = (None if slope is None else float(np.degrees(slope / k)) for slope in lying)
+    return Method("classical test", k, x, y, why if x is not None else f"{why}; no tilt 90 deg in state 1")
+
+
+def _slope_at(measured: TableMeasurements, state: int, tilt_deg: float) -> float | None:
+    """Slope over the table rate at one tilt, None where it was not measured."""
+    near = (measured.state == state) & (np.abs(measured.tilt_deg - tilt_deg) < _SAME_TILT_DEG)
+    rate, output = measured.rate_deg_s[near], measured.output[near]
+    if len(rate) == 0:
+        return None
+    centred = rate - rate.mean() if len(np.unique(rate)) > 1 else rate
+    return float(centred @ output / (centred @ centred))
+
+
+def relative_error_ppm(found: float | None, true: float) -> float | None:
+    """Error of a found value [ppm]; None where there is none.
+
+    Raises
+    ------
+    InputError
+        If the true value is zero.
+    """
+    if true == 0.0:
+        raise InputError("a true scale factor of 0 gives no relative error")
+    return None if found is None else 1e6 * (found / true - 1.0)

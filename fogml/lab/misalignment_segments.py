@@ -1,0 +1,223 @@
+"""Rests and turns of a rate table: from marked averages, from averages in order, from samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.lab.misalignment import TableMeasurements
+from fogml.runs.raw_table import numbered_row
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.transitions import transition_mask
+from fogml.runs.turning import LEAST_RATE_DEG_S, turning
+
+IndexArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of a file, each array of shape (n,): averages or samples, in the order recorded."""
+
+    source: str
+    unit: str
+    state: FloatArray
+    tilt_deg: FloatArray
+    rate_deg_s: FloatArray
+    output: FloatArray
+    row_name: Callable[[int], str] = numbered_row
+
+
+@dataclass(frozen=True)
+class _Chunks:
+    """Consecutive rows of one setting, each array of shape (c,).
+
+    ``rest`` says which are rests; ``first_half`` and ``second_half`` are the means of the rows that go
+    with the turn before and with the turn after, for rests.
+    """
+
+    place: IndexArray
+    state: FloatArray
+    tilt_deg: FloatArray
+    rate_deg_s: FloatArray
+    rest: BoolArray
+    mean: FloatArray
+    after_mean: FloatArray
+    before_mean: FloatArray
+    count: FloatArray
+
+
+def from_marks(rows: Rows, segment: NDArray[np.str_]) -> TableMeasurements:
+    """Measurements of averages that say what they are: before, turn or after.
+
+    Where the rests carry the rate of their turn they are matched by it, elsewhere by their place.
+
+    Raises
+    ------
+    InputError
+        If a turn has no rest before or after it, or no rate.
+    """
+    turn = segment == "turn"
+    if not turn.any():
+        raise InputError(f"{rows.source}, column 'segment': no turn; averages while turning were expected")
+    still = turn & (np.abs(rows.rate_deg_s) < LEAST_RATE_DEG_S)
+    if still.any():
+        row = int(np.argmax(still))
+        raise InputError(
+            f"{rows.source}, column 'rate', {rows.row_name(row)}: a turn at {rows.rate_deg_s[row]:g} deg/s; "
+            "the table rate with its sign was expected"
+        )
+    keys = np.column_stack([rows.state, np.round(rows.tilt_deg, 9), np.round(rows.rate_deg_s, 12)])
+    unique, group = np.unique(keys, axis=0, return_inverse=True)
+    group = group.ravel()
+    counts = np.array(
+        [np.bincount(group[segment == s], minlength=len(unique)) for s in ("before", "turn", "after")]
+    )
+    turned = counts[1] > 0
+    if (counts[:, turned] > 0).all():
+        sums = [
+            np.bincount(group[segment == s], weights=rows.output[segment == s], minlength=len(unique))
+            for s in ("before", "turn", "after")
+        ]
+        before, during, after = (
+            np.asarray(total[turned] / count[turned]) for total, count in zip(sums, counts)
+        )
+        state, tilt, rate = unique[turned].T
+        return TableMeasurements(state, tilt, rate, during - (before + after) / 2.0, rows.unit, rows.source)
+    changes = turn[1:] != turn[:-1]
+    # A rest's rate, where it states one, is its turn's and no setting of its own.
+    changes |= turn[1:] & turn[:-1] & (np.diff(rows.rate_deg_s) != 0.0)
+    return _measured(rows, _chunks(rows, _edges(rows, changes), ~turn, segment))
+
+
+def from_rates(rows: Rows) -> TableMeasurements:
+    """Measurements of averages in the order recorded, rests told by a rate of zero."""
+    rest = np.abs(rows.rate_deg_s) < LEAST_RATE_DEG_S
+    changes = np.abs(np.diff(rows.rate_deg_s)) >= LEAST_RATE_DEG_S
+    return _measured(rows, _chunks(rows, _edges(rows, changes), rest))
+
+
+def from_samples(rows: Rows, time: FloatArray) -> TableMeasurements:
+    """Measurements of samples: rests and turns found, changes of the rate cut, turns cut to whole ones.
+
+    Over whole turns the horizontal part of the Earth rate averages to nothing.
+
+    Raises
+    ------
+    InputError
+        If time does not increase, or nothing turns.
+    """
+    back = np.diff(time) <= 0.0
+    if back.any():
+        row = int(np.argmax(back)) + 1
+        raise InputError(
+            f"{rows.source}, column 'time', {rows.row_name(row)}: time goes back or repeats; it must increase"
+        )
+    run = Run(rows.source, {"time": time, "gyro": rows.output, "rate": rows.rate_deg_s})
+    rest = ~turning(run)
+    if rest.all():
+        raise InputError(
+            f"{rows.source}, column 'rate': the table never turns; turns both ways were expected"
+        )
+    kept = ~transition_mask(run)
+    setting = (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
+    changes = setting | (rest[1:] != rest[:-1]) | (kept[1:] != kept[:-1])
+    changes |= ~rest[1:] & ~rest[:-1] & (np.sign(rows.rate_deg_s[1:]) != np.sign(rows.rate_deg_s[:-1]))
+    edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(time)]])
+    first, last = edges[:-1][kept[edges[:-1]]], edges[1:][kept[edges[:-1]]]
+    sample_s = run.sample_s
+    ends = np.array([_whole_turns(run, a, b, sample_s) for a, b in zip(first, last)], dtype=np.intp)
+    return _measured(rows, _chunks(rows, (first, ends), rest))
+
+
+def _whole_turns(run: Run, first: int, last: int, sample_s: float) -> int:
+    """End of the rows that make up whole turns of the table; all of a rest, and of less than one turn."""
+    rate = abs(float(np.mean(run.rate[first:last])))
+    if rate < LEAST_RATE_DEG_S or sample_s <= 0.0:
+        return last
+    turns = np.floor((last - first) * sample_s * rate / 360.0 + 1e-6)
+    return min(first + round(float(turns) * 360.0 / rate / sample_s), last) if turns >= 1.0 else last
+
+
+def _edges(rows: Rows, changes: BoolArray) -> tuple[IndexArray, IndexArray]:
+    """First and end row of each stretch of one setting, with changes of state and tilt added."""
+    changes = changes | (np.diff(rows.state) != 0.0) | (np.diff(rows.tilt_deg) != 0.0)
+    edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rows.output)]])
+    return edges[:-1], edges[1:]
+
+
+def _chunks(
+    rows: Rows,
+    edges: tuple[IndexArray, IndexArray],
+    rest: BoolArray,
+    segment: NDArray[np.str_] | None = None,
+) -> _Chunks:
+    first, last = edges
+
+    def means(values: FloatArray, weight: FloatArray) -> FloatArray:
+        weighted, total = (np.concatenate([[0.0], np.cumsum(v)]) for v in (values * weight, weight))
+        share = total[last] - total[first]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            return np.asarray((weighted[last] - weighted[first]) / share)
+
+    level = rows.output[0]
+    flat = np.ones(len(rows.output))
+    mean = level + means(rows.output - level, flat)
+    after = before = mean
+    if segment is not None:
+        # A rest between two turns may hold rows of both: 'after' the one and 'before' the other.
+        told = [
+            level + means(rows.output - level, (segment == s).astype(np.float64)) for s in ("after", "before")
+        ]
+        after, before = (np.where(np.isnan(values), mean, values) for values in told)
+    return _Chunks(
+        first,
+        rows.state[first],
+        rows.tilt_deg[first],
+        means(rows.rate_deg_s, flat),
+        rest[first],
+        mean,
+        after,
+        before,
+        (last - first).astype(np.float64),
+    )
+
+
+def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
+    """Each turn less the mean of the rests next to it."""
+    turns = np.flatnonzero(~chunks.rest)
+    if len(turns) == 0:
+        raise InputError(
+            f"{rows.source}, column 'rate': the table never turns; turns both ways were expected"
+        )
+    padded = np.concatenate([[False], chunks.rest, [False]])
+
+    def same(other: IndexArray) -> BoolArray:
+        inside = np.clip(other, 0, len(chunks.rest) - 1)
+        alike = (chunks.state[inside] == chunks.state[turns]) & (
+            chunks.tilt_deg[inside] == chunks.tilt_deg[turns]
+        )
+        return np.asarray(padded[other + 1] & alike)
+
+    has_before, has_after = same(turns - 1), same(turns + 1)
+    lonely = ~(has_before & has_after)
+    if lonely.any():
+        turn = turns[int(np.argmax(lonely))]
+        side = "before" if not has_before[int(np.argmax(lonely))] else "after"
+        raise InputError(
+            f"{rows.source}, {rows.row_name(int(chunks.place[turn]))}: no rest {side} the turn at "
+            f"{chunks.rate_deg_s[turn]:.6g} deg/s (state {chunks.state[turn]:g}, tilt {chunks.tilt_deg[turn]:g} "
+            "deg); each turn needs a rest at the same state and tilt before and after it"
+        )
+    level = (chunks.before_mean[turns - 1] + chunks.after_mean[turns + 1]) / 2.0
+    return TableMeasurements(
+        chunks.state[turns],
+        chunks.tilt_deg[turns],
+        chunks.rate_deg_s[turns],
+        chunks.mean[turns] - level,
+        rows.unit,
+        rows.source,
+    )
