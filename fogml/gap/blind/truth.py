@@ -137,7 +137,7 @@ class Truth(_Part):
     case
         Its number, as in the file names.
     seed
-        What it was drawn from.
+        The suite's; with the case's number it fixes everything that is drawn.
     kind
         What it is drawn as.
     runs

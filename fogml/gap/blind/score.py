@@ -1,0 +1,168 @@
+"""The score of a blind suite: every figure, what lies behind it, and limits on it."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import fogml
+from fogml.errors import InputError
+from fogml.gap.blind.folders import BlindFolder
+from fogml.gap.blind.relatives import relatives_of
+from fogml.gap.blind.run import Progress
+from fogml.gap.blind.scoring.answers import read_answer
+from fogml.gap.blind.scoring.breakdowns import confusion, left_out, thinned, worst
+from fogml.gap.blind.scoring.marks import Mark, mark
+from fogml.gap.blind.scoring.statistics import Bin
+from fogml.gap.blind.scoring.table import BY_KEY, calibration, curve, rows
+from fogml.gap.blind.seeds import check_use, record_use, uses
+from fogml.gap.blind.truth import KINDS, STRATUM_NAMES, SUMS, Truth, check_sums, read_truth
+
+SCHEMA = "fogml.blind_score/1"
+
+
+def score(
+    folder: BlindFolder,
+    methods: Sequence[str] | None = None,
+    final: Path | None = None,
+    progress: Progress | None = None,
+) -> dict[str, Any]:
+    """Score the answers of a suite, as JSON-ready values of schema ``fogml.blind_score/1``.
+
+    Parameters
+    ----------
+    folder
+        The suite.
+    methods
+        Which methods' answers; all that there are by default. A case without an answer is a failed
+        one, for each of them.
+    final
+        The ledger of uses of final seeds, to be given where the suite's seed is one; the use is added.
+    progress
+        Told each case's number.
+
+    Raises
+    ------
+    InputError
+        If the truth changed since it was hashed, cases and truths don't match, there are no answers,
+        or a final seed is used without the ledger.
+    """
+    names = folder.names()
+    count = check_sums(folder.truth)
+    if count != len(names):
+        raise InputError(f"{folder.path}: {len(names)} cases, but {count} truths; make the cases anew")
+    truths = [read_truth(folder.truth / f"{name}.json") for name in names]
+    seeds = sorted({truth.seed for truth in truths})
+    if len(seeds) != 1:
+        raise InputError(f"{folder.truth}: cases of several seeds ({seeds}); a suite has one")
+    check_use(seeds[0], final)
+    methods = folder.methods() if methods is None else methods
+    if not methods:
+        raise InputError(f"{folder.path}: holds no answers; run a method first (fogml blind run)")
+    found: dict[str, Any] = {name: _method(folder, name, truths, progress) for name in methods}
+    digest = hashlib.sha256((folder.truth / SUMS).read_bytes()).hexdigest()
+    if final is not None:
+        figures = {
+            name: {row["key"]: row["value"] for row in values["rows"]} for name, values in found.items()
+        }
+        record_use(final, seeds[0], len(names), digest, figures)
+    return {
+        "schema": SCHEMA,
+        "version": fogml.__version__,
+        "data": "synthetic: a reality written apart from the twin",
+        "seed": seeds[0],
+        "final": final is not None,
+        "final_uses": uses(final) if final is not None else [],
+        "truth": digest,
+        "cases": len(names),
+        "kinds": _counted([truth.kind for truth in truths], KINDS),
+        "strata": _counted([truth.stratum for truth in truths if truth.effects], STRATUM_NAMES),
+        "fit_runs": _counted([len(truth.runs.fit) for truth in truths]),
+        "turning": sum(truth.turning for truth in truths),
+        "sample_s": sorted({truth.sample_s for truth in truths}),
+        "methods": found,
+        "gates": [],
+    }
+
+
+def marks_of(
+    folder: BlindFolder, method: str, truths: Sequence[Truth], progress: Progress | None = None
+) -> list[Mark]:
+    """Each case's answer held against its truth."""
+    found = []
+    for truth in truths:
+        answer = read_answer(folder.answers(method) / truth.case)
+        found.append(mark(truth, answer, relatives_of(folder, truth)))
+        if progress:
+            progress(f"{method} {truth.case}")
+    return found
+
+
+def gate(values: dict[str, Any], gates: Mapping[str, float], method: str) -> list[dict[str, Any]]:
+    """Hold figures of a method against limits: ``{"key", "limit", "value", "met"}`` each.
+
+    A figure of which more is wanted must reach the limit, another one must not exceed it; one with
+    both a lower and an upper bound wanted must reach it. One without a value fails.
+
+    Raises
+    ------
+    InputError
+        For a figure that there is none of.
+    """
+    reached = {row["key"]: row["value"] for row in values["methods"][method]["rows"]}
+    found = []
+    for key, limit in gates.items():
+        if key not in BY_KEY:
+            raise InputError(f"--gate: no figure '{key}'; figures are {', '.join(BY_KEY)}")
+        value, more = reached[key], _more_is_better(key)
+        met = value is not None and (value >= limit if more else value <= limit)
+        found.append({"key": key, "limit": limit, "at_least": more, "value": value, "met": met})
+    return found
+
+
+def wanted_gates() -> dict[str, float]:
+    """A gate at what is wanted of every figure."""
+    limits = {key: figure.high if figure.low is None else figure.low for key, figure in BY_KEY.items()}
+    return {key: limit for key, limit in limits.items() if limit is not None}
+
+
+def _more_is_better(key: str) -> bool:
+    figure = BY_KEY[key]
+    if figure.low is None and figure.high is None:
+        return key.endswith(("exact", "strict", "right"))
+    return figure.low is not None
+
+
+def _method(
+    folder: BlindFolder, name: str, truths: Sequence[Truth], progress: Progress | None
+) -> dict[str, Any]:
+    marks = marks_of(folder, name, truths, progress)
+    return {
+        "rows": rows(marks),
+        "reliability": [_bin(part) for part in calibration(marks)],
+        "open_set": thinned(curve(marks)),
+        "confusion": confusion(marks),
+        "left_out": left_out(marks),
+        "worst": worst(marks, name),
+        "failed": [{"case": m.truth.case, "reason": m.failure} for m in marks if m.failure],
+    }
+
+
+def _bin(part: Bin) -> dict[str, Any]:
+    return {
+        "from": part.low,
+        "to": part.high,
+        "stated": part.stated,
+        "found": part.found.value,
+        "low": part.found.low,
+        "high": part.found.high,
+        "n": part.found.n,
+    }
+
+
+def _counted(values: Sequence[Any], order: Sequence[Any] | None = None) -> dict[str, int]:
+    counts = Counter(values)
+    return {str(name): counts[name] for name in (order or sorted(counts)) if counts[name]}
