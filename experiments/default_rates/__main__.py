@@ -26,6 +26,9 @@ TRAINED = {"one rate": (1.0,), "three rates": (0.5, 1.0, 2.0)}
 OTHER_RATES = (0.4, 0.7, 1.5, 3.0)
 PROCESS_ROWS = 500
 AVERAGING_S = 100.0
+UNITS = {"first": range(10), "fresh": range(500, 520)}
+"""Seeds of the units: those that the rule of the choice was set with, and others."""
+SAME = 1e-9
 
 
 def world(seed: int) -> World:
@@ -120,36 +123,51 @@ def ratios(rows: list[dict], trained: str, against: str, *, with_floor: bool) ->
     return np.array(found)
 
 
+def table(rows: list[dict]) -> str:
+    """Ratios of `auto` to the other models as a Markdown table, for each group of units."""
+    lines = [
+        "| units | trained at | against | error, mean | error, largest | residual, largest | worse in |",
+        "|---|---|---|---:|---:|---:|---:|",
+    ]
+    for group, seeds in UNITS.items():
+        chosen = [row for row in rows if row["seed"] in seeds]
+        for trained in TRAINED:
+            for against in ("cubic, dT, T*dT", "Gaussian process"):
+                pure = ratios(chosen, trained, against, with_floor=False)
+                residual = ratios(chosen, trained, against, with_floor=True)
+                cells = f"{np.exp(np.log(pure).mean()):.3f} | {pure.max():.2f} | {residual.max():.3f}"
+                worse = f"{int((pure > 1.0 + SAME).sum())} of {pure.size}"
+                lines.append(f"| {group} | {trained} | {against} | {cells} | {worse} |")
+    return "\n".join(lines)
+
+
 def page(rows: list[dict]) -> str:
     """The result page."""
-    lines = [
-        "| trained at | against | error, geometric mean | error, largest | residual, largest |",
-        "|---|---|---:|---:|---:|",
-    ]
-    for trained in TRAINED:
-        for against in ("cubic, dT, T*dT", "Gaussian process"):
-            pure = ratios(rows, trained, against, with_floor=False)
-            residual = ratios(rows, trained, against, with_floor=True)
-            cells = f"{np.exp(np.log(pure).mean()):.3f} | {pure.max():.2f} | {residual.max():.3f}"
-            lines.append(f"| {trained} | {against} | {cells} |")
-    units = len({row["seed"] for row in rows})
+    described = "; ".join(f"{group}: seeds {seeds[0]} to {seeds[-1]}" for group, seeds in UNITS.items())
     return f"""# The default at other ramp rates
 
-Data: **synthetic** ({units} units drawn by `experiments/synthetic_world.py`, noise 0.1 to 0.5 deg/h a sample
+Data: **synthetic** (units drawn by `experiments/synthetic_world.py`, noise 0.1 to 0.5 deg/h a sample
 of {SAMPLE_S:.0f} s; every other unit has a ripple over temperature that no cubic follows). `auto` is
 trained on one cycle at 1 °C/min, or on three at 0.5, 1 and 2 °C/min, and used at 0.4, 0.7, 1.5 and
-3 °C/min. Ratios of
-`auto` to another model, unit by unit and rate by rate; below 1 `auto` is better. *Error* is against the
-noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages in it, as a recording would.
+3 °C/min. The rule of the choice was set with the first units in view and judged on the fresh ones
+({described}). Ratios of
+`auto` to another model, unit by unit and rate by rate; below 1 `auto` is better, means are geometric. *Error* is against the
+noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages in it, as a recording would;
+*worse in* counts the cases with a ratio of errors above 1.
 The process sees {PROCESS_ROWS} averages. fogml {__version__}; `python -m experiments.default_rates`.
 
-{chr(10).join(lines)}
+{table(rows)}
+
+At one rate `auto` keeps the cubic's terms in the rate and adds to them only what gains two standard
+errors on the left-out parts of the run; so in most cases it is the cubic itself, or better. Where it is
+worse, the larger form passed by luck: the run's noise does not tell the two apart, and the residual
+shows by how little they differ.
 """
 
 
-def main(seeds: int = 10) -> None:
+def main() -> None:
     """Compute and write the results."""
-    rows = [row for seed in range(seeds) for row in case(seed)]
+    rows = [row for seeds in UNITS.values() for seed in seeds for row in case(seed)]
     write_results(HERE, rows, page(rows))
     print(page(rows))
 

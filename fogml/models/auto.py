@@ -1,10 +1,10 @@
 """The automatic choice among models, features and sizes, on parts of the training runs held out.
 
-Candidates are scored on averages of the training runs: each run in turn is held out where there
-are several, else blocks of the one run's time. What is held out is limited to the box of the
+Candidates are scored on averages of the training runs: blocks of their time are held out, and
+where there are several, each run in turn as well. What is held out is limited to the box of the
 rows fitted to, as in use. The rule that picks one is `fogml.models.score.choose`: a larger
 candidate than the standard form only if it beats it beyond noise, a smaller one if it is no
-worse, and no compensation where nothing beats the mean.
+worse, and no compensation where nothing beats the mean on runs left out.
 """
 
 from __future__ import annotations
@@ -83,8 +83,8 @@ class AutoModel(DriftModel):
         """Why this one, and what the training runs could not tell; for the card."""
         mean = next(score for score in self.scores_ if not score.candidate.features)
         chosen = self.choice_
-        held_out = "left-out runs" if trial.folds_are_runs else "left-out parts of the training run"
-        rms = [f"{np.sqrt(score.mean_square):.4g}" for score in (chosen, mean)]
+        held_out = "left-out runs" if trial.several_runs else "left-out parts of the training run"
+        rms = [f"{np.sqrt(score.on_runs.mean_square):.4g}" for score in (chosen, mean)]
         if not chosen.candidate.features:
             notes = [f"no compensation: nothing beats the training mean ({rms[1]} deg/h rms) on {held_out}"]
         else:
@@ -95,8 +95,9 @@ class AutoModel(DriftModel):
         weighed = self.features is None
         if weighed and trial.both_directions and trial.rates < RATES_THAT_TELL:
             notes.append(
-                f"at most temperatures the training runs hold {trial.rates} distinct rate(s): only terms "
-                "linear in the rate are weighed; train at three or more rates to allow others"
+                f"at most temperatures the training runs hold {trial.rates} distinct rate(s), which don't "
+                "tell how the drift depends on the rate: all that is weighed holds dT and T*dT and is linear "
+                "in them; train at three or more rates to allow other forms"
             )
         if not trial.both_directions:
             only = "so only terms in temperature are weighed, " if weighed else ""

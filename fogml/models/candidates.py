@@ -13,11 +13,14 @@ from fogml.features.parse import parse_features
 from fogml.models.feature_model import shared_sensors
 from fogml.runs.run import Run
 
-_STATIC = ("", "T", "T^1..2", "T^1..3", "T^1..5")
-_RATE = ("", "dT", "dT, T*dT")
+_AT_LEAST_CUBIC = ("T^1..3", "T^1..5")
+_STATIC = ("", "T", "T^1..2", *_AT_LEAST_CUBIC)
+_RATE_TERMS = "dT, T*dT"
+_RATE = ("", "dT", _RATE_TERMS)
 _GRADIENT = ("T_in-T_out", "T_in-T_out, d(T_in-T_out)")
 _DIRECTION = ("", "sign(dT)")
-_EACH_SENSOR = ("{0}", "{0}, d{0}", "{0}^1..2, d{0}")
+_EACH_SENSOR_AND_RATE = ("{0}, d{0}", "{0}^1..2, d{0}")
+_EACH_SENSOR = ("{0}", *_EACH_SENSOR_AND_RATE)
 # More coil sensors than inner and outer face: each of them may tell something of its own.
 _MANY_SENSORS = 3
 
@@ -68,7 +71,9 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
     rates_told
         Whether the training runs hold three or more distinct rates of temperature. With fewer,
         nothing tells a rate from its direction, from its powers or from the rate of a gradient,
-        and what was fitted fails at the next rate: only terms linear in the rate are offered.
+        nor whether a term in it may be left out, and what was fitted fails at the next rate: only
+        what holds the standard form's terms in the rate, and is linear in it, is offered, and
+        nothing smaller.
     both_directions
         Whether temperature both rises and falls. On one way only, rate and gradient are functions
         of temperature and time, and what was fitted to them turns against the model on the way
@@ -80,13 +85,17 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
     sensors = shared_sensors(runs)
     faces = len(sensors) > 1
     gradient = ("", *(_GRADIENT if rates_told else _GRADIENT[:1])) if faces else ("",)
-    families = [_STATIC, _RATE, gradient, _DIRECTION if rates_told else ("",)]
+    families = (
+        [_STATIC, _RATE, gradient, _DIRECTION] if rates_told else [_AT_LEAST_CUBIC, (_RATE_TERMS,), gradient]
+    )
     texts = {", ".join(part for part in parts if part) for parts in product(*families)}
     if len(sensors) >= _MANY_SENSORS:
-        texts |= {", ".join(form.format(name) for name in sensors) for form in _EACH_SENSOR}
+        forms = _EACH_SENSOR if rates_told else _EACH_SENSOR_AND_RATE
+        texts |= {", ".join(form.format(name) for name in sensors) for form in forms}
     linear = [STANDARD, *(Candidate(text) for text in sorted(texts - {STANDARD.features}))]
-    networks = ["T", *(", ".join(part for part in ("T, dT, T*dT", extra) if part) for extra in gradient)]
-    return [*linear, *(Candidate(text, network=True) for text in networks)]
+    networks = [", ".join(part for part in ("T", _RATE_TERMS, extra) if part) for extra in gradient]
+    mapped = [Candidate(text, network=True) for text in (["T", *networks] if rates_told else networks)]
+    return [*linear, *mapped, *([] if rates_told else [Candidate("")])]
 
 
 def union_of(candidates: Sequence[Candidate]) -> Features:

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml.models.candidates import Candidate
 from fogml.runs.run import FloatArray
+
+STANDARD_ERRORS = 2.0
+"""A gain of this many standard errors is beyond noise. At one, of dozens of candidates some pass by luck."""
 
 
 @dataclass(frozen=True)
@@ -23,29 +26,42 @@ class Score:
     parameters
         Its number of parameters.
     squared_errors
-        Mean squared error on each block of time [(deg/h)**2], shape (b,).
+        Mean squared error on each block of time [(deg/h)**2], shape (b,). Of several training
+        runs each block is there twice: with its run left out, then with its part of the time.
     rows
         Rows of each block, shape (b,).
+    of_runs
+        How many of the blocks, from the first, come from runs left out; None: the score does not
+        part them.
     """
 
     candidate: Candidate
     parameters: int
     squared_errors: FloatArray
     rows: NDArray[np.intp]
+    of_runs: int | None = None
 
     @property
     def mean_square(self) -> float:
         """Mean squared error over all rows [(deg/h)**2]."""
         return float(np.average(self.squared_errors, weights=self.rows))
 
+    @property
+    def on_runs(self) -> Score:
+        """The score on runs left out alone, where there are several; else the score itself."""
+        if self.of_runs is None:
+            return self
+        held = slice(self.of_runs)
+        return replace(self, squared_errors=self.squared_errors[held], rows=self.rows[held], of_runs=None)
+
     def beats(self, other: Score) -> bool:
-        """Whether it is better by more than the standard error of the difference, block by block."""
+        """Whether it is better by more than two standard errors of the difference, block by block."""
         weights = self.rows / self.rows.sum()
         gain = other.squared_errors - self.squared_errors
         mean = float(weights @ gain)
         count = len(weights)
         error = float(np.sqrt(np.sum((weights * (gain - mean)) ** 2) * count / max(count - 1, 1)))
-        return mean > error
+        return mean > STANDARD_ERRORS * error
 
     def as_dict(self) -> dict[str, float | int | str]:
         """Name, parameters and rms error on the held-out rows [deg/h]."""
@@ -62,7 +78,9 @@ def choose(scores: Sequence[Score]) -> Score:
     The first score is the standard form's. A larger candidate replaces it only if it beats it; of
     those the best is taken. Else a smaller one replaces it if it is no worse; the smallest of
     those is taken. What does not beat the training runs' mean is not worth its parameters: then
-    the mean is taken.
+    the mean is taken. That last question is put to runs left out, where there are several: parts
+    of a run are predicted well from the rest of it whatever it is that moved the drift, time
+    included, and harm shows on the next run only.
     """
     mean = next(score for score in scores if not score.candidate.features)
     standard = scores[0]
@@ -73,4 +91,4 @@ def choose(scores: Sequence[Score]) -> Score:
         small = [s for s in scores if s.parameters <= standard.parameters]
         no_worse = [s for s in small if s.mean_square <= standard.mean_square]
         choice = min(no_worse, key=lambda s: (s.parameters, s.mean_square))
-    return choice if choice.beats(mean) else mean
+    return choice if choice.on_runs.beats(mean.on_runs) else mean

@@ -55,8 +55,8 @@ class Trial:
         What there is to choose from, the standard form first.
     rates
         Number of distinct rates of temperature in the training runs.
-    folds_are_runs
-        Whether a fold holds out a run, rather than a part of the only one.
+    several_runs
+        Whether there are several runs, each of which is left out in turn.
     both_directions
         Whether temperatures go up and down in the training runs.
     """
@@ -79,24 +79,34 @@ class Trial:
         averaged = averaged_rows(rows)
         self._atoms = np.concatenate([part.atoms for part in averaged])
         self._table = bare_table(averaged)
-        self.folds_are_runs = len(runs) > 1
-        self._folds: list[Fold] = (
-            run_folds(self._table)
-            if self.folds_are_runs
-            else time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)
-        )
+        self.several_runs = len(runs) > 1
+        self._partings: list[list[Fold]] = [time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)]
+        if self.several_runs:
+            self._partings.insert(0, run_folds(self._table))
 
     def score(self, candidate: Candidate) -> Score:
-        """Errors of a candidate on the rows that each fold holds out."""
+        """Errors of a candidate on the rows that each fold holds out.
+
+        Of several runs, each is left out in turn, and each of ten parts of the time of all of them
+        too. Runs left out tell what the next run holds that these did not, but each fit lacks a
+        rate or a direction that the model will have seen; parts of the time are judged by fits
+        that lack next to nothing. Both count alike.
+        """
         table = self._table
-        predicted = np.empty(len(table))
         parameters = 1
-        for fitted, held in self._folds:
-            if not candidate.features:
-                predicted[held] = table.y[fitted].mean()
-                continue
-            predicted[held], parameters = self._predicted(candidate, fitted, held)
-        return Score(candidate, parameters, *squares_by_block(table, predicted))
+        squares, rows = [], []
+        for folds in self._partings:
+            predicted = np.empty(len(table))
+            for fitted, held in folds:
+                if not candidate.features:
+                    predicted[held] = table.y[fitted].mean()
+                    continue
+                predicted[held], parameters = self._predicted(candidate, fitted, held)
+            by_block = squares_by_block(table, predicted)
+            squares.append(by_block[0])
+            rows.append(by_block[1])
+        of_runs = len(rows[0]) if self.several_runs else None
+        return Score(candidate, parameters, np.concatenate(squares), np.concatenate(rows), of_runs)
 
     def _predicted(
         self, candidate: Candidate, fitted: IndexArray, held: IndexArray

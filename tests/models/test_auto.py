@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,7 +41,7 @@ def score(features: str, parameters: int, squares: list[float]) -> Score:
 def test_a_larger_candidate_needs_a_gain_beyond_its_standard_error() -> None:
     mean = score("", 1, [9.0, 9.0, 9.0, 9.0])
     standard = score(STANDARD.features, 6, [1.0, 1.0, 1.0, 1.0])
-    unsure = score("T^1..5", 7, [0.2, 1.6, 0.9, 1.2])  # gains 0.025 on average, scattered by 0.6
+    unsure = score("T^1..5", 7, [0.2, 1.3, 0.4, 1.0])  # gains 0.28 on average, 1.2 of its standard error
     sure = score("T^1..4", 8, [0.9, 0.91, 0.92, 0.9])
     assert choose([standard, unsure, mean]) is standard
     assert choose([standard, unsure, sure, mean]) is sure
@@ -57,6 +59,29 @@ def test_nothing_is_better_than_a_gain_within_its_noise() -> None:
     mean = score("", 1, [1.0, 1.0, 1.0, 1.0])
     standard = score(STANDARD.features, 6, [0.2, 1.9, 0.9, 0.9])
     assert choose([standard, mean]) is mean
+
+
+def test_harm_is_looked_for_on_runs_left_out() -> None:
+    """Parts of a run may be told by the rest of it where the next run is not."""
+
+    def both(features: str, parameters: int, on_runs: list[float], on_parts: list[float]) -> Score:
+        return replace(score(features, parameters, on_runs + on_parts), of_runs=len(on_runs))
+
+    mean = both("", 1, [1.0, 1.1, 0.9, 1.0], [9.0, 9.1, 8.9, 9.0])
+    standard = both(STANDARD.features, 6, [1.2, 0.9, 1.3, 1.1], [0.1, 0.1, 0.1, 0.1])
+    assert standard.beats(mean) and not standard.on_runs.beats(mean.on_runs)
+    assert choose([standard, mean]) is mean
+    helps = both(STANDARD.features, 6, [0.2, 0.2, 0.3, 0.2], [0.1, 0.1, 0.1, 0.1])
+    assert choose([helps, mean]) is helps
+
+
+def test_several_runs_are_left_out_in_turn_and_in_parts() -> None:
+    runs = [world_run(rate, seed)[0] for seed, rate in enumerate((0.5, 1.0))]
+    found = trial.Trial(runs, 0).score(Candidate("T, dT"))
+    assert found.of_runs is not None
+    assert found.rows[: found.of_runs].sum() == found.rows[found.of_runs :].sum()
+    single = trial.Trial(runs[:1], 0).score(Candidate("T, dT"))
+    assert single.of_runs is None and single.on_runs is single
 
 
 def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
@@ -89,6 +114,9 @@ def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
     assert not any("sign" in text or "d(T_in-T_out)" in text for text in few)
     assert any("sign" in text for text in many) and any("d(T_in-T_out)" in text for text in many)
     assert few < many
+    # How the drift depends on the rate stays as in the standard form.
+    assert all({"dT", "T*dT"} <= set(parse_features(text).names()) for text in few if text)
+    assert "" in few and STANDARD.features in few
 
 
 def test_one_way_only_offers_no_rates() -> None:
