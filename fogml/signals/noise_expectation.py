@@ -18,7 +18,7 @@ _COLUMNS = 64
 
 @dataclass(frozen=True)
 class Fitted:
-    """Columns whose constants are fitted to the averages, by generalised least squares.
+    """Columns whose constants are fitted to the averages.
 
     Attributes
     ----------
@@ -27,10 +27,14 @@ class Fitted:
     deviations
         Prior standard deviations of their constants, shape (p,), infinite for free ones; all
         are free if None.
+    ordinary
+        Ordinary least squares, without priors, in place of generalised: a column of ones is then the
+        mean. For noise that wanders, generalised least squares leaves much more.
     """
 
     columns: ArrayLike
     deviations: ArrayLike | None = None
+    ordinary: bool = False
 
 
 def expected_mean_square(
@@ -52,9 +56,8 @@ def expected_mean_square(
     averaging_s
         Lengths of the windows [s], a number or shape (n,).
     fitted
-        What has been fitted to these very averages. What remains of the noise has covariance
-        ``C - X V X'``, V the constants' covariance after the fit. A constant alone gives the mean
-        square about the mean.
+        What has been fitted to these very averages. What generalised least squares leave of the
+        noise has covariance ``C - X V X'``, V the constants' covariance after the fit.
     ladder
         Flicker states; those for the length of `time` if None. Flicker slower than they are is
         constant over a run.
@@ -65,12 +68,16 @@ def expected_mean_square(
     """
     whitener = Whitener(model, time, averaging_s, ladder)
     total = model.variances(time, averaging_s, whitener.ladder)
-    if fitted is not None:
-        columns = _columns(fitted, len(whitener))
-        root = np.linalg.qr(_with_prior(whitener.whiten(columns), fitted), mode="r")
+    if fitted is None:
+        return float(np.mean(total))
+    columns = _columns(fitted, len(whitener))
+    if fitted.ordinary:
+        taken = whitener.colour_adjoint(np.linalg.qr(columns)[0])
+    else:
+        root = np.asarray(np.linalg.qr(_with_prior(whitener.whiten(columns), fitted), mode="r"))
         # X V X' = (X R^-1) (X R^-1)'.
-        total = total - np.sum(np.linalg.solve(root.T, columns.T) ** 2, axis=0)
-    return float(np.mean(total))
+        taken = np.linalg.solve(root.T, columns.T)
+    return float((np.sum(total) - np.sum(taken**2)) / len(whitener))
 
 
 def mean_square_draws(
@@ -85,21 +92,25 @@ def mean_square_draws(
 ) -> FloatArray:
     """Mean squares that the noise leaves in averages of so many drawn runs, shape (draws,).
 
-    As `expected_mean_square`, which is their mean; their scatter is what one run's floor is worth.
-    Constants with a prior are taken to be at its mean.
+    As `expected_mean_square`; their scatter is what one run's floor is worth. Constants with a prior
+    are at its mean here and scatter with it there, where residuals are a little larger.
     """
     whitener = Whitener(model, time, averaging_s, ladder)
     n = len(whitener)
-    basis = None
+    basis, ordinary = None, fitted is not None and fitted.ordinary
     if fitted is not None:
-        whitened = whitener.whiten(_columns(fitted, n))
-        basis = np.linalg.qr(_with_prior(whitened, fitted))[0][:n]
+        columns = _columns(fitted, n)
+        stacked = columns if ordinary else _with_prior(whitener.whiten(columns), fitted)
+        basis = np.linalg.qr(stacked)[0][:n]
     squares = np.empty(draws)
     for low in range(0, draws, _COLUMNS):
-        white = rng.standard_normal((n, min(_COLUMNS, draws - low)))
-        if basis is not None:
-            white -= basis @ (basis.T @ white)
-        squares[low : low + white.shape[1]] = np.mean(whitener.colour(white) ** 2, axis=0)
+        noise = rng.standard_normal((n, min(_COLUMNS, draws - low)))
+        if basis is not None and not ordinary:
+            noise -= basis @ (basis.T @ noise)
+        noise = whitener.colour(noise)
+        if basis is not None and ordinary:
+            noise -= basis @ (basis.T @ noise)
+        squares[low : low + noise.shape[1]] = np.mean(noise**2, axis=0)
     return squares
 
 

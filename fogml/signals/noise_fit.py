@@ -9,7 +9,7 @@ IEEE Trans. SP-40 (1992) 611), so that an evaluation takes the same time at any 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from fogml.errors import InputError
 from fogml.signals.noise_fit_data import FitData, Level, fit_data
 from fogml.signals.noise_model import NoiseModel
+from fogml.signals.noise_terms import FLICKER_FLOOR
 from fogml.signals.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
@@ -186,7 +187,7 @@ def _levels_log_likelihood(levels: Sequence[Level], model: NoiseModel) -> float:
     return total
 
 
-def _curvature(function, at: FloatArray, steps: FloatArray) -> FloatArray:  # type: ignore[no-untyped-def]
+def _curvature(function: Callable[[FloatArray], float], at: FloatArray, steps: FloatArray) -> FloatArray:
     """Second derivatives by central differences, shape (k, k)."""
     k = len(at)
     offsets = np.diag(steps)
@@ -214,6 +215,6 @@ def _glance(data: FitData) -> NoisePrior:
     tau = np.array([level.averaging_s for level in seen])
     variance = np.array([level.squares / level.freedom for level in seen])
     white = math.sqrt(variance[0] * tau[0]) / 60.0
-    flicker = math.sqrt(variance.min() * math.pi / (2.0 * math.log(2.0)))
+    flicker = math.sqrt(variance.min()) / FLICKER_FLOOR
     walk = 60.0 * math.sqrt(3.0 * variance[-1] / tau[-1])
     return NoisePrior(NoiseModel(white, 0.5 * flicker, 0.5 * walk), _WIDE)

@@ -18,8 +18,6 @@ FloatArray = NDArray[np.float64]
 _FEWEST = 16
 _INDEPENDENT = 1e-9
 """Columns whose singular value is below this share of the largest hold nothing new."""
-_FASTER = 0.1
-_SLOWER = 3.0
 
 
 @dataclass(frozen=True)
@@ -96,13 +94,15 @@ def fit_data(
             averages.append((t, np.full(len(t), sample_s), x, y))
             continue
         blocks = block_averages(t, x, y, window_s=sample_s * 2**octaves)
-        averages.append((t[blocks.stops - 1], blocks.counts * sample_s, *blocks.values))
+        x, y = blocks.values
+        averages.append((t[blocks.stops - 1], blocks.counts * sample_s, x, y))
     shared, prior_rows = _columns([x for _, _, x, _ in averages], deviations)
     parts = []
     edges = np.cumsum([0] + [len(t) for t, _, _, _ in averages])
     for (t, a, _, y), low, high in zip(averages, edges[:-1], edges[1:]):
         length = float(t[-1] - t[0]) + float(a[0])
-        ladder = flicker_ladder(_FASTER * float(np.median(a)), _SLOWER * length)
+        # One for all coefficients, so that the likelihood is smooth in them.
+        ladder = flicker_ladder(float(np.median(a)), length)
         table = np.column_stack((shared[low:high], y - y.mean()))
         parts.append(Part(t, a, table, ladder))
     return FitData(tuple(parts), tuple(levels), _merged(glance), prior_rows)

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.signals.noise_terms import FLICKER_FLOOR
 
 FloatArray = NDArray[np.float64]
 
@@ -50,12 +51,23 @@ class Ladder:
         return float(self.time_constants_s[0]) * math.exp(-0.5 * self.step)
 
 
-def flicker_ladder(from_s: float, to_s: float) -> Ladder:
-    """The fewest states that stand for the time constants between two [s], ripple under 1.3 %."""
-    reach = math.log(max(to_s / from_s, math.e))
+def flicker_ladder(averaging_s: float, longest_s: float, white_below_s: float = 0.0) -> Ladder:
+    """The fewest states, ripple under 1.3 %, that make flicker of a series.
+
+    Parameters
+    ----------
+    averaging_s
+        What its samples are means over [s].
+    longest_s
+        Its length [s]. Slower flicker is constant over it.
+    white_below_s
+        Time constant [s] below which flicker may count as white.
+    """
+    fastest = max(_FASTER * averaging_s, min(white_below_s, longest_s))
+    reach = math.log(_SLOWER * max(longest_s / fastest, 1.0))
     count = math.ceil(reach / WIDEST_STEP)
     step = reach / count
-    return Ladder(from_s * np.exp(step * (np.arange(count) + 0.5)), step)
+    return Ladder(fastest * np.exp(step * (np.arange(count) + 0.5)), step)
 
 
 @dataclass(frozen=True)
@@ -108,20 +120,11 @@ class NoiseModel:
         return (3600.0 * self.Q / averaging_s) ** 2
 
     def ladder(self, averaging_s: float, longest_s: float) -> Ladder:
-        """The flicker states that a series needs.
-
-        Parameters
-        ----------
-        averaging_s
-            What its samples are means over [s].
-        longest_s
-            Its length [s]. Slower flicker is constant over it.
-        """
-        fastest = _FASTER * averaging_s
-        if self.B > 0.0:
-            hidden = _HIDDEN * self.white_density * math.pi / (2.0 * self.B**2)
-            fastest = max(fastest, min(hidden, longest_s))
-        return flicker_ladder(fastest, max(_SLOWER * longest_s, 10.0 * fastest))
+        """The flicker states that a series needs beside this white noise; as `flicker_ladder`."""
+        if self.B == 0.0:
+            return flicker_ladder(averaging_s, longest_s)
+        hidden = _HIDDEN * self.white_density * math.pi / (2.0 * self.B**2)
+        return flicker_ladder(averaging_s, longest_s, hidden)
 
     def state_variance(self, ladder: Ladder) -> float:
         """Variance of each of the ladder's states [(deg/h)^2]."""
@@ -149,7 +152,7 @@ class NoiseModel:
         """Allan variance of means over times [s], of the power laws [(deg/h)^2]."""
         tau = np.asarray(averaging_s, dtype=np.float64)
         quantisation = 3.0 * (3600.0 * self.Q / tau) ** 2
-        flicker = 2.0 * math.log(2.0) / math.pi * self.B**2
+        flicker = (FLICKER_FLOOR * self.B) ** 2
         return np.asarray(quantisation + self.white_density / tau + flicker + self.walk_rate * tau / 3.0)
 
     def variances(self, time: ArrayLike, averaging_s: ArrayLike, ladder: Ladder) -> FloatArray:

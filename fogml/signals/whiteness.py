@@ -130,7 +130,8 @@ def whiteness(
         upto = int(lags[low[0]])
         worst = int(np.argmax(np.abs(correlation[:upto])))
         failed.append(
-            f"neighbouring innovations are correlated: {correlation[worst]:+.3f} at {(worst + 1) * sample_s:g} s"
+            "neighbouring innovations are correlated: "
+            f"{correlation[worst]:+.3f} at {(worst + 1) * sample_s:g} s"
         )
     return Whiteness(
         not failed,

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from fogml.errors import InputError
 from fogml.signals.clock import Clock
 from fogml.signals.noise_model import ADJOINING, Ladder, NoiseModel
-from fogml.signals.whitening_kernels import gains_kernel, whiten_kernel
+from fogml.signals.whitening_kernels import adjoint_kernel, gains_kernel, whiten_kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -122,6 +122,15 @@ class Whitener:
         """The inverse of `whiten`: noise of the model [deg/h] from independent standard normal numbers."""
         return self._through(np.asarray(white, dtype=np.float64), inverse=True)
 
+    def colour_adjoint(self, values: ArrayLike) -> FloatArray:
+        """The transpose of `colour`, which after it multiplies by the noise's covariance C.
+
+        ``colour(colour_adjoint(v))`` is ``C v``, and ``sum(colour_adjoint(v)**2)`` is ``v' C v``.
+        """
+        out, columns, costates = self._copied(np.asarray(values, dtype=np.float64))
+        adjoint_kernel(columns, self._kind, self._decay, self._reading, self._gains, self.deviation, costates)
+        return out
+
     def whiten_blocks(self, blocks: Iterable[ArrayLike]) -> Iterator[FloatArray]:
         """Whitened blocks of rows (r, k), in time order, one at a time: for columns that fill the memory.
 
@@ -148,14 +157,18 @@ class Whitener:
         if row != len(self):
             raise InputError(f"whitening: blocks of {row} rows together, {len(self)} were expected")
 
-    def _through(self, values: FloatArray, *, inverse: bool) -> FloatArray:
+    def _copied(self, values: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """A copy to work in, its columns, and states at rest for them."""
         if values.ndim not in (1, 2) or len(values) != len(self):
             raise InputError(
                 f"whitening: values of shape {values.shape}, ({len(self)},) or ({len(self)}, k) was expected"
             )
         out = np.array(values, order="C")
         columns = out.reshape(len(out), -1)
-        states = np.zeros((self._gains.shape[1], columns.shape[1]))
+        return out, columns, np.zeros((self._gains.shape[1], columns.shape[1]))
+
+    def _through(self, values: FloatArray, *, inverse: bool) -> FloatArray:
+        out, columns, states = self._copied(values)
         self._work(columns, 0, states, inverse=inverse)
         return out
 

@@ -207,3 +207,36 @@ def whiten_kernel(
                 for q in range(width):
                     z[j, q] = kept * z[j, q] + taken * error[q]
         states[:, left:right] = z
+
+
+@njit(cache=True, nogil=True)
+def adjoint_kernel(
+    values: FloatArray,
+    kind: IntArray,
+    decay: FloatArray,
+    reading: FloatArray,
+    gains: FloatArray,
+    deviation: FloatArray,
+    costates: FloatArray,
+) -> None:
+    """The transpose of the inverse of `whiten_kernel` on columns (n, k), in place, last sample first.
+
+    `costates`, shape (s, k), are overwritten with those before the first sample.
+    """
+    n, columns = values.shape
+    size = len(costates)
+    fed = np.empty(columns)
+    for i in range(n - 1, -1, -1):
+        row = values[i]
+        f, c, g = decay[kind[i]], reading[kind[i]], gains[i]
+        for q in range(columns):
+            fed[q] = row[q]
+        for j in range(size):
+            kept, taken, given = f[j], c[j], g[j]
+            for q in range(columns):
+                now = costates[j, q]
+                fed[q] += given * now
+                costates[j, q] = kept * now + taken * row[q]
+        scale = deviation[i]
+        for q in range(columns):
+            row[q] = fed[q] * scale
