@@ -64,6 +64,8 @@ class Job:
         Whether the peak memory of ours is measured, in a process of its own.
     big
         Whether it needs ``--big``: minutes and gigabytes.
+    missing
+        Says what it lacks to run on this machine; None where it lacks nothing.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Job:
     limit_mb: float | None = None
     memory: bool = False
     big: bool = False
+    missing: Callable[[], str | None] = lambda: None
 
 
 def measure(job: Job, folder: Path, *, quick: bool = False, repeats: int = LEAST_REPEATS) -> dict[str, Any]:

@@ -37,6 +37,8 @@ def results_page(results: Mapping[str, Any]) -> str:
     lines += [
         f"| {job['name']} | {job['ours']} | {job['plain']} | {job['checked']} |" for job in results["jobs"]
     ]
+    for left in results["skipped"]:
+        lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
     busiest = max((job["load"] for job in results["jobs"]), default=0.0)
     lines += ["", f"Greatest load of the machine before a job: {busiest:.1f}."]
     return "\n".join(lines) + "\n"

@@ -67,8 +67,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _measure(jobs: Sequence[harness.Job], asked: argparse.Namespace) -> dict[str, Any]:
-    measured = []
+    measured, skipped = [], []
     for job in jobs:
+        reason = job.missing()
+        if reason is not None:
+            print(f"{job.name}: skipped, {reason}", file=sys.stderr)
+            skipped.append({"name": job.name, "title": job.title, "reason": reason})
+            continue
         print(f"{job.name}: {job.title}", file=sys.stderr)
         with tempfile.TemporaryDirectory(prefix="fogml-benchmark-") as folder:
             measured.append(harness.measure(job, Path(folder), quick=asked.quick, repeats=asked.repeats))
@@ -82,6 +87,7 @@ def _measure(jobs: Sequence[harness.Job], asked: argparse.Namespace) -> dict[str
         "repeats": asked.repeats,
         "quick": asked.quick,
         "jobs": measured,
+        "skipped": skipped,
     }
 
 
