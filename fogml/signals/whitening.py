@@ -143,7 +143,7 @@ class Whitener:
         row = 0
         for given in blocks:
             block = np.array(given, dtype=np.float64, order="C", ndmin=1)
-            columns = block.reshape(len(block), -1)
+            columns = block if block.ndim == 2 else block[:, None]
             if states is None:
                 states = np.zeros((self._gains.shape[1], columns.shape[1]))
             if row + len(block) > len(self) or columns.shape[1] != states.shape[1]:
@@ -164,7 +164,7 @@ class Whitener:
                 f"whitening: values of shape {values.shape}, ({len(self)},) or ({len(self)}, k) was expected"
             )
         out = np.array(values, order="C")
-        columns = out.reshape(len(out), -1)
+        columns = out if out.ndim == 2 else out[:, None]
         return out, columns, np.zeros((self._gains.shape[1], columns.shape[1]))
 
     def _through(self, values: FloatArray, *, inverse: bool) -> FloatArray:
