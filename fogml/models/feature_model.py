@@ -101,7 +101,7 @@ class FeatureModel(DriftModel):
         rows = [run_rows(run, features) for run in group]
         count = row_count(rows)
         learn_box(features, [part.atoms for part in rows])
-        regressor = self._make_regressor(len(features))
+        regressor = self.unfitted_regressor(len(features))
         regressor = for_features(regressor, features, [part.atoms for part in rows])
         self.features_ = features
         if isinstance(regressor, LinearRegressor) and self.max_rows is None:
@@ -116,7 +116,7 @@ class FeatureModel(DriftModel):
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=features.window_s)
         return self
 
-    def _make_regressor(self, width: int) -> Any:
+    def unfitted_regressor(self, width: int) -> Any:
         """An unfitted regressor for `width` columns."""
         return LinearRegressor() if self.regressor is None else clone(self.regressor)
 

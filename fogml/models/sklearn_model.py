@@ -67,7 +67,8 @@ class SklearnModel(FeatureModel):
         """The dotted name."""
         return self.name
 
-    def _make_regressor(self, width: int) -> Any:
+    def unfitted_regressor(self, width: int) -> Any:
+        """An unfitted regressor for `width` columns."""
         kind = sklearn_regressor_class(self.name)
         options = dict(self.options or {})
         known = inspect.signature(kind).parameters
