@@ -35,8 +35,9 @@ _CREATE_RULESET, _ADD_RULE, _RESTRICT_SELF = 444, 445, 446
 _VERSION_FLAG, _PATH_BENEATH, _NO_NEW_PRIVILEGES = 1, 1, 38
 _EXECUTE, _WRITE_FILE, _READ_FILE, _READ_DIR = 1 << 0, 1 << 1, 1 << 2, 1 << 3
 _READING = _EXECUTE | _READ_FILE | _READ_DIR
-_ALL_FIRST_VERSION = (1 << 13) - 1
-_FILE_RIGHTS = _EXECUTE | _WRITE_FILE | _READ_FILE
+# Rights that came with each version: all of the first, moves between folders, truncation.
+_RIGHTS = {1: (1 << 13) - 1, 2: 1 << 13, 3: 1 << 14}
+_FILE_RIGHTS = _EXECUTE | _WRITE_FILE | _READ_FILE | _RIGHTS[3]
 
 
 class _RulesetAttributes(ctypes.Structure):
@@ -114,15 +115,17 @@ def _landlock(readable: Iterable[Path], writable: Iterable[Path]) -> bool:
     library = ctypes.CDLL(None, use_errno=True)
     call = library.syscall
     call.restype = ctypes.c_long
-    if call(_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(_VERSION_FLAG)) < 1:
+    version = call(_CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(_VERSION_FLAG))
+    if version < 1:
         return False
-    attributes = _RulesetAttributes(_ALL_FIRST_VERSION)
+    everything = sum(rights for since, rights in _RIGHTS.items() if since <= version)
+    attributes = _RulesetAttributes(everything)
     size = ctypes.c_size_t(ctypes.sizeof(attributes))
     ruleset = call(_CREATE_RULESET, ctypes.byref(attributes), size, ctypes.c_uint32(0))
     if ruleset < 0:
         return False
     try:
-        for paths, rights in ((readable, _READING), (writable, _ALL_FIRST_VERSION)):
+        for paths, rights in ((readable, _READING), (writable, everything)):
             for path in paths:
                 _allow(call, ruleset, path, rights)
         library.prctl(_NO_NEW_PRIVILEGES, 1, 0, 0, 0)

@@ -1,0 +1,53 @@
+"""Answers of the oracle, which alone is given the truth: in processes of its own, not sealed."""
+
+from __future__ import annotations
+
+import json
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any
+
+from fogml.gap.blind.folders import OUTCOME, BlindFolder
+from fogml.gap.blind.methods import ORACLE
+from fogml.gap.blind.run import Progress, RunPlan, count_samples, outcome_of
+from fogml.outputs import whole_folder
+
+
+def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
+    """Answer the cases that are left; returns how many were answered now, and how many failed."""
+    left = plan.left()
+    if not left:
+        return 0, 0
+    plan.answers.mkdir(parents=True, exist_ok=True)
+    failed = 0
+    with ProcessPoolExecutor(plan.workers, mp_context=get_context("spawn")) as pool:
+        waiting = [pool.submit(_one, plan.folder.path, plan.answers, name) for name in left]
+        for future in as_completed(waiting):
+            name, done = future.result()
+            failed += not done
+            if progress:
+                progress(name)
+    return len(left), failed
+
+
+def _one(path: Path, answers: Path, name: str) -> tuple[str, bool]:
+    from fogml.gap.blind.baselines.oracle import oracle
+    from fogml.gap.blind.truth import read_truth
+
+    folder = BlindFolder(path)
+    began = time.perf_counter()
+    answer: dict[str, Any] = {"done": True, "reason": None, "message": ""}
+    with whole_folder(answers) as staging:
+        out = staging / name
+        out.mkdir()
+        try:
+            oracle(folder, read_truth(folder.truth / f"{name}.json"), out)
+        except Exception as error:
+            answer = {"done": False, "reason": "error", "message": f"{type(error).__name__}: {error}"}
+        answer["seconds"] = time.perf_counter() - began
+        samples = count_samples(folder.cases / name)
+        values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples)
+        (out / OUTCOME).write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    return name, bool(answer["done"])
