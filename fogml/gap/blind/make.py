@@ -1,0 +1,100 @@
+"""Making blind cases: seeded, in parallel, the truth apart and hashed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+from fogml.errors import InputError
+from fogml.gap.blind.folders import BlindFolder
+from fogml.gap.blind.plan import Plan, plans
+from fogml.gap.blind.truth import read_truth, write_sums
+
+
+def make_cases(
+    directory: str | Path,
+    count: int,
+    seed: int,
+    sample_s: float = 10.0,
+    workers: int = 2,
+    kinds: Sequence[str] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> int:
+    """Make `count` cases under `directory`, in ``cases``, and their truth in ``truth``.
+
+    The same arguments give the same files, byte for byte, whatever `workers`. Cases whose truth is
+    there already are left as they are, so that an interrupted call goes on where it stopped; a
+    greater `count` adds cases to those of a smaller one.
+
+    Parameters
+    ----------
+    directory
+        Made if it is not there.
+    count
+        How many, from number 0001.
+    seed
+        What everything is drawn from.
+    sample_s
+        Sample interval [s].
+    workers
+        Processes.
+    kinds
+        Kinds of `fogml.gap.blind.truth.KINDS`, in the mix's proportions among them; all if None.
+    progress
+        Called with the number of cases that are there, and `count`.
+
+    Returns
+    -------
+    int
+        How many were made now.
+
+    Raises
+    ------
+    InputError
+        If an argument is not possible, or `directory` holds cases of another seed or interval.
+    """
+    if count < 1 or workers < 1:
+        raise InputError(f"count and workers must be at least 1, found {count} and {workers}")
+    if not 0.1 <= sample_s <= 30.0:
+        raise InputError(f"sample interval {sample_s:g} s: 0.1 to 30 s are possible")
+    folder = BlindFolder(Path(directory))
+    folder.cases.mkdir(parents=True, exist_ok=True)
+    folder.truth.mkdir(parents=True, exist_ok=True)
+    wanted = plans(count, seed, kinds)
+    missing = [plan for plan in wanted if not _is_there(folder, plan, seed, sample_s)]
+    done = count - len(missing)
+    if progress:
+        progress(done, count)
+    if missing:
+        from joblib import Parallel, delayed
+
+        jobs = (delayed(_make)(folder.cases, folder.truth, plan, seed, sample_s) for plan in missing)
+        pool = Parallel(n_jobs=min(workers, len(missing)), backend="loky", return_as="generator_unordered")
+        for number, _ in enumerate(pool(jobs), start=1):
+            if progress:
+                progress(done + number, count)
+    write_sums(folder.truth)
+    return len(missing)
+
+
+def _make(cases: Path, truth: Path, plan: Plan, seed: int, sample_s: float) -> None:
+    from threadpoolctl import threadpool_limits
+
+    from fogml.gap.blind.case import make_case
+
+    # One thread a process; sums then also come out the same on any machine's number of cores.
+    with threadpool_limits(limits=1):
+        make_case(cases, truth, plan, seed, sample_s)
+
+
+def _is_there(folder: BlindFolder, plan: Plan, seed: int, sample_s: float) -> bool:
+    path = folder.truth / f"{plan.name}.json"
+    if not (path.is_file() and path.with_suffix(".npz").is_file() and (folder.cases / plan.name).is_dir()):
+        return False
+    held = read_truth(path)
+    if (held.seed, held.sample_s, held.kind) != (seed, sample_s, plan.kind):
+        raise InputError(
+            f"{path}: is of seed {held.seed}, {held.sample_s:g} s and kind {held.kind}, not of seed {seed}, "
+            f"{sample_s:g} s and kind {plan.kind}; choose another folder"
+        )
+    return True

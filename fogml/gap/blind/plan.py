@@ -1,0 +1,122 @@
+"""Which case is what: the mix of `gap.md`, fixed for each block of twenty cases."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.gap.blind.reality.catalogue import INVENTED, known_names
+from fogml.gap.blind.truth import KINDS, Kind
+
+PER_BLOCK: dict[Kind, int] = {
+    "nothing": 3,
+    "one": 6,
+    "two": 3,
+    "three": 1,
+    "unknown_left_out": 2,
+    "unknown_invented": 2,
+    "unknown_and_known": 2,
+    "wrong_thermal": 1,
+}
+"""Cases of each kind in twenty."""
+STRATA = ((4.0, 6.0), (6.0, 10.0), (10.0, 20.0), (20.0, 40.0))
+"""Bounds of d'; within them it is drawn evenly in its logarithm."""
+_RUNS = (1, 2, 5)
+_RUN_SHARES = (0.35, 0.45, 0.2)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What one case is to be.
+
+    Attributes
+    ----------
+    number
+        From 1.
+    kind
+        Of the truth's schema.
+    left_out
+        Ids that are withheld.
+    first
+        Name of an effect that it must have, or None; drawn ones come on top.
+    known
+        How many more effects of the catalogue are drawn.
+    runs
+        To fit on.
+    static
+        Whether there is a static run.
+    """
+
+    number: int
+    kind: Kind
+    first: str | None
+    known: int
+    left_out: tuple[str, ...]
+    runs: int
+    static: bool
+
+    @property
+    def name(self) -> str:
+        """Number as in the file names."""
+        return f"{self.number:04d}"
+
+
+def plans(count: int, seed: int, kinds: Sequence[str] | None = None) -> list[Plan]:
+    """The first `count` cases of a seed; a longer list begins with a shorter one.
+
+    Parameters
+    ----------
+    kinds
+        Only cases of these kinds, in the mix's proportions among them; all if None.
+
+    Raises
+    ------
+    InputError
+        If a kind is not known.
+    """
+    for kind in kinds or ():
+        if kind not in KINDS:
+            raise InputError(f"there is no kind of case '{kind}'; kinds are {', '.join(KINDS)}")
+    block = [k for k, n in PER_BLOCK.items() if kinds is None or k in kinds for _ in range(n)]
+    rng = np.random.default_rng([seed, 0x9E37])
+    known = _Cycle(rng, known_names())
+    left_out = _Cycle(rng, known_names())
+    invented = _Cycle(rng, tuple(form.name for form in INVENTED))
+    unknown_and_known = 0
+    found: list[Plan] = []
+    while len(found) < count:
+        for kind in rng.permutation(np.array(block)).tolist():
+            first, more, withheld = None, 0, ()
+            if kind in ("one", "two", "three"):
+                first, more = known.next(), ("one", "two", "three").index(kind)
+            elif kind == "unknown_left_out":
+                first = left_out.next()
+            elif kind == "unknown_invented":
+                first = invented.next()
+            elif kind == "unknown_and_known":
+                more = 1
+                first = (left_out if unknown_and_known % 2 else invented).next()
+                unknown_and_known += 1
+            elif kind == "wrong_thermal":
+                first = "wrong_thermal_structure"
+            if kind.startswith("unknown") and first in known_names():
+                withheld = (first,)
+            runs = int(rng.choice(_RUNS, p=_RUN_SHARES))
+            static = bool(rng.random() < 0.6)
+            found.append(Plan(len(found) + 1, kind, first, more, withheld, runs, static))
+    return found[:count]
+
+
+class _Cycle:
+    """Names in random order, each once before any comes again."""
+
+    def __init__(self, rng: np.random.Generator, names: tuple[str, ...]) -> None:
+        self._rng, self._names, self._left = rng, names, []  # type: ignore[var-annotated]
+
+    def next(self) -> str:
+        if not self._left:
+            self._left = [str(name) for name in self._rng.permutation(np.array(self._names))]
+        return str(self._left.pop())

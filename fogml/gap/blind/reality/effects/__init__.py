@@ -1,0 +1,1 @@
+"""Other forms of the catalogue's effects, by subject."""

@@ -1,0 +1,71 @@
+"""Sensors that don't show what they sit on."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from fogml.gap.blind.reality.form import Sensing, Shape
+from fogml.gap.blind.reality.recurrences import FloatArray, lag
+from fogml.gap.blind.reality.world import World
+
+
+class LagOfTwoStages(Sensing):
+    """A sensor behind glue and housing: two stages of lag."""
+
+    name, form, unit = "sensor_lag", "two stages", "s"
+    greatest: ClassVar[float] = 900.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Share of the second stage."""
+        return {"second_share": rng.uniform(0.1, 0.5)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """Two lags whose time constants add up to the amplitude."""
+        share = shape["second_share"]
+        first = lag(world.sample_s, temperature, amplitude * (1.0 - share))
+        return lag(world.sample_s, first, amplitude * share)
+
+
+class CoarseSteps(Sensing):
+    """A converter with whole steps that it cuts off rather than rounds."""
+
+    name, form, unit = "sensor_quantisation", "truncation", "degC"
+    greatest: ClassVar[float] = 2.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Where the steps lie."""
+        return {"offset": rng.uniform(0.0, 1.0)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """Whole steps, in the mean unbiased."""
+        steps = temperature / amplitude + shape["offset"]
+        return amplitude * (np.floor(steps) + 0.5 - shape["offset"])
+
+
+class Elsewhere(Sensing):
+    """Sensors that feel the case as well, the outer ones more."""
+
+    name, form, unit = "sensor_placement", "outer sensors more", "1"
+    records = ("T_case",)
+    greatest: ClassVar[float] = 1.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """How much more the outer ones feel it."""
+        return {"outer": rng.uniform(0.9, 1.2)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """A mix of the place and the case."""
+        outer = name in ("T_out", "T2", "T4")
+        share = amplitude * (shape["outer"] if outer else 1.0)
+        return temperature + share * (world.nodes["T_case"] - temperature)
+
+
+FORMS = (LagOfTwoStages, CoarseSteps, Elsewhere)

@@ -1,0 +1,110 @@
+"""The form that an effect takes in this reality: one class, one declaration."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar
+
+import numpy as np
+
+from fogml.gap.blind.reality.programme import Demands
+from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.reality.world import World
+
+Shape = dict[str, float]
+
+
+class Form(ABC):
+    """An effect as it truly acts.
+
+    Attributes
+    ----------
+    name
+        Id of the catalogue's effect that it is a form of, or a name of its own where there is none.
+    known
+        Whether the catalogue holds it.
+    stage
+        Where it acts, as the catalogue names it.
+    form
+        What this form is, in a word or two.
+    unit
+        Of the amplitude in the catalogue's definition; "" where the form has no such amplitude.
+    demands
+        What the programmes must hold for it to show.
+    faces
+        Whether it needs a sensor on both faces.
+    records
+        Columns that are recorded, for it to be told.
+    several_runs
+        Whether one run can't show it.
+    horizontal
+        Whether the input axis must lie east or west.
+    quick_plant
+        Whether the unit must be light.
+    """
+
+    name: ClassVar[str]
+    known: ClassVar[bool] = True
+    stage: ClassVar[str] = "bias"
+    form: ClassVar[str] = ""
+    unit: ClassVar[str] = ""
+    demands: ClassVar[Demands] = Demands()
+    faces: ClassVar[bool] = False
+    records: ClassVar[tuple[str, ...]] = ()
+    several_runs: ClassVar[bool] = False
+    horizontal: ClassVar[bool] = False
+    quick_plant: ClassVar[bool] = False
+
+    @abstractmethod
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Shape parameters, continuous over the catalogue's ranges."""
+
+
+class Additive(Form):
+    """Adds to the output in proportion to its amplitude."""
+
+    @abstractmethod
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Change of the output per unit of amplitude [deg/h], shape (n,).
+
+        `rng` is the same for every call on one run.
+        """
+
+
+class ScaleFactor(Additive):
+    """Adds to the scale factor error [ppm]."""
+
+    stage: ClassVar[str] = "scale_factor"
+    demands: ClassVar[Demands] = Demands(turns=True)
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Change of the output per unit of amplitude [deg/h], shape (n,)."""
+        return 1e-6 * world.rate_deg_h * self.error(world, shape)
+
+    @abstractmethod
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """Scale factor error per unit of amplitude [ppm], shape (n,)."""
+
+
+class Distorting(Form):
+    """Changes the noise-free output as a whole; not linear in its amplitude, which has the sign +."""
+
+    greatest: ClassVar[float] = 100.0
+    """The largest amplitude that is tried."""
+
+    @abstractmethod
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """The output [deg/h] that comes of a noise-free `output` [deg/h], shape (n,)."""
+
+
+class Sensing(Form):
+    """Falsifies what the coil's sensors feel; not linear in its amplitude, which has the sign +."""
+
+    stage: ClassVar[str] = "sensor"
+    greatest: ClassVar[float] = 100.0
+
+    @abstractmethod
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """What the coil sensor `name` feels where it would feel `temperature` [degC], shape (n,)."""

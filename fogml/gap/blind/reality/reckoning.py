@@ -1,0 +1,161 @@
+"""What a perfect diagnosis would find: the true structural gap, its segments, what the true form closes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.gap.blind.reality import nominal
+from fogml.gap.blind.reality.form import Additive, Distorting
+from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.reality.strength import Acting, Scales, falsified
+from fogml.gap.blind.reality.unit import Unit, UnitRun
+from fogml.gap.blind.reality.whitening import Projected, Whitening
+
+AVERAGING_S = 100.0
+_SHORTEST_S = 600.0
+
+
+@dataclass(frozen=True)
+class Closing:
+    """Rms values in deg/h over averages of `AVERAGING_S` on one held-out run."""
+
+    run: str
+    recalibrated: float
+    after: float
+    floor: float
+    closed: float | None
+
+
+class Reckoning:
+    """All effects of a case together.
+
+    Attributes
+    ----------
+    contributions
+        By run name and place in `effects` [deg/h], shape (n,).
+    d_prime
+        Of all effects together.
+    """
+
+    def __init__(self, scales: Scales, effects: tuple[Acting, ...]) -> None:
+        self.unit, self.effects, self._scales = scales.unit, effects, scales
+        unit = self.unit
+        self._width = max(round(AVERAGING_S / unit.sample_s), 1)
+        self._projected = scales.projected(effects)
+        self.contributions = {
+            (run.name, place): effect.contribution(unit, run)
+            for run in (*unit.fit, *unit.held_out)
+            for place, effect in enumerate(effects)
+        }
+        self._totals = [self.total(run.name, len(run.world.time)) for run in unit.fit]
+        self.d_prime = self._projected.length(self._totals) if effects else 0.0
+
+    def total(self, run: str, count: int) -> FloatArray:
+        """Contribution of all effects to a run [deg/h], shape (count,)."""
+        parts = [s for (name, _), s in self.contributions.items() if name == run]
+        return np.asarray(sum(parts, np.zeros(count)))
+
+    def segments(self) -> list[tuple[str, float, float]]:
+        """(run, from s, to s) where 100 s averages of the true structural gap exceed the floor.
+
+        The structural gap is what is left of the contributions once the nominal constants took up
+        their part; the floor is what the noise leaves after the same.
+        """
+        if not self.effects:
+            return []
+        theta = self._projected.constants(self._totals)
+        found = []
+        for run, total, columns, whitening in zip(
+            self.unit.fit, self._totals, self._projected.columns, self._scales.whitenings
+        ):
+            gap = means(total - columns @ theta, self._width)
+            taken = means(columns, self._width) @ np.linalg.cholesky(_positive(self._projected.covariance))
+            square = whitening.mean_square_of_means(self._width) - float(np.mean(np.sum(taken**2, axis=1)))
+            floor = np.sqrt(max(square, whitening.white / self._width))
+            block = self._width * self.unit.sample_s
+            start = float(run.world.time[0])
+            for first, stop in runs_of(np.abs(gap) > floor):
+                if (stop - first) * block >= _SHORTEST_S:
+                    found.append((run.name, start + first * block, start + stop * block))
+        return found
+
+    def closing(self) -> list[Closing]:
+        """What the true signatures, fitted on the fit runs with the nominal constants, close."""
+        unit, noisy = self.unit, {}
+        for run in (*unit.fit, *unit.held_out):
+            noisy[run.name] = self._gap(run.name)
+        fit = [noisy[r.name][0] for r in unit.fit]
+        plain = [noisy[r.name][1] for r in unit.fit]
+        names = nominal.columns(unit.seen(unit.fit[0]))[0]
+        sd = np.array([nominal.PRIOR_SD[name] for name in names])
+        theta = Projected(self._scales.whitenings, plain).constants(fit, sd)
+        wide = [np.concatenate([x, self._signatures(r.name)], 1) for x, r in zip(plain, unit.fit)]
+        loose = np.concatenate([sd, np.full(len(self.effects), np.inf)])
+        both = Projected(self._scales.whitenings, wide).constants(fit, loose)
+        return [self._closed(r.name, noisy[r.name], theta, both) for r in unit.held_out]
+
+    def _closed(
+        self, name: str, noisy: tuple[FloatArray, FloatArray], theta: FloatArray, both: FloatArray
+    ) -> Closing:
+        gap, columns = noisy
+        whitening = Whitening(self.unit.noise, len(gap), self.unit.sample_s)
+        recalibrated = mean_square(gap - columns @ theta, self._width)
+        after = mean_square(gap - np.concatenate([columns, self._signatures(name)], 1) @ both, self._width)
+        floor = whitening.mean_square_of_means(self._width)
+        white = whitening.white / self._width
+        blocks = len(gap) // self._width
+        # The slow part of the noise has about two degrees of freedom in a run.
+        spread = np.sqrt(2.0 * white**2 / blocks + (floor - white) ** 2)
+        gained = recalibrated - floor
+        closed = (recalibrated - after) / gained if self.effects and gained > 1.645 * spread else None
+        return Closing(
+            name, float(np.sqrt(recalibrated)), float(np.sqrt(after)), float(np.sqrt(floor)), closed
+        )
+
+    def _signatures(self, name: str) -> FloatArray:
+        series = [self.contributions[name, place] for place in range(len(self.effects))]
+        count = len(next(r for r in (*self.unit.fit, *self.unit.held_out) if r.name == name).world.time)
+        return np.stack(series, axis=1) if series else np.empty((count, 0))
+
+    def _gap(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Recorded output less the rate about the input axis, and the nominal columns of the record."""
+        unit = self.unit
+        run = next(r for r in (*unit.fit, *unit.held_out) if r.name == name)
+        columns = nominal.columns(unit.seen(run, falsified(unit, run, self.effects)))[1]
+        return recorded_output(unit, run, self.effects) - run.world.rate_deg_h, columns
+
+
+def recorded_output(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> FloatArray:
+    """The gyro's record [deg/h]: nominal, additive effects, distortions, noise; shape (n,)."""
+    output = unit.output(run)
+    for effect in effects:
+        if isinstance(effect.form, Additive):
+            output = output + effect.contribution(unit, run)
+    for effect in effects:
+        if isinstance(effect.form, Distorting):
+            output = effect.form.distorted(output, run.world, effect.amplitude, effect.shape)
+    return np.asarray(output + run.noise)
+
+
+def means(x: FloatArray, width: int) -> FloatArray:
+    """Means over whole blocks of `width` rows."""
+    blocks = len(x) // width
+    return np.asarray(x[: blocks * width].reshape(blocks, width, *x.shape[1:]).mean(axis=1))
+
+
+def mean_square(x: FloatArray, width: int) -> float:
+    """Mean square of the means over blocks."""
+    return float(np.mean(means(x, width) ** 2))
+
+
+def runs_of(flags: FloatArray) -> list[tuple[int, int]]:
+    """(first, stop) of each stretch of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
+    return list(zip(edges[::2].tolist(), edges[1::2].tolist()))
+
+
+def _positive(matrix: FloatArray) -> FloatArray:
+    """A covariance with enough on its diagonal for a Cholesky factor."""
+    return matrix + np.diag(1e-9 * np.diag(matrix) + 1e-300)

@@ -1,0 +1,114 @@
+"""How strongly an effect shows: its contribution, its d', and the amplitude that gives a wanted d'."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.gap.blind.reality import nominal
+from fogml.gap.blind.reality.form import Additive, Distorting, Form, Sensing, Shape
+from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.reality.unit import Unit, UnitRun
+from fogml.gap.blind.reality.whitening import Projected, Whitening
+
+_LEAST_OUTSIDE = 0.02
+"""Share of an effect's whitened length that must lie outside the nominal constants' span."""
+_TOLERANCE = 1e-4
+
+
+class TooWeak(Exception):
+    """This unit can't show the effect at the wanted strength."""
+
+
+@dataclass(frozen=True, eq=False)
+class Acting:
+    """One effect at work on a unit: its form, shape and amplitude (0 before it is set)."""
+
+    form: Form
+    shape: Shape
+    amplitude: float = 0.0
+    d_prime: float = 0.0
+
+    def contribution(self, unit: Unit, run: UnitRun) -> FloatArray:
+        """What the gap of a run holds of it [deg/h], shape (n,)."""
+        form, world = self.form, run.world
+        if isinstance(form, Additive):
+            return self.amplitude * form.response(world, self.shape, np.random.default_rng(run.seed))
+        if isinstance(form, Distorting):
+            output = unit.output(run)
+            return form.distorted(output, world, self.amplitude, self.shape) - output
+        felt = falsified(unit, run, (self,))
+        trusted = nominal.output(unit.constants, unit.seen(run))
+        return trusted - nominal.output(unit.constants, unit.seen(run, felt))
+
+
+def falsified(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> dict[str, FloatArray]:
+    """What the sensors feel with all `effects` that act on them [degC]."""
+    felt = dict(run.sensed.felt)
+    for effect in effects:
+        if isinstance(effect.form, Sensing) and effect.amplitude > 0.0:
+            for name in unit.instruments.coil:
+                felt[name] = effect.form.felt(name, felt[name], run.world, effect.amplitude, effect.shape)
+    return felt
+
+
+class Scales:
+    """Measures contributions on a unit's fit runs by the true whitening."""
+
+    def __init__(self, unit: Unit) -> None:
+        self.unit = unit
+        self.whitenings = [Whitening(unit.noise, len(r.world.time), unit.sample_s) for r in unit.fit]
+
+    def projected(self, effects: tuple[Acting, ...] = ()) -> Projected:
+        """Nominal columns as a replay has them, from what the sensors recorded under `effects`."""
+        unit = self.unit
+        columns = [nominal.columns(unit.seen(r, falsified(unit, r, effects)))[1] for r in unit.fit]
+        return Projected(self.whitenings, columns)
+
+    def d_prime(self, effect: Acting, projected: Projected | None = None) -> float:
+        """||W (I - P) s|| over the fit runs."""
+        projected = projected or self.projected((effect,) if isinstance(effect.form, Sensing) else ())
+        return projected.length([effect.contribution(self.unit, r) for r in self.unit.fit])
+
+    def with_strength(self, form: Form, shape: Shape, sign: float, wanted: float) -> Acting:
+        """The effect at the amplitude that gives d' = `wanted`, by bisection where it is not linear.
+
+        Raises
+        ------
+        TooWeak
+            If no amplitude does, or the effect lies in the span of the nominal constants.
+        """
+        if isinstance(form, Additive):
+            one = Acting(form, shape, 1.0)
+            projected = self.projected()
+            series = [one.contribution(self.unit, r) for r in self.unit.fit]
+            length = projected.length(series)
+            whole = sum(float(s @ w.solve(s[:, None])[:, 0]) for s, w in zip(series, self.whitenings))
+            if not length > _LEAST_OUTSIDE * np.sqrt(whole):
+                raise TooWeak(form.name)
+            return replace(one, amplitude=sign * wanted / length, d_prime=wanted)
+        return self._bisected(form, shape, wanted)
+
+    def _bisected(self, form: Form, shape: Shape, wanted: float) -> Acting:
+        assert isinstance(form, Distorting | Sensing)
+        fixed = self.projected() if isinstance(form, Distorting) else None
+
+        def at(log_amplitude: float) -> float:
+            return self.d_prime(Acting(form, shape, float(np.exp(log_amplitude))), fixed)
+
+        high = float(np.log(form.greatest))
+        low = high - np.log(1e6)
+        if at(high) < wanted or at(low) > wanted:
+            raise TooWeak(form.name)
+        reached = np.inf
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            reached = at(middle)
+            low, high = (middle, high) if reached < wanted else (low, middle)
+            if abs(reached / wanted - 1.0) < _TOLERANCE:
+                break
+        if abs(reached / wanted - 1.0) > 0.01:
+            # A form with steps jumps over the wanted strength.
+            raise TooWeak(form.name)
+        return Acting(form, shape, float(np.exp(middle)), reached)
