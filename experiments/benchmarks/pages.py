@@ -39,9 +39,22 @@ def results_page(results: Mapping[str, Any]) -> str:
     ]
     for left in results["skipped"]:
         lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
+    for entry in results.get("merged", []):
+        lines += ["", _measured_later(entry, machine["versions"], results["repeats"])]
     busiest = max((job["load"] for job in results["jobs"]), default=0.0)
     lines += ["", f"Greatest load of the machine before a job: {busiest:.1f}."]
     return "\n".join(lines) + "\n"
+
+
+def _measured_later(entry: Mapping[str, Any], versions: Mapping[str, str], repeats: int) -> str:
+    """How jobs that were merged in were measured, where it differs from the rest."""
+    machine = entry["machine"]
+    changed = [
+        f"{name} {number}" for name, number in machine["versions"].items() if versions.get(name) != number
+    ]
+    differs = [*changed, *([f"{entry['repeats']} pairs"] if entry["repeats"] != repeats else [])]
+    told = f"; {', '.join(differs)}" if differs else ""
+    return f"{', '.join(entry['jobs'])}: `{entry['command']}` on the same machine, {machine['date']}{told}."
 
 
 def _seconds(spread: Mapping[str, Any]) -> str:

@@ -1,7 +1,8 @@
-"""Measure speed and memory: ``python -m experiments.benchmarks [--quick] [--only NAME] [--big] [--out DIR]``.
+"""Measure speed and memory: ``python -m experiments.benchmarks [--quick] [--only NAME] [--big] [--merge]``.
 
-Writes ``results.json`` and ``results.md`` beside this file, or into DIR. Run it on a machine that
-does nothing else. Exit 1: a limit was not met.
+Writes ``results.json`` and ``results.md`` beside this file, or into ``--out DIR``. With ``--merge``
+the jobs measured take their places among the results that are there. Run it on a machine that does
+nothing else. Exit 1: a limit was not met.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from typing import Any
 from experiments.benchmarks import harness
 from experiments.benchmarks.jobs import JOBS
 from experiments.benchmarks.machine import describe_machine
+from experiments.benchmarks.merging import kept_results, merged
 from experiments.benchmarks.pages import results_page
 
 
@@ -32,6 +34,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "--out",
         type=Path,
         help="folder for results.json and results.md (this one, for all jobs at full size)",
+    )
+    parser.add_argument(
+        "--merge", action="store_true", help="put these jobs into the results that are there, keep the rest"
     )
     parser.add_argument("--list", action="store_true", help="names and titles of the jobs")
     parser.add_argument("--peak", metavar="NAME", help=argparse.SUPPRESS)
@@ -53,9 +58,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
     chosen = (
         [jobs[name] for name in asked.only] if asked.only else [j for j in JOBS if asked.big or not j.big]
     )
-    results = _measure(chosen, asked)
     # What is kept beside the code is the whole, at full size.
-    out = asked.out or (None if asked.quick or asked.only else Path(__file__).parent)
+    out = asked.out or (None if asked.quick or (asked.only and not asked.merge) else Path(__file__).parent)
+    kept = None
+    if asked.merge:
+        if out is None:
+            parser.error("--merge with --quick needs an --out: what is kept beside the code is at full size")
+        try:
+            kept = kept_results(out / "results.json", quick=asked.quick)
+        except ValueError as error:
+            parser.error(str(error))
+    results = _measure(chosen, asked)
+    if kept is not None:
+        results = merged(kept, results, [job.name for job in JOBS])
     if out:
         out.mkdir(parents=True, exist_ok=True)
         text = json.dumps(results, indent=2, allow_nan=False, ensure_ascii=False)
@@ -80,6 +95,7 @@ def _measure(jobs: Sequence[harness.Job], asked: argparse.Namespace) -> dict[str
     words = ["python -m experiments.benchmarks"]
     words += [flag for flag, given in (("--quick", asked.quick), ("--big", asked.big)) if given]
     words += [f"--only {name}" for name in asked.only or []]
+    words += ["--merge"] if asked.merge else []
     return {
         "schema": "fogml.benchmarks/1",
         "command": " ".join(words),

@@ -125,7 +125,37 @@ def test_what_is_missing_is_said(
     assert left["reason"] in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("arguments", [["--only", "nonsense"], ["--repeats", "3"]])
+def test_a_job_measured_on_its_own_takes_its_place_among_the_rest(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    def quick(*names: str, merge: bool = True) -> dict:
+        only = [word for name in names for word in ("--only", name)]
+        words = ["--quick", *only, "--repeats", "1", "--out", str(tmp_path), *(["--merge"] if merge else [])]
+        assert run.main(words) == 0
+        return json.loads((tmp_path / "results.json").read_text(encoding="utf-8"))
+
+    with pytest.raises(SystemExit):
+        quick("import")
+    assert "holds no results" in capsys.readouterr().err
+    first = quick("allan-octaves", "import", merge=False)
+    both = quick("csv")
+    assert [job["name"] for job in both["jobs"]] == ["csv", "allan-octaves", "import"]
+    assert [both["jobs"][i] for i in (1, 2)] == first["jobs"]
+    again = quick("csv", "import")
+    assert [entry["jobs"] for entry in again["merged"]] == [["csv", "import"]]
+    assert again["jobs"][1] == first["jobs"][0] and again["jobs"][2] != first["jobs"][1]
+    page = (tmp_path / "results.md").read_text(encoding="utf-8")
+    assert "csv, import: `python -m experiments.benchmarks --quick --only csv --only import --merge`" in page
+    foreign = {**again, "machine": {**again["machine"], "processor": "another"}}
+    (tmp_path / "results.json").write_text(json.dumps(foreign), encoding="utf-8")
+    with pytest.raises(SystemExit):
+        quick("import")
+    assert "another machine" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments", [["--only", "nonsense"], ["--repeats", "3"], ["--quick", "--merge", "--only", "import"]]
+)
 def test_bad_usage(arguments: list[str], capsys: pytest.CaptureFixture[str]):
     with pytest.raises(SystemExit) as stopped:
         run.main(arguments)

@@ -1,0 +1,61 @@
+"""Jobs measured on their own, put into results that are there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.benchmarks.machine import describe_machine
+
+SAME = ("processor", "cores", "memory_gb", "system", "python")
+"""What must be the same of the machine: figures of two machines in one table would mislead."""
+
+
+def kept_results(path: Path, *, quick: bool) -> dict[str, Any]:
+    """The results in a file, which were measured on this machine.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or they are of another machine or size.
+    """
+    try:
+        kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise ValueError(f"--merge: {path} holds no results ({error})") from None
+    here = describe_machine()
+    other = [name for name in SAME if kept["machine"][name] != here[name]]
+    if other:
+        told = ", ".join(f"{name} {kept['machine'][name]}, here {here[name]}" for name in other)
+        raise ValueError(f"--merge: {path} was measured on another machine: {told}; measure all jobs here")
+    if kept["quick"] != quick:
+        raise ValueError(f"--merge: {path} is of {'small' if kept['quick'] else 'full'} size")
+    return kept
+
+
+def merged(kept: Mapping[str, Any], new: Mapping[str, Any], order: Sequence[str]) -> dict[str, Any]:
+    """Results with the jobs of the new ones in their places, and how those were measured.
+
+    Parameters
+    ----------
+    kept, new
+        Results as ``results.json`` holds them.
+    order
+        Names of all jobs in the order of the page.
+    """
+    names = [job["name"] for job in new["jobs"]]
+    jobs = {job["name"]: job for job in (*kept["jobs"], *new["jobs"])}
+    later = [
+        {**entry, "jobs": [name for name in entry["jobs"] if name not in names]}
+        for entry in kept.get("merged", [])
+    ]
+    how = {"jobs": names, **{key: new[key] for key in ("command", "machine", "repeats")}}
+    skipped = [left for left in (*kept["skipped"], *new["skipped"]) if left["name"] not in jobs]
+    return {
+        **kept,
+        "jobs": [jobs[name] for name in order if name in jobs],
+        "skipped": list({left["name"]: left for left in skipped}.values()),
+        "merged": [*(entry for entry in later if entry["jobs"]), *([how] if names else [])],
+    }
