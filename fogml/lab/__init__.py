@@ -1,1 +1,1 @@
-"""The laboratory's procedures: scale factor and misalignment, north seeking, what a drift costs in navigation."""
+"""The laboratory's procedures: misalignment, north seeking, what a drift costs in navigation."""

@@ -13,20 +13,25 @@ University), with a constant column over the tilts for a fixture that is tilted 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from scipy import stats
 
 from fogml.errors import InputError
+from fogml.lab.misalignment_errors import (
+    ROUND_OFF,
+    Region,
+    Slopes,
+    StateFit,
+    covariance_of,
+    errors_of,
+    slope_noise,
+)
 from fogml.runs.run import FloatArray
 
 STATES = (1, 2, 3, 4)
-LEVEL = 0.95
-"""Confidence of intervals and of the region."""
 _CROSS_TILT_TEST = 0.01
-_LEAST_DOF = 4
-_ROUND_OFF = 1e-11
 
 
 @dataclass(frozen=True)
@@ -55,36 +60,6 @@ class TableMeasurements:
     output: FloatArray
     unit: str
     source: str = "measurements"
-
-
-@dataclass(frozen=True)
-class StateFit:
-    """One state's slopes over its tilts.
-
-    ``tilts_deg``, ``slopes`` and ``residuals`` of shape (m,), slopes in output per deg/s;
-    ``coefficients`` c_c, c_s and, with a cross tilt, the constant.
-    """
-
-    state: int
-    tilts_deg: FloatArray
-    slopes: FloatArray
-    residuals: FloatArray
-    coefficients: FloatArray
-    design: FloatArray = field(repr=False)
-
-
-@dataclass(frozen=True)
-class Region:
-    """Joint confidence region of (dx, dy): an ellipse about the estimate.
-
-    Half-axes [deg], the angle of the longer one from the x axis [deg], the level, and points of the
-    outline, shape (k, 2) [deg].
-    """
-
-    level: float
-    half_axes_deg: tuple[float, float]
-    angle_deg: float
-    outline_deg: FloatArray
 
 
 @dataclass(frozen=True)
@@ -138,15 +113,6 @@ class Misalignment:
     notes: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Slopes:
-    tilts: FloatArray
-    values: FloatArray
-    squares: float
-    dof: int
-    inverse_spread: float
-
-
 def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Misalignment:
     """Scale factor and misalignment from all four states.
 
@@ -171,12 +137,13 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
     fits = tuple(_fit(state, slopes[state], cross_tilt) for state in STATES)
     c = np.array([fit.coefficients[:2] for fit in fits])
     values = _solve(c)
-    rate_noise, tilt_noise, variance, dof, notes = _noise(slopes, fits)
-    se, intervals, region = None, {}, None
+    rate_noise, tilt_noise, variance, dof, notes = slope_noise(slopes, fits)
+    se, region = None, None
+    intervals: dict[str, tuple[float, float]] = {}
     covariance = None
     if variance is not None:
-        covariance = _covariance(c, fits, variance)
-        se, intervals, region = _errors(values, covariance, dof)
+        covariance = covariance_of(_solve, c, fits, variance)
+        se, intervals, region = errors_of(values, covariance, dof)
     across, more = _cross_tilt_angle(fits, values, covariance) if cross_tilt else (None, ())
     return Misalignment(
         K=float(values[0]),
@@ -226,7 +193,7 @@ def fit_state(measured: TableMeasurements, state: int, cross_tilt: bool = False)
     return _fit(state, slopes, cross_tilt)
 
 
-def _slopes(measured: TableMeasurements, state: int) -> _Slopes:
+def _slopes(measured: TableMeasurements, state: int) -> Slopes:
     """Slopes over the table rate per tilt, by least squares with an intercept where rates differ.
 
     The intercept takes what is even in the rate: the horizontal part of the Earth rate.
@@ -237,7 +204,7 @@ def _slopes(measured: TableMeasurements, state: int) -> _Slopes:
     count = np.bincount(group).astype(np.float64)
 
     def sums(values: FloatArray) -> FloatArray:
-        return np.bincount(group, weights=values)
+        return np.asarray(np.bincount(group, weights=values), dtype=np.float64)
 
     mean_rate, mean_output = sums(rate) / count, sums(output) / count
     centred = rate - mean_rate[group]
@@ -251,7 +218,7 @@ def _slopes(measured: TableMeasurements, state: int) -> _Slopes:
     level = np.where(single, 0.0, mean_output)
     residuals = output - level[group] - values[group] * centred
     dof = int((count - np.where(single, 1.0, 2.0)).sum())
-    return _Slopes(tilts, values, float(residuals @ residuals), dof, float(np.mean(1.0 / spread)))
+    return Slopes(tilts, values, float(residuals @ residuals), dof, float(np.mean(1.0 / spread)))
 
 
 def _check_tilts(source: str, state: int, tilts: FloatArray, cross_tilt: bool) -> None:
@@ -261,8 +228,8 @@ def _check_tilts(source: str, state: int, tilts: FloatArray, cross_tilt: bool) -
         what = f"{needed} tilts that differ (say 0, 30, 60 and 90 deg)"
         held = ", ".join(f"{tilt:g}" for tilt in tilts[:12])
         raise InputError(
-            f"{source}, column 'tilt', state {state}: only tilt {held} deg; at least {what} are needed to tell "
-            "scale factor and misalignment apart"
+            f"{source}, column 'tilt', state {state}: only tilt {held} deg; at least {what} are "
+            "needed to tell scale factor and misalignment apart"
         )
 
 
@@ -274,27 +241,27 @@ def _design(tilts_deg: FloatArray, cross_tilt: bool) -> FloatArray:
     return np.column_stack(columns)
 
 
-def _fit(state: int, slopes: _Slopes, cross_tilt: bool) -> StateFit:
+def _fit(state: int, slopes: Slopes, cross_tilt: bool) -> StateFit:
     design = _design(slopes.tilts, cross_tilt)
-    coefficients = np.linalg.lstsq(design, slopes.values, rcond=None)[0]
+    coefficients = np.asarray(np.linalg.lstsq(design, slopes.values, rcond=None)[0], dtype=np.float64)
     residuals = slopes.values - design @ coefficients
     return StateFit(state, slopes.tilts, slopes.values, residuals, coefficients, design)
 
 
-def _shows_cross_tilt(slopes: Mapping[int, _Slopes]) -> bool:
+def _shows_cross_tilt(slopes: Mapping[int, Slopes]) -> bool:
     """Whether constants over the tilts of the four states lower the residuals beyond chance (F test)."""
     if any(len(np.unique(s.tilts)) < 4 for s in slopes.values()):
         return False
     plain = [_fit(state, s, False) for state, s in slopes.items()]
     wide = [_fit(state, s, True) for state, s in slopes.items()]
     scale = max(float(np.abs(s.values).max()) for s in slopes.values())
-    if max(abs(float(fit.coefficients[2])) for fit in wide) < _ROUND_OFF * scale:
+    if max(abs(float(fit.coefficients[2])) for fit in wide) < ROUND_OFF * scale:
         return False
     before = sum(float(fit.residuals @ fit.residuals) for fit in plain)
     after = sum(float(fit.residuals @ fit.residuals) for fit in wide)
     dof = sum(len(fit.residuals) - 3 for fit in wide)
-    if after <= (_ROUND_OFF * scale) ** 2 * dof:
-        return before > (_ROUND_OFF * scale) ** 2 * dof
+    if after <= (ROUND_OFF * scale) ** 2 * dof:
+        return before > (ROUND_OFF * scale) ** 2 * dof
     ratio = (before - after) / len(wide) / (after / dof)
     return bool(stats.f.sf(ratio, len(wide), dof) < _CROSS_TILT_TEST)
 
@@ -316,104 +283,6 @@ def _solve(c: FloatArray) -> FloatArray:
 
 def _half(angle: FloatArray) -> FloatArray:
     return np.asarray(np.angle(np.exp(1j * angle)) / 2.0)
-
-
-def _noise(
-    slopes: Mapping[int, _Slopes], fits: tuple[StateFit, ...]
-) -> tuple[float | None, float | None, float | None, int, tuple[str, ...]]:
-    """Noise of a slope by the rates and by the tilts, the variance to use, its degrees of freedom, notes."""
-    dof_rates = sum(s.dof for s in slopes.values())
-    per_output = sum(s.squares for s in slopes.values()) / dof_rates if dof_rates else None
-    by_rates = (
-        per_output * float(np.mean([s.inverse_spread for s in slopes.values()])) if per_output else None
-    )
-    dof_tilts = sum(len(fit.residuals) - fit.design.shape[1] for fit in fits)
-    by_tilts = sum(float(fit.residuals @ fit.residuals) for fit in fits) / dof_tilts if dof_tilts else None
-    told = tuple(np.sqrt(v) if v is not None else None for v in (by_rates, by_tilts))
-    if by_tilts is not None and dof_tilts >= _LEAST_DOF:
-        # These hold errors of the tilt settings too, which no line over the rates can see.
-        notes: tuple[str, ...] = ()
-        scale = max(float(np.abs(fit.slopes).max()) for fit in fits)
-        real = by_tilts > (_ROUND_OFF * scale) ** 2
-        if real and by_rates and by_tilts > stats.f.isf(0.01, dof_tilts, dof_rates) * by_rates:
-            notes = (
-                "slopes scatter over the tilts more than noise explains: errors of the tilt settings, "
-                "or drift between the tilts; the standard errors hold them",
-            )
-        return told[0], told[1], by_tilts, dof_tilts, notes
-    dof = dof_tilts + dof_rates
-    if dof == 0:
-        return (
-            told[0],
-            told[1],
-            None,
-            0,
-            ("no standard errors: nothing is left over; take more tilts or rates",),
-        )
-    variance = ((by_tilts or 0.0) * dof_tilts + (by_rates or 0.0) * dof_rates) / dof
-    note = (
-        "few tilts: standard errors rest on the scatter over the rates and miss errors of the tilt settings"
-    )
-    return told[0], told[1], variance, dof, (note,)
-
-
-def _covariance(c: FloatArray, fits: tuple[StateFit, ...], variance: float) -> FloatArray:
-    """Covariance of what `_solve` gives, by central differences."""
-    jacobian = np.empty((6, 8))
-    step = 1e-6 * float(np.abs(c).max())
-    for i in range(8):
-        moved = np.zeros(8)
-        moved[i] = step
-        up, down = _solve(c + moved.reshape(4, 2)), _solve(c - moved.reshape(4, 2))
-        jacobian[:, i] = (up - down) / (2.0 * step)
-    blocks = np.zeros((8, 8))
-    for i, fit in enumerate(fits):
-        inverse = np.linalg.inv(fit.design.T @ fit.design)
-        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = variance * inverse[:2, :2]
-    return np.asarray(jacobian @ blocks @ jacobian.T)
-
-
-def _errors(
-    values: FloatArray, covariance: FloatArray, dof: int
-) -> tuple[dict[str, float | list[float]], dict[str, tuple[float, float]], Region]:
-    sd = np.sqrt(np.diag(covariance))
-    region = _region(values[1:3], covariance[1:3, 1:3], dof)
-    factor = float(stats.t.isf((1.0 - LEVEL) / 2.0, dof))
-    names = ("K", "delta_x_deg", "delta_y_deg")
-    intervals = {
-        n: (float(values[i] - factor * sd[i]), float(values[i] + factor * sd[i])) for i, n in enumerate(names)
-    }
-    # The angle can't be negative: its interval is what the joint region of dx and dy spans.
-    sines = np.sin(np.radians(region.outline_deg))
-    angles = np.degrees(np.arcsin(np.minimum(np.hypot(sines[:, 0], sines[:, 1]), 1.0)))
-    inside = _holds_zero(values[1:3], covariance[1:3, 1:3], dof)
-    intervals["delta_deg"] = (0.0 if inside else float(angles.min()), float(angles.max()))
-    se: dict[str, float | list[float]] = {n: float(sd[i]) for i, n in enumerate(names)}
-    gradient_free = inside or sd[3] == 0.0
-    se["delta_deg"] = float(np.hypot(sd[1], sd[2]) / np.sqrt(2.0)) if gradient_free else float(sd[3])
-    se["fixture_error_deg"] = [float(sd[4]), float(sd[5])]
-    return se, intervals, region
-
-
-def _holds_zero(centre: FloatArray, covariance: FloatArray, dof: int) -> bool:
-    """Whether the region about an estimate holds zero misalignment."""
-    if not np.linalg.det(covariance) > 0.0:
-        return not centre.any()
-    return bool(centre @ np.linalg.solve(covariance, centre) <= _region_factor(dof))
-
-
-def _region_factor(dof: int) -> float:
-    return 2.0 * float(stats.f.isf(1.0 - LEVEL, 2, dof))
-
-
-def _region(centre: FloatArray, covariance: FloatArray, dof: int) -> Region:
-    squares, axes = np.linalg.eigh(covariance)
-    half = np.sqrt(np.maximum(squares, 0.0) * _region_factor(dof))
-    turn = np.linspace(0.0, 2.0 * np.pi, 121)
-    outline = centre + (np.column_stack([np.cos(turn), np.sin(turn)]) * half) @ axes.T
-    long = axes[:, 1]
-    angle = float(np.degrees(np.arctan2(long[1], long[0]))) % 180.0
-    return Region(LEVEL, (float(half[1]), float(half[0])), angle, outline)
 
 
 def _cross_tilt_angle(

@@ -61,8 +61,9 @@ def _cells(table: RawTable) -> dict[str, str]:
     if missing:
         held = ", ".join(f"'{name}'" for name in list(cells)[:20])
         raise InputError(
-            f"{table.file}: no column {', '.join(repr(name) for name in missing)}; the procedure needs 'state', "
-            f"'tilt [deg]', 'rate [deg/s]', 'segment' and 'output' with its unit; the header holds {held}"
+            f"{table.file}: no column {', '.join(repr(name) for name in missing)}; the procedure needs "
+            f"'state', 'tilt [deg]', 'rate [deg/s]', 'segment' and 'output' with its unit; "
+            f"the header holds {held}"
         )
     return cells
 
@@ -129,8 +130,8 @@ def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
         marks = np.array([str(value).strip().lower() for value in column])
     else:
         raise InputError(
-            f"{table.file}: text in column 'segment' is read from CSV and Parquet files; export it as one, or "
-            "leave the column out, and segments are found from the rate"
+            f"{table.file}: text in column 'segment' is read from CSV and Parquet files; export it as "
+            "one, or leave the column out, and segments are found from the rate"
         )
     if len(marks) != len(table):
         raise InputError(

@@ -7,14 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from fogml.lab.misalignment import LEVEL, TableMeasurements, decouple
+from fogml.lab.misalignment import TableMeasurements, decouple
+from fogml.lab.misalignment_errors import LEVEL
 from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
 
 SCHEMA = "fogml.misalignment/1"
 
 
 def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = None) -> dict[str, Any]:
-    """Scale factor and misalignment of a gyro, with the other methods beside, schema ``fogml.misalignment/1``.
+    """Scale factor and misalignment of a gyro, with the other methods beside, as ``fogml.misalignment/1``.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The other ways to a scale factor and a misalignment, for comparison: the classical test, one state alone."""
+"""Other ways to a scale factor and a misalignment, to compare: the classical test, one state alone."""
 
 from __future__ import annotations
 

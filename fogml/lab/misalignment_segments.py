@@ -209,8 +209,9 @@ def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
         side = "before" if not has_before[int(np.argmax(lonely))] else "after"
         raise InputError(
             f"{rows.source}, {rows.row_name(int(chunks.place[turn]))}: no rest {side} the turn at "
-            f"{chunks.rate_deg_s[turn]:.6g} deg/s (state {chunks.state[turn]:g}, tilt {chunks.tilt_deg[turn]:g} "
-            "deg); each turn needs a rest at the same state and tilt before and after it"
+            f"{chunks.rate_deg_s[turn]:.6g} deg/s (state {chunks.state[turn]:g}, tilt "
+            f"{chunks.tilt_deg[turn]:g} deg); each turn needs a rest at the same state and "
+            "tilt before and after it"
         )
     level = (chunks.before_mean[turns - 1] + chunks.after_mean[turns + 1]) / 2.0
     return TableMeasurements(

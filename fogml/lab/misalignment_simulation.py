@@ -85,7 +85,7 @@ def measurements(
     seed: int = 0,
     output_unit: str = "V",
 ) -> TableMeasurements:
-    """Turns of all states, tilts and rates, noise of a rest-corrected turn and of each tilt setting on top."""
+    """Turns of all states, tilts and rates, with noise of each turn and of each tilt setting."""
     random = np.random.default_rng(seed)
     state, tilt, rate = (
         v.ravel() for v in np.meshgrid(np.array(STATES, dtype=float), tilts_deg, rates_deg_s, indexing="ij")
@@ -126,7 +126,7 @@ def samples(
     one_tilt = np.concatenate(blocks)
     count = len(STATES) * len(tilts_deg)
     rate = np.tile(one_tilt, count)
-    time = sample_s * np.arange(len(rate))
+    time = np.asarray(sample_s * np.arange(len(rate)), dtype=np.float64)
     state = np.repeat(np.repeat(np.array(STATES, dtype=float), len(tilts_deg)), len(one_tilt))
     tilt = np.repeat(np.tile(np.asarray(tilts_deg, dtype=float), len(STATES)), len(one_tilt))
     axis = np.array([unit.input_axis(int(s)) for s in STATES])[state.astype(int) - 1]

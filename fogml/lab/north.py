@@ -1,17 +1,18 @@
-"""North seeking from several positions of one gyro with a horizontal input axis, and what a drift does to it.
+"""North seeking from positions of one gyro with a horizontal input axis, and what a drift does to it.
 
-With theta the azimuth clockwise from north, turned by angles a_j (clockwise s = +1, counter-clockwise s = -1)::
+With theta the azimuth clockwise from north, turned by angles a_j, s = +1 clockwise, s = -1 else::
 
     G_j = H cos(theta + s a_j) + D(t_j),      H = 15.041067 deg/h cos(latitude)
 
 Azimuth and offset are a least-squares solution; for 0, 90, 180, 270 deg clockwise it is
-theta = atan2(G4 - G2, G1 - G3). A drift adds p_c to H cos(theta) and p_s to H sin(theta), whatever theta is, so::
+theta = atan2(G4 - G2, G1 - G3). A drift adds p_c to H cos(theta) and p_s to H sin(theta), whatever theta,
+so::
 
     tan(error) = (p_s cos(theta) - p_c sin(theta)) / (H + p_c cos(theta) + p_s sin(theta))
 
-It is nothing at theta = atan2(p_s, p_c) and 180 deg further, and largest, asin(p / H), at +-acos(-p / H) from
-there. For a linear drift and four positions clockwise that is tan(error) = delta (A + B) / (R^2 + delta (A - B))
-of the patent, whose quiet azimuths are 135 and 315 deg.
+It is nothing at theta = atan2(p_s, p_c) and 180 deg further, and largest, asin(p / H), +-acos(-p / H) from
+there. For a linear drift and four positions clockwise it is
+tan(error) = delta (A + B) / (R^2 + delta (A - B)) of the patent, whose quiet azimuths are 135 and 315 deg.
 
 Source: the patent on north seeking at start-up, its formula worked out for any sense, order and drift.
 """
@@ -59,8 +60,8 @@ class Drift:
         for amplitude, constant in self.transients:
             if not (np.isfinite(amplitude) and np.isfinite(constant) and constant > 0.0):
                 raise InputError(
-                    f"transient of {amplitude:g} deg/h with {constant:g} s: finite numbers and a time constant "
-                    "above 0 are needed"
+                    f"transient of {amplitude:g} deg/h with {constant:g} s: finite numbers and a time "
+                    "constant above 0 are needed"
                 )
 
     def mean(self, start_s: FloatArray, stop_s: FloatArray) -> FloatArray:
@@ -131,14 +132,14 @@ class Scheme:
 
     @cached_property
     def design(self) -> FloatArray:
-        """Columns of H cos(theta), H sin(theta), the offset and, if observed, the drift, shape (m, 3 or 4)."""
+        """Columns of H cos(theta), H sin(theta), offset and, if observed, drift, shape (m, 3 or 4)."""
         begin, end = self.spans_s
         return design_matrix(self.order_deg, self.sense, (begin + end) / 2.0 if self.observes_drift else None)
 
     @cached_property
     def solver(self) -> FloatArray:
         """What the positions' means are multiplied with, shape (3 or 4, m)."""
-        return np.linalg.pinv(self.design)
+        return np.asarray(np.linalg.pinv(self.design))
 
     def outputs(self, azimuth_deg: float | FloatArray, horizontal_deg_h: float) -> FloatArray:
         """Outputs without drift [deg/h], shape (..., m)."""

@@ -255,9 +255,9 @@ def _notes(
     if abs(horizontal - expected) <= tolerance:
         return ()
     return (
-        f"the positions show {horizontal:.4g} deg/h of Earth rate, {expected:.4g} deg/h were expected at latitude "
-        f"{latitude:g} deg: the axis is not level, the scale factor is off, or the positions are not what they "
-        "are called",
+        f"the positions show {horizontal:.4g} deg/h of Earth rate, {expected:.4g} deg/h were expected at "
+        f"latitude {latitude:g} deg: the axis is not level, the scale factor is off, or the positions are "
+        "not what they are called",
     )
 
 

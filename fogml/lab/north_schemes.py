@@ -37,7 +37,7 @@ Way = Scheme | CoarseFine
 
 def ways_of_equal_time(
     plain: Scheme, *, coarse_dwell_s: float = 6.0, quiet_deg: float | None = None
-) -> dict[str, Way]:
+) -> tuple[dict[str, Way], dict[str, str]]:
     """Every way to use the time, transfers included, that a plain seek takes.
 
     Parameters
@@ -49,19 +49,28 @@ def ways_of_equal_time(
     quiet_deg
         Where the fine seek is done; the quiet azimuth of a linear drift if None.
 
-    Raises
-    ------
-    InputError
-        If the time does not suffice for one of them.
+    Returns
+    -------
+    ways, left_out
+        Each by its name: ``plain``, ``drift-observing``, ``palindrome``, ``coarse-fine``; and why one is
+        left out, where the time or the positions do not suffice for it.
     """
     plain = replace(plain, observes_drift=False)
     palindrome_order = (*plain.order_deg, *plain.order_deg[::-1])
-    return {
-        "plain": plain,
-        "drift-observing": replace(plain, observes_drift=True),
-        "palindrome": _filling(replace(plain, order_deg=palindrome_order), plain.duration_s),
-        "coarse-fine": coarse_fine(plain, plain.duration_s, coarse_dwell_s, quiet_deg),
+    makers: dict[str, Callable[[], Way]] = {
+        "plain": lambda: plain,
+        "drift-observing": lambda: replace(plain, observes_drift=True),
+        "palindrome": lambda: _filling(replace(plain, order_deg=palindrome_order), plain.duration_s),
+        "coarse-fine": lambda: coarse_fine(plain, plain.duration_s, coarse_dwell_s, quiet_deg),
     }
+    ways: dict[str, Way] = {}
+    left_out: dict[str, str] = {}
+    for name, make in makers.items():
+        try:
+            ways[name] = make()
+        except InputError as error:
+            left_out[name] = str(error)
+    return ways, left_out
 
 
 def coarse_fine(
@@ -73,12 +82,15 @@ def coarse_fine(
     fine = replace(plain, start_s=start)
     fine = _filling(fine, time_s - (start - plain.start_s))
     if quiet_deg is None:
-        quiet_deg = quiet_azimuths(fine)[0]
+        quiet = quiet_azimuths(fine)
+        if not quiet:
+            raise InputError("a linear drift does nothing in this order: there is no azimuth to turn to")
+        quiet_deg = quiet[0]
     return CoarseFine(coarse, fine, quiet_deg)
 
 
 def quiet_azimuths(scheme: Scheme, drift: Drift | None = None) -> tuple[float, ...]:
-    """Azimuths [deg] at which a drift, linear unless given, does nothing; none where it does nothing anywhere."""
+    """Azimuths [deg] at which a drift, linear unless given, does nothing; none if it never does anything."""
     return drift_error(scheme, drift or Drift(1e-3), 0.0).quiet_deg
 
 

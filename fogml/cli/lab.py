@@ -1,0 +1,143 @@
+"""``fogml lab``: procedures of a laboratory, misalignment and north seeking."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from fogml.cli import options
+from fogml.cli.terminal import Terminal
+
+app = typer.Typer(**options.APP_SETTINGS, no_args_is_help=True)
+
+
+@app.callback()
+def lab() -> None:
+    """Procedures of a laboratory: misalignment on a rate table, north seeking."""
+
+
+@app.command()
+def misalignment(
+    file: Annotated[
+        str | None,
+        typer.Argument(
+            metavar="FILE",
+            help="Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
+        ),
+    ] = None,
+    cross_tilt: Annotated[
+        bool | None,
+        typer.Option(
+            "--cross-tilt/--no-cross-tilt",
+            help="Fit a constant over the tilts for a fixture tilted across (where the data show one).",
+        ),
+    ] = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Scale factor and input-axis misalignment, decoupled over four mounting states.
+
+    With --out, writes misalignment.json, misalignment.html and config.yaml.
+    """
+    from fogml.cli.lab_misalignment_job import MisalignmentSettings, misalignment_and_write
+
+    settings = MisalignmentSettings.gather(
+        config,
+        {"file": file, "cross_tilt": cross_tilt, "out": str(out) if out else None, "seed": seed},
+    )
+    misalignment_and_write(settings, Terminal(as_json, quiet))
+
+
+@app.command()
+def north(
+    positions: Annotated[
+        str | None, typer.Option("--positions", metavar="FILE", help="A run with a column position, 1 to 4.")
+    ] = None,
+    azimuth: Annotated[
+        float | None, typer.Option("--azimuth", metavar="DEG", help="Simulate a seek at this azimuth.")
+    ] = None,
+    latitude: Annotated[float | None, typer.Option("--latitude", metavar="DEG", help="Latitude.")] = None,
+    dwell: Annotated[float | None, typer.Option("--dwell", metavar="S", help="In a position (60).")] = None,
+    transfer: Annotated[
+        float | None, typer.Option("--transfer", metavar="S", help="Time to the next position (0).")
+    ] = None,
+    drift: Annotated[
+        float | None, typer.Option("--drift", metavar="DEG/H/H", help="Linear drift of the bias.")
+    ] = None,
+    transient: Annotated[
+        list[str] | None,
+        typer.Option("--transient", metavar="DEG/H,S", help="Exponential from power-on; may be repeated."),
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option("--start", metavar="S", help="Begin of the seek after power-on (0).")
+    ] = None,
+    random_walk: Annotated[
+        float | None, typer.Option("--noise", metavar="DEG/SQRT(H)", help="Angle random walk, for se.")
+    ] = None,
+    sense: Annotated[
+        str | None, typer.Option("--sense", metavar="cw|ccw", help="Way the positions are taken (cw).")
+    ] = None,
+    order: Annotated[
+        str | None, typer.Option("--order", metavar="DEG,...", help="Angles of the positions (0,90,180,270).")
+    ] = None,
+    way: Annotated[
+        str | None,
+        typer.Option(
+            "--way", metavar="NAME", help="plain, drift-observing, palindrome, coarse-fine (plain)."
+        ),
+    ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method", metavar="NAME", help="With --positions: auto, plain, drift-observing (auto)."
+        ),
+    ] = None,
+    settle: Annotated[
+        float | None,
+        typer.Option("--settle", metavar="S", help="With --positions: left out at each begin (0)."),
+    ] = None,
+    coarse: Annotated[
+        float | None, typer.Option("--coarse", metavar="S", help="Time in a coarse position (6).")
+    ] = None,
+    repair: options.Repair = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """North from several positions, and what a drift does to it: the error, and where it is nothing.
+
+    Either from a recorded run (--positions) or simulated (--azimuth and --latitude). With --out, writes
+    north.json, north.html and config.yaml.
+    """
+    from fogml.cli.lab_north_job import NorthSettings, north_and_write
+
+    settings = NorthSettings.gather(
+        config,
+        {
+            "positions": positions,
+            "azimuth": azimuth,
+            "latitude": latitude,
+            "dwell": dwell,
+            "transfer": transfer,
+            "drift": drift,
+            "transients": transient,
+            "start": start,
+            "noise": random_walk,
+            "sense": sense,
+            "order": order,
+            "way": way,
+            "method": method,
+            "settle": settle,
+            "coarse": coarse,
+            "repair": repair,
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
+    )
+    north_and_write(settings, Terminal(as_json, quiet))

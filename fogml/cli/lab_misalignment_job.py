@@ -1,0 +1,82 @@
+"""The job of ``fogml lab misalignment``."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from fogml.cli.lab_outputs import say_where, tell
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.lab.misalignment_input import read_measurements
+from fogml.lab.misalignment_json import misalignment_json
+from fogml.validation.report_json import finite_json
+
+
+class MisalignmentSettings(Settings):
+    """Settings of ``fogml lab misalignment``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("file",)
+    file: str | None = None
+    cross_tilt: bool | None = None
+    out: str | None = None
+
+    def in_full(self) -> MisalignmentSettings:
+        """The settings with every path in full."""
+        paths = {name: absolute(path) for name in ("file", "out") if (path := getattr(self, name))}
+        return self.model_copy(update=paths)
+
+
+def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
+    """Find scale factor and misalignment, write them where a folder is named, and print them."""
+    if not settings.file:
+        raise InputError("no file is given; name the table of turns and rests")
+    file = settings.file
+
+    def make() -> dict[str, Any]:
+        with terminal.work(f"reading {file}"):
+            return finite_json(misalignment_json(read_measurements(file), settings.cross_tilt))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report import misalignment_page
+
+        return misalignment_page(values)
+
+    values = tell("misalignment", make, page, settings.in_full(), settings.out, terminal)
+    _print(values, terminal)
+    terminal.result(values)
+    say_where("misalignment", settings.out, terminal)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    se, intervals = values["se"], values["intervals"]
+    rows = [
+        [label, f"{values[key]:.8g}", number(se.get(key)), *_interval(intervals.get(key)), unit]
+        for label, key, unit in (
+            ("scale factor K", "K", values["unit"]),
+            ("delta x", "delta_x_deg", "deg"),
+            ("delta y", "delta_y_deg", "deg"),
+            ("delta", "delta_deg", "deg"),
+        )
+    ]
+    fixture_se = se.get("fixture_error_deg", [None, None])
+    for axis, value, error in zip("xy", values["fixture_error_deg"], fixture_se, strict=True):
+        rows.append([f"fixture error {axis}", f"{value:.6g}", number(error), "–", "–", "deg"])
+    level = f"{values['level']:.0%}"
+    terminal.table(
+        f"{values['source']}: scale factor and misalignment, four states",
+        ["quantity", "value", "standard error", f"{level} from", "to", "unit"],
+        rows,
+    )
+    rows = [
+        [m["name"], *(number(m[key]) for key in ("K", "K_difference_ppm", "delta_x_deg", "delta_y_deg"))]
+        for m in values["methods"]
+    ]
+    header = ["method", f"K [{values['unit']}]", "K less four states [ppm]", "delta x [deg]", "delta y [deg]"]
+    terminal.table("Methods on the same turns", header, rows)
+    for note in values["notes"]:
+        terminal.say(note)
+
+
+def _interval(ends: list[float] | None) -> list[str]:
+    return [f"{end:.8g}" for end in ends] if ends else ["–", "–"]

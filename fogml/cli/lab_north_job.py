@@ -1,0 +1,169 @@
+"""The job of ``fogml lab north``."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import field_validator
+
+from fogml.cli.lab_outputs import say_where, tell
+from fogml.cli.runs import open_run
+from fogml.cli.settings import Settings, absolute
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
+from fogml.lab.north_json import recorded_north_json, simulated_north_json
+from fogml.validation.report_json import finite_json
+
+_COLUMNS = ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "se")
+WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
+
+
+class NorthSettings(Settings):
+    """Settings of ``fogml lab north``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("positions",)
+    positions: str | None = None
+    azimuth: float | None = None
+    latitude: float | None = None
+    dwell: float = 60.0
+    transfer: float = 0.0
+    drift: float = 0.0
+    transients: list[tuple[float, float]] = []
+    start: float = 0.0
+    noise: float = 0.0
+    sense: str = "cw"
+    order: list[float] = list(DEFAULT_ORDER)
+    way: str = "plain"
+    method: str = "auto"
+    settle: float = 0.0
+    coarse: float = 6.0
+    repair: bool = False
+    out: str | None = None
+
+    @field_validator("order", mode="before")
+    @classmethod
+    def _order_from_text(cls, value: Any) -> Any:
+        return _numbers(value, "0,90,180,270") if isinstance(value, str) else value
+
+    @field_validator("transients", mode="before")
+    @classmethod
+    def _transients_from_text(cls, value: Any) -> Any:
+        """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
+        if not isinstance(value, list):
+            return value
+        pairs = [_numbers(item, "0.2,600") if isinstance(item, str) else item for item in value]
+        if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
+            raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
+        return pairs
+
+    def in_full(self) -> NorthSettings:
+        """The settings with every path in full."""
+        paths = {name: absolute(path) for name in ("positions", "out") if (path := getattr(self, name))}
+        return self.model_copy(update=paths)
+
+
+def _numbers(text: str, example: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"'{text}' is no list of numbers; write e.g. {example}") from None
+
+
+def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
+    """Find north in a recorded run or in a simulation, write it where a folder is named, and print it."""
+    _check(settings)
+
+    def make() -> dict[str, Any]:
+        return finite_json(_recorded(settings, terminal) if settings.positions else _simulated(settings))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report import north_page
+
+        return north_page(values)
+
+    values = tell("north", make, page, settings.in_full(), settings.out, terminal)
+    _print(values, terminal)
+    terminal.result(values)
+    say_where("north", settings.out, terminal)
+
+
+def _check(settings: NorthSettings) -> None:
+    check_sense(settings.sense)
+    if settings.positions and settings.azimuth is not None:
+        raise InputError("--positions and --azimuth: one is recorded, the other simulated; give one of them")
+    if settings.latitude is not None:
+        horizontal_rate(settings.latitude)
+    if settings.positions:
+        return
+    if settings.azimuth is None or settings.latitude is None:
+        raise InputError("give a run with --positions, or --azimuth and --latitude for a simulation")
+    if abs(settings.azimuth) > 1e6 or settings.azimuth != settings.azimuth:
+        raise InputError(f"azimuth {settings.azimuth:g} deg: a finite number is needed")
+    if not 0.0 <= settings.noise < float("inf"):
+        raise InputError(f"noise {settings.noise:g} deg/sqrt(h): a finite number, not negative, is needed")
+    if settings.way not in WAYS:
+        raise InputError(f"way '{settings.way}': one of {', '.join(WAYS)} was expected")
+
+
+def _recorded(settings: NorthSettings, terminal: Terminal) -> dict[str, Any]:
+    assert settings.positions
+    with terminal.work(f"reading {settings.positions}"):
+        run = open_run(settings.positions, repair=settings.repair)
+    return recorded_north_json(
+        run,
+        sense=settings.sense,
+        order_deg=tuple(settings.order),
+        method=settings.method,
+        settle_s=settings.settle,
+        latitude_deg=settings.latitude,
+    )
+
+
+def _simulated(settings: NorthSettings) -> dict[str, Any]:
+    assert settings.azimuth is not None and settings.latitude is not None
+    scheme = Scheme(
+        tuple(settings.order), settings.sense, settings.dwell, settings.transfer, start_s=settings.start
+    )
+    return simulated_north_json(
+        scheme,
+        settings.azimuth,
+        settings.latitude,
+        Drift(settings.drift, tuple(settings.transients)),
+        way=settings.way,
+        coarse_dwell_s=settings.coarse,
+        random_walk_deg_sqrt_h=settings.noise,
+    )
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    se = f" ± {number(values['se'])}" if values["se"] is not None else ""
+    if values["kind"] == "recorded":
+        terminal.say(f"{values['source']}: azimuth {values['azimuth_deg']:.5f}{se} deg ({values['method']})")
+        drift, drift_se = values["drift_deg_h_per_h"], values["drift_se"]
+        if drift is not None:
+            terminal.say(f"linear drift {number(drift)} ± {number(drift_se)} deg/h per h")
+            terminal.say(f"a plain seek is off by {number(values['error_deg'])} deg for it")
+    else:
+        terminal.say(
+            f"simulated at {values['true_azimuth_deg']:g} deg: found {values['azimuth_deg']:.5f}{se} deg "
+            f"({values['way']}), error {number(values['error_deg'])} deg"
+        )
+        rows = [
+            [
+                name,
+                *(
+                    number(told[key])
+                    for key in ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "se")
+                ),
+            ]
+            for name, told in values["ways"].items()
+        ]
+        header = ["way", "dwell [s]", "error here [deg]", "greatest [deg]", "rms [deg]", "se of noise [deg]"]
+        terminal.table(f"Ways to spend {values['duration_s']:g} s", header, rows)
+    quiet, worst = (
+        ", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) or "none" for k in ("quiet", "worst")
+    )
+    terminal.say(f"quiet azimuths {quiet} deg; worst {worst} deg")
+    for note in values["notes"]:
+        terminal.say(note)

@@ -1,0 +1,161 @@
+"""Standard errors, intervals and the confidence region of the decoupled scale factor and misalignment."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy import stats
+
+from fogml.runs.run import FloatArray
+
+LEVEL = 0.95
+"""Confidence of intervals and of the region."""
+ROUND_OFF = 1e-11
+"""Share of the largest slope below which a difference is round-off."""
+_LEAST_DOF = 4
+
+
+@dataclass(frozen=True)
+class StateFit:
+    """One state's slopes over its tilts.
+
+    ``tilts_deg``, ``slopes`` and ``residuals`` of shape (m,), slopes in output per deg/s;
+    ``coefficients`` c_c, c_s and, with a cross tilt, the constant.
+    """
+
+    state: int
+    tilts_deg: FloatArray
+    slopes: FloatArray
+    residuals: FloatArray
+    coefficients: FloatArray
+    design: FloatArray = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Region:
+    """Joint confidence region of (dx, dy): an ellipse about the estimate.
+
+    Half-axes [deg], the angle of the longer one from the x axis [deg], the level, and points of the
+    outline, shape (k, 2) [deg].
+    """
+
+    level: float
+    half_axes_deg: tuple[float, float]
+    angle_deg: float
+    outline_deg: FloatArray
+
+
+@dataclass(frozen=True)
+class Slopes:
+    """Slopes of one state over its tilts, arrays of shape (m,), and what the lines over the rates left."""
+
+    tilts: FloatArray
+    values: FloatArray
+    squares: float
+    dof: int
+    inverse_spread: float
+
+
+def slope_noise(
+    slopes: Mapping[int, Slopes], fits: tuple[StateFit, ...]
+) -> tuple[float | None, float | None, float | None, int, tuple[str, ...]]:
+    """Noise of a slope by the rates and by the tilts, the variance to use, its degrees of freedom, notes."""
+    dof_rates = sum(s.dof for s in slopes.values())
+    per_output = sum(s.squares for s in slopes.values()) / dof_rates if dof_rates else None
+    by_rates = (
+        per_output * float(np.mean([s.inverse_spread for s in slopes.values()])) if per_output else None
+    )
+    dof_tilts = sum(len(fit.residuals) - fit.design.shape[1] for fit in fits)
+    by_tilts = sum(float(fit.residuals @ fit.residuals) for fit in fits) / dof_tilts if dof_tilts else None
+    told = tuple(np.sqrt(v) if v is not None else None for v in (by_rates, by_tilts))
+    if by_tilts is not None and dof_tilts >= _LEAST_DOF:
+        # These hold errors of the tilt settings too, which no line over the rates can see.
+        notes: tuple[str, ...] = ()
+        scale = max(float(np.abs(fit.slopes).max()) for fit in fits)
+        real = by_tilts > (ROUND_OFF * scale) ** 2
+        if real and by_rates and by_tilts > stats.f.isf(0.01, dof_tilts, dof_rates) * by_rates:
+            notes = (
+                "slopes scatter over the tilts more than noise explains: errors of the tilt settings, "
+                "or drift between the tilts; the standard errors hold them",
+            )
+        return told[0], told[1], by_tilts, dof_tilts, notes
+    dof = dof_tilts + dof_rates
+    if dof == 0:
+        return (
+            told[0],
+            told[1],
+            None,
+            0,
+            ("no standard errors: nothing is left over; take more tilts or rates",),
+        )
+    variance = ((by_tilts or 0.0) * dof_tilts + (by_rates or 0.0) * dof_rates) / dof
+    note = (
+        "few tilts: standard errors rest on the scatter over the rates and miss errors of the tilt settings"
+    )
+    return told[0], told[1], variance, dof, (note,)
+
+
+def covariance_of(
+    solve: Callable[[FloatArray], FloatArray],
+    c: FloatArray,
+    fits: tuple[StateFit, ...],
+    variance: float,
+) -> FloatArray:
+    """Covariance of what `solve` makes of c, shape (4, 2), by central differences."""
+    jacobian = np.empty((6, 8))
+    step = 1e-6 * float(np.abs(c).max())
+    for i in range(8):
+        moved = np.zeros(8)
+        moved[i] = step
+        up, down = solve(c + moved.reshape(4, 2)), solve(c - moved.reshape(4, 2))
+        jacobian[:, i] = (up - down) / (2.0 * step)
+    blocks = np.zeros((8, 8))
+    for i, fit in enumerate(fits):
+        inverse = np.linalg.inv(fit.design.T @ fit.design)
+        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = variance * inverse[:2, :2]
+    return np.asarray(jacobian @ blocks @ jacobian.T)
+
+
+def errors_of(
+    values: FloatArray, covariance: FloatArray, dof: int
+) -> tuple[dict[str, float | list[float]], dict[str, tuple[float, float]], Region]:
+    sd = np.sqrt(np.diag(covariance))
+    region = _region(values[1:3], covariance[1:3, 1:3], dof)
+    factor = float(stats.t.isf((1.0 - LEVEL) / 2.0, dof))
+    names = ("K", "delta_x_deg", "delta_y_deg")
+    intervals = {
+        n: (float(values[i] - factor * sd[i]), float(values[i] + factor * sd[i])) for i, n in enumerate(names)
+    }
+    # The angle can't be negative: its interval is what the joint region of dx and dy spans.
+    sines = np.sin(np.radians(region.outline_deg))
+    angles = np.degrees(np.arcsin(np.minimum(np.hypot(sines[:, 0], sines[:, 1]), 1.0)))
+    inside = _holds_zero(values[1:3], covariance[1:3, 1:3], dof)
+    intervals["delta_deg"] = (0.0 if inside else float(angles.min()), float(angles.max()))
+    se: dict[str, float | list[float]] = {n: float(sd[i]) for i, n in enumerate(names)}
+    gradient_free = inside or sd[3] == 0.0
+    se["delta_deg"] = float(np.hypot(sd[1], sd[2]) / np.sqrt(2.0)) if gradient_free else float(sd[3])
+    se["fixture_error_deg"] = [float(sd[4]), float(sd[5])]
+    return se, intervals, region
+
+
+def _holds_zero(centre: FloatArray, covariance: FloatArray, dof: int) -> bool:
+    """Whether the region about an estimate holds zero misalignment."""
+    if not np.linalg.det(covariance) > 0.0:
+        return not centre.any()
+    return bool(centre @ np.linalg.solve(covariance, centre) <= _region_factor(dof))
+
+
+def _region_factor(dof: int) -> float:
+    return 2.0 * float(stats.f.isf(1.0 - LEVEL, 2, dof))
+
+
+def _region(centre: FloatArray, covariance: FloatArray, dof: int) -> Region:
+    squares, axes = np.linalg.eigh(covariance)
+    half = np.sqrt(np.maximum(squares, 0.0) * _region_factor(dof))
+    turn = np.linspace(0.0, 2.0 * np.pi, 121)
+    outline = centre + (np.column_stack([np.cos(turn), np.sin(turn)]) * half) @ axes.T
+    long = axes[:, 1]
+    angle = float(np.degrees(np.arctan2(long[1], long[0]))) % 180.0
+    return Region(LEVEL, (float(half[1]), float(half[0])), angle, outline)

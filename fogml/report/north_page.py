@@ -1,0 +1,181 @@
+"""The page of ``fogml lab north``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fogml.report.figures_north import error_by_azimuth, error_map
+from fogml.report.page import Tile, render
+from fogml.report.tables import Row, Table, noticed
+from fogml.report.words import MISSING, duration, listed, number, stated
+
+
+def north_page(values: Mapping[str, Any]) -> str:
+    """The self-contained HTML page of a ``north.json`` (schema ``fogml.north/1``)."""
+    recorded = values["kind"] == "recorded"
+    name = values["source"] if recorded else "Simulated seek"
+    return render(
+        "north.html",
+        title=f"{name} – north",
+        name=name,
+        kicker="North from recorded positions" if recorded else "North seeking under a drift (synthetic)",
+        values=values,
+        verdict=_recorded_verdict(values) if recorded else _simulated_verdict(values),
+        tiles=_tiles(values),
+        circle=error_by_azimuth(values),
+        map=error_map(values),
+        ways=None if recorded else _ways(values),
+        quiet=None if recorded else _quiet(values),
+        stays=_stays(values) if recorded else None,
+        about=_about(values),
+        findings=noticed(values.get("findings", ())),
+    )
+
+
+def _recorded_verdict(values: Mapping[str, Any]) -> list[str]:
+    within = f" ± {number(values['se'], 2)}" if values["se"] is not None else ""
+    sentences = [f"The azimuth is {values['azimuth_deg']:.4f}{within} deg."]
+    if values["method"] == "drift-observing":
+        sentences.append(
+            f"A drift of {number(values['drift_deg_h_per_h'])} deg/h per h shows and is taken out; without "
+            f"that the azimuth would be off by {number(values['error_deg'])} deg."
+        )
+    elif values["drift_deg_h_per_h"] is not None:
+        sentences.append(
+            "No linear drift shows beyond noise, so the plain seek holds: it has the least noise."
+        )
+    return sentences
+
+
+def _simulated_verdict(values: Mapping[str, Any]) -> list[str]:
+    sentences = [
+        f"At {values['true_azimuth_deg']:g} deg this drift puts the azimuth off by "
+        f"{number(values['error_deg'])} deg."
+    ]
+    if values["quiet_azimuth_deg"]:
+        quiet = " and ".join(f"{a:.1f}" for a in values["quiet_azimuth_deg"])
+        worst = " and ".join(f"{a:.1f}" for a in values["worst_azimuth_deg"])
+        sentences.append(f"It does nothing at {quiet} deg, and most at {worst} deg.")
+    return sentences
+
+
+def _tiles(values: Mapping[str, Any]) -> list[Tile]:
+    tiles = [
+        Tile(
+            "Azimuth found",
+            f"{values['azimuth_deg']:.4f}",
+            "deg",
+            values.get("method", values.get("way", "")),
+        ),
+        Tile("Error for the drift", number(values["error_deg"]), "deg", "here"),
+    ]
+    if values["se"] is not None:
+        tiles.append(Tile("Standard error", number(values["se"]), "deg", "of noise"))
+    if values.get("greatest_error_deg") is not None:
+        tiles.append(Tile("Greatest error", number(values["greatest_error_deg"]), "deg", "over the circle"))
+    if values["drift_deg_h_per_h"] is not None:
+        tiles.append(
+            Tile("Linear drift seen", number(values["drift_deg_h_per_h"]), "deg/h per h", "by the positions")
+        )
+    return tiles
+
+
+def _ways(values: Mapping[str, Any]) -> Table:
+    rows = [
+        Row(
+            (
+                name,
+                str(told["stays"]),
+                number(told["dwell_s"]),
+                number(told["error_deg"]),
+                number(told["greatest_error_deg"]),
+                number(told["rms_error_deg"]),
+                number(told["rms_se"]),
+            ),
+            "chosen" if name == values["way"] else "",
+        )
+        for name, told in values["ways"].items()
+    ]
+    return Table(
+        columns=(
+            ("Way", "", "text"),
+            ("Stays", "", "figure"),
+            ("Dwell", "s", "figure"),
+            ("Error here", "deg", "figure"),
+            ("Greatest error", "deg", "figure"),
+            ("Rms over the circle", "deg", "figure"),
+            ("Standard error of noise, rms", "deg", "figure"),
+        ),
+        rows=tuple(rows),
+        caption=f"Every way takes {duration(values['duration_s'])} with its transfers. Dwell: of the fine seek.",
+    )
+
+
+def _quiet(values: Mapping[str, Any]) -> Table:
+    rows = [
+        Row(
+            (
+                "clockwise" if told["sense"] == "cw" else "counter-clockwise",
+                _angles(told["order_deg"], ".0f"),
+                _angles(told["linear_deg"], ".1f"),
+                _angles(told["this_drift_deg"], ".1f"),
+            ),
+            "chosen" if told["here"] else "",
+        )
+        for told in values["quiet_by_set_up"]
+    ]
+    return Table(
+        columns=(
+            ("Positions taken", "", "text"),
+            ("Order", "deg", "text"),
+            ("Quiet for a linear drift", "deg", "figure"),
+            ("Quiet for this drift", "deg", "figure"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def _stays(values: Mapping[str, Any]) -> Table:
+    rows = [
+        Row((str(stay["position"]), number(stay["time_s"], 5), number(stay["mean_deg_h"], 6)))
+        for stay in values["stays"]
+    ]
+    return Table(
+        columns=(("Position", "", "text"), ("Middle", "s", "figure"), ("Mean", "deg/h", "figure")),
+        rows=tuple(rows),
+    )
+
+
+def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    rows = [
+        ("positions taken", "clockwise" if values["sense"] == "cw" else "counter-clockwise"),
+        ("order", f"{_angles(values['order_deg'], 'g')} deg"),
+        ("horizontal Earth rate", f"{number(values['horizontal_deg_h'], 5)} deg/h"),
+    ]
+    if values["kind"] == "simulated":
+        drift = values["drift"]
+        transients = [f"{stated(a)} deg/h with {stated(tau)} s" for a, tau in drift["transients"]]
+        difference = values["error_deg"] - values["simulated_error_deg"]
+        rows += [
+            ("latitude", f"{stated(values['latitude_deg'])} deg"),
+            ("dwell, transfer", f"{stated(values['dwell_s'])} s, {stated(values['transfer_s'])} s"),
+            ("linear drift", f"{stated(drift['linear_deg_h_per_h'])} deg/h per h"),
+            ("transients", listed(transients) or MISSING),
+            ("angle random walk", f"{stated(values['random_walk_deg_sqrt_h'])} deg/√h"),
+            (
+                "closed form less simulation",
+                f"{number(values['error_deg'] - values['simulated_error_deg'], 2)} deg",
+            ),
+        ]
+    else:
+        rows += [
+            ("offset", f"{number(values['offset_deg_h'], 4)} deg/h"),
+            ("noise of a sample", f"{number(values['sample_noise_deg_h'])} deg/h"),
+            ("plain seek", f"{values['plain_azimuth_deg']:.4f} deg"),
+        ]
+    return rows
+
+
+def _angles(angles: Sequence[float], form: str) -> str:
+    return ", ".join(f"{angle:{form}}" for angle in angles) or "everywhere"
