@@ -1,0 +1,122 @@
+"""Effects that the runs can't tell from each other, and the probabilities of what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import logsumexp
+
+from fogml.gap.search import Chosen, Explanation, Search
+
+SAME_CLASS_NATS = 3.0
+LEAST_PROBABILITY = 0.1
+"""Effects less probable than this are not listed."""
+
+
+@dataclass(frozen=True)
+class Ranked:
+    """An effect of the best explanation, or one that competes with it.
+
+    Attributes
+    ----------
+    chosen
+        At its best.
+    members
+        Ids of its class, itself first.
+    probability
+        That a member of the class acts, by the evidence.
+    margin
+        How much the evidence falls without the class [nats].
+    """
+
+    chosen: Chosen
+    members: tuple[str, ...]
+    probability: float
+    margin: float
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What the evidence says.
+
+    Attributes
+    ----------
+    best
+        The most probable explanation.
+    effects
+        Effects with some probability, the most certain first.
+    unknown
+        Probability that something unknown acts, by the evidence.
+    """
+
+    best: Explanation
+    effects: tuple[Ranked, ...]
+    unknown: float
+
+
+def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
+    """Classes and probabilities.
+
+    Parameters
+    ----------
+    search
+        For swapping one effect for another.
+    explanations
+        What was tried, the most probable first.
+    """
+    best = explanations[0]
+    classes = {c.candidate: _members(search, best, c.candidate) for c in best.effects}
+    weights = _weights(explanations)
+    unknown = float(sum(w for e, w in zip(explanations, weights) if e.unknown is not None))
+    ranked = []
+    taken: set[str] = set()
+    for chosen in best.effects:
+        members = classes[chosen.candidate]
+        ranked.append(_ranked(chosen, members, explanations, weights))
+        taken |= set(members)
+    for id in sorted({i for e in explanations[:40] for i in e.ids} - taken):
+        with_it = next(e for e in explanations if id in e.ids)
+        chosen = next(c for c in with_it.effects if c.candidate == id)
+        other = _ranked(chosen, (id,), explanations, weights)
+        if other.probability >= LEAST_PROBABILITY:
+            ranked.append(other)
+    ranked.sort(key=lambda r: -r.probability)
+    return Ranking(best, tuple(ranked), unknown)
+
+
+def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
+    logs = np.array([e.log_posterior for e in explanations])
+    return np.asarray(np.exp(logs - logsumexp(logs)))
+
+
+def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
+    """The effect and those that take its place at less than `SAME_CLASS_NATS` of evidence."""
+    others = tuple(c for c in best.effects if c.candidate != id)
+    held = search.field_.condition(search._terms(others, best.unknown))
+    gains = held.node_gains()
+    members = {id: best.log_evidence}
+    for other in search.places:
+        if other in best.ids:
+            continue
+        # A quick look first: with the others held, a swap only gets better by a few nats.
+        quick = float(logsumexp(gains[search.places[other]])) - float(logsumexp(gains[search.places[id]]))
+        if quick < -SAME_CLASS_NATS - 3.0:
+            continue
+        swapped = search.explanation((*others, search._best(other, gains)), unknown=best.unknown is not None)
+        if swapped.log_evidence > best.log_evidence - SAME_CLASS_NATS:
+            members[other] = swapped.log_evidence
+    rest = sorted((m for m in members if m != id), key=lambda m: -members[m])
+    return (id, *rest)
+
+
+def _ranked(
+    chosen: Chosen, members: tuple[str, ...], explanations: Sequence[Explanation], weights: np.ndarray
+) -> Ranked:
+    inside = np.array([bool(e.ids & set(members)) for e in explanations])
+    probability = float(weights[inside].sum())
+    without = max((e.log_posterior for e, i in zip(explanations, inside) if not i), default=-math.inf)
+    with_it = max(e.log_posterior for e, i in zip(explanations, inside) if i)
+    return Ranked(chosen, members, probability, with_it - without)

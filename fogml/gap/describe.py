@@ -1,0 +1,21 @@
+"""What an unknown looks like, in plain words."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from fogml.gap.search import Search
+
+if TYPE_CHECKING:
+    from fogml.gap.classes import Ranking
+    from fogml.gap.diagnose import Prepared
+
+
+def describe_unknown(p: Prepared, search: Search, ranking: Ranking) -> str:
+    """The best group's words."""
+    best = ranking.best
+    shown = best if best.unknown is not None else search.explanation(best.effects, unknown=True)
+    if shown.unknown is None:
+        return ""
+    group = next(g for g in p.groups if g.name == shown.unknown[0])
+    return group.looks_like

@@ -1,0 +1,167 @@
+"""What an effect that no candidate describes may look like: the unknown, as groups of columns.
+
+Each group is a kind of cause: a function of temperature, of its rate, of its past, of its direction,
+of time, of the table's rate, of the time since the start. The unknown competes with the candidates
+as one of the groups, or all of them together, with a ridge over the group's columns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.gap.observation import Observation
+from fogml.runs.run import FloatArray
+from fogml.twin.memory import Memory
+
+LAGS_S = (600.0, 1800.0, 5400.0, 16200.0)
+DECAYS_S = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
+SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
+"""Shortest half-period of each group of cosines in time [s]."""
+KNOTS = 9
+
+
+@dataclass(frozen=True)
+class Group:
+    """A kind of unknown.
+
+    Attributes
+    ----------
+    name
+        Of the kind.
+    looks_like
+        In plain words.
+    columns
+        For each run the columns [deg/h], shape (m, k); of no particular size.
+    """
+
+    name: str
+    looks_like: str
+    columns: tuple[FloatArray, ...]
+
+
+def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
+    """The groups that these runs can show."""
+    temperatures = [o.temperature for o in observations]
+    low = min(float(t.min()) for t in temperatures)
+    high = max(float(t.max()) for t in temperatures)
+    groups = [
+        ("time_slow", "drifts slowly with time, on each run in its own way", _own(observations, SLOW_S)),
+        ("time_medium", "wanders with time over tens of minutes", _own(observations, MEDIUM_S)),
+        ("time_fast", "comes and goes within a quarter of an hour", _own(observations, FAST_S)),
+        ("start", "decays from the start of a run", [_decays(o) for o in observations]),
+        ("time", "drifts with time, the same way on every run", [_drifts(o) for o in observations]),
+    ]
+    if high - low > 2.0:
+        half = 0.5 * (high - low)
+        u = [(t - 0.5 * (low + high)) / half for t in temperatures]
+        groups += [
+            ("temperature", "is a function of temperature", [_bumps(x) for x in u]),
+            ("temperature_rate", "follows the rate of temperature", _rates(observations, u)),
+            ("direction", "follows the direction of temperature change", _directions(observations, u)),
+            ("past", "remembers past temperatures", [_past(o, half) for o in observations]),
+        ]
+    if any(np.any(o.run.rate) for o in observations):
+        groups.append(("table_rate", "follows the table's rate", _table(observations, temperatures)))
+    return [Group(name, words, tuple(columns)) for name, words, columns in groups]
+
+
+def _own(observations: Sequence[Observation], half_period_s: float) -> list[FloatArray]:
+    """Cosines in time of each run by itself, in columns of its own."""
+    parts = []
+    for o in observations:
+        span = max(float(o.time[-1] - o.time[0]), 1.0)
+        count = max(1, min(int(span / half_period_s), len(o) // 4))
+        angle = np.pi * (o.time - o.time[0]) / span
+        parts.append(np.cos(np.outer(angle, np.arange(1, count + 1))))
+    total = sum(part.shape[1] for part in parts)
+    blocks, first = [], 0
+    for part in parts:
+        block = np.zeros((len(part), total))
+        block[:, first : first + part.shape[1]] = part
+        first += part.shape[1]
+        blocks.append(block)
+    return blocks
+
+
+def _decays(o: Observation) -> FloatArray:
+    return np.exp(-np.subtract.outer(o.time, o.time[0])[:, None] / np.array(DECAYS_S))
+
+
+def _drifts(o: Observation) -> FloatArray:
+    hours = (o.time - o.time[0]) / 3600.0
+    return np.column_stack([hours, hours**2 / 10.0, np.sqrt(hours), np.log1p(3.0 * hours)])
+
+
+def _bumps(u: FloatArray) -> FloatArray:
+    """Smooth bumps over the temperatures, shape (m, KNOTS)."""
+    centres = np.linspace(-1.0, 1.0, KNOTS)
+    return np.exp(-0.5 * ((u[:, None] - centres) * (KNOTS - 1) / 2.0 / 0.9) ** 2)
+
+
+def _rates(observations: Sequence[Observation], u: Sequence[FloatArray]) -> list[FloatArray]:
+    blocks = []
+    for o, x in zip(observations, u):
+        rate = _rate(o)
+        size = np.abs(rate)
+        slow = _lag(o, rate, 600.0)
+        blocks.append(
+            np.column_stack(
+                [rate, rate * x, rate * x**2, rate * x**3, size, size * x, rate * size, slow, rate - slow]
+            )
+        )
+    return blocks
+
+
+def _directions(observations: Sequence[Observation], u: Sequence[FloatArray]) -> list[FloatArray]:
+    blocks = []
+    for o, x in zip(observations, u):
+        sign = np.tanh(_rate(o) / 0.05)
+        held = Memory()
+        plays = [held.play(f"{w}", o.temperature, w) - o.temperature for w in (2.0, 6.0, 18.0)]
+        blocks.append(np.column_stack([sign, sign * x, sign * x**2, *plays, x * plays[1]]))
+    return blocks
+
+
+def _past(o: Observation, half: float) -> FloatArray:
+    t = o.temperature
+    lagged = [(_lag(o, t, tau) - t) / half for tau in LAGS_S]
+    swing = [_lag(o, np.abs(_rate(o)), tau) for tau in LAGS_S[1:]]
+    return np.column_stack([*lagged, *swing])
+
+
+def _table(observations: Sequence[Observation], temperatures: Sequence[FloatArray]) -> list[FloatArray]:
+    top = max(float(np.abs(o.run.rate).max()) for o in observations)
+    blocks = []
+    for o, t in zip(observations, temperatures):
+        rate = o.averaged(o.run.rate) / top
+        u = (t - 25.0) / 50.0
+        hours = (o.time - o.time[0]) / 36000.0
+        blocks.append(
+            np.column_stack(
+                [
+                    np.abs(rate),
+                    rate**2,
+                    rate**3,
+                    np.sign(np.round(rate, 6)),
+                    np.abs(rate) * u,
+                    rate * u**3,
+                    rate * _rate(o),
+                    rate * hours,
+                    _lag(o, np.abs(rate), 600.0),
+                ]
+            )
+        )
+    return blocks
+
+
+def _lag(o: Observation, values: FloatArray, time_constant_s: float) -> FloatArray:
+    """A first-order lag of a series of rows, shape (m,)."""
+    return Memory().lag("lag", o.time, values, time_constant_s)
+
+
+def _rate(o: Observation) -> FloatArray:
+    """Rate of the temperature over a minute or so [degC/min], shape (m,)."""
+    return 60.0 * (o.temperature - _lag(o, o.temperature, 100.0)) / 100.0

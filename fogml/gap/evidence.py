@@ -1,0 +1,167 @@
+"""Evidence of sets of effects, constants integrated out, from inner products alone.
+
+With whitened data y and whitened columns F of independent coefficients with standard deviation s ::
+
+    log p(y) = -1/2 (y'y - b'(1 + s^2 A)^-1 b s^2) - 1/2 log det(1 + s^2 A),    A = F'F, b = F'y
+
+where inner products are those beside everything that is integrated out already.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.special import log_ndtr, logsumexp
+
+from fogml.gap.basis import Basis, NodeColumns
+from fogml.runs.run import FloatArray
+
+LENGTHS = np.array([5.0, 15.0, 45.0, 135.0, 400.0, 1200.0])
+"""Whitened lengths that the prior of an amplitude is a mixture over."""
+LENGTH_WEIGHTS = np.array([0.25, 0.25, 0.2, 0.15, 0.1, 0.05])
+
+
+@dataclass(frozen=True)
+class Term:
+    """Columns with independent normal coefficients.
+
+    Attributes
+    ----------
+    columns
+        Indices into the basis.
+    length
+        Standard deviation of each coefficient.
+    """
+
+    columns: tuple[int, ...]
+    length: float
+
+
+class Field:
+    """Inner products beside the constants.
+
+    Parameters
+    ----------
+    basis
+        What there is.
+    runs
+        Runs to use; all if None.
+    """
+
+    def __init__(self, basis: Basis, runs: Sequence[int] | None = None) -> None:
+        self.basis = basis
+        used = basis.by_run if runs is None else [basis.by_run[r] for r in runs]
+        gram = np.sum(used, axis=0)
+        fixed = basis.constants
+        inner = np.eye(len(fixed)) + gram[np.ix_(fixed, fixed)]
+        factor = np.linalg.cholesky(inner)
+        half = solve_triangular(factor, gram[fixed], lower=True)
+        self.gram: FloatArray = gram - half.T @ half
+        self.log_det = float(np.log(np.diag(factor)).sum())
+        width = max((len(n.columns) for n in basis.nodes), default=1)
+        self.rank = width
+        # A column of zeros fills nodes of lower rank up.
+        padded = len(self.gram)
+        self._index = np.full((len(basis.nodes), self.rank), padded)
+        for i, node in enumerate(basis.nodes):
+            self._index[i, : len(node.columns)] = node.columns
+        extended = np.zeros((padded + 1, padded + 1))
+        extended[:padded, :padded] = self.gram
+        self._blocks = extended[self._index[:, :, None], self._index[:, None, :]]
+        self._fits = extended[self._index, 0]
+        self.signs = np.array([n.sign for n in basis.nodes])
+        self.log_weights = np.array([n.log_weight for n in basis.nodes])
+
+    def condition(self, terms: Sequence[Term]) -> Conditioned:
+        """The field with terms integrated out as well."""
+        return Conditioned(self, terms)
+
+
+class Conditioned:
+    """A field with terms integrated out.
+
+    Attributes
+    ----------
+    log_evidence
+        Of the data, up to what does not depend on the terms.
+    """
+
+    def __init__(self, field: Field, terms: Sequence[Term]) -> None:
+        self.field, self.terms = field, tuple(terms)
+        self._columns = np.array([c for t in terms for c in t.columns], dtype=np.intp)
+        self._scale = np.array([t.length for t in terms for _ in t.columns])
+        gram = field.gram
+        k = len(self._columns)
+        if k:
+            rows = self._scale[:, None] * gram[self._columns]
+            inner = np.eye(k) + rows[:, self._columns] * self._scale
+            self._factor = np.linalg.cholesky(0.5 * (inner + inner.T))
+            self.half = solve_triangular(self._factor, rows, lower=True)
+            log_det = float(np.log(np.diag(self._factor)).sum())
+        else:
+            self.half = np.zeros((0, len(gram)))
+            log_det = 0.0
+        fit = self.half[:, 0]
+        self.square = float(gram[0, 0] - fit @ fit)
+        self.log_evidence = -0.5 * self.square - log_det
+
+    def coefficients(self) -> tuple[FloatArray, FloatArray]:
+        """Posterior mean and covariance of the terms' coefficients, in their own units."""
+        factor = (self._factor, True)
+        mean = self._scale * cho_solve(factor, self._scale * self.field.gram[self._columns, 0])
+        covariance = self._scale[:, None] * cho_solve(factor, np.diag(self._scale))
+        return mean, covariance
+
+    def node_gains(self) -> FloatArray:
+        """Gain in log evidence of each node at each length, weights included, shape (nodes, lengths)."""
+        field = self.field
+        index = field._index
+        half = np.concatenate([self.half, np.zeros((len(self.half), 1))], axis=1)
+        across = half[:, index]
+        blocks = field._blocks - np.einsum("kni,knj->nij", across, across)
+        fits = field._fits - np.einsum("kni,k->ni", across, self.half[:, 0])
+        sizes, axes = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
+        sizes = np.maximum(sizes, 0.0)
+        along = np.einsum("nij,ni->nj", axes, fits)
+        squares = LENGTHS[None, :, None] ** 2
+        wider = 1.0 + squares * sizes[:, None, :]
+        gains = 0.5 * (squares * along[:, None, :] ** 2 / wider - np.log(wider)).sum(axis=2)
+        one = field.signs > 0
+        if one.any():
+            fit, size = fits[one, 0][:, None], np.maximum(blocks[one, 0, 0], 0.0)[:, None]
+            z = LENGTHS * fit / np.sqrt(1.0 + LENGTHS**2 * size)
+            gains[one] += log_ndtr(z) + np.log(2.0)
+        return np.asarray(gains + np.log(LENGTH_WEIGHTS) + field.log_weights[:, None])
+
+
+def by_candidate(nodes: Sequence[NodeColumns]) -> dict[str, NDArray[np.intp]]:
+    """Indices of each candidate's nodes."""
+    places: dict[str, list[int]] = {}
+    for i, node in enumerate(nodes):
+        places.setdefault(node.candidate, []).append(i)
+    return {id: np.array(found) for id, found in places.items()}
+
+
+def group_terms(basis: Basis, groups: Sequence[str]) -> list[tuple[str, Term]]:
+    """The unknown as each of its groups at each length."""
+    return [
+        (name, Term(tuple(int(c) for c in basis.groups[name]), float(length)))
+        for name in groups
+        for length in LENGTHS
+    ]
+
+
+__all__ = [
+    "LENGTHS",
+    "LENGTH_WEIGHTS",
+    "Conditioned",
+    "Field",
+    "Term",
+    "by_candidate",
+    "group_terms",
+    "logsumexp",
+]

@@ -1,0 +1,124 @@
+"""How far the gap closes on a held-out run once the effects found are added."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.gap.fitting import Fit
+from fogml.gap.model import Constant, EffectValue
+from fogml.gap.noise import Noise
+from fogml.gap.observation import Observation
+from fogml.gap.result import HowFar
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_expectation import expected_mean_square, mean_square_draws
+
+AVERAGING_S = 100.0
+DRAWS = 40
+_Z90 = 1.6448536269514722
+
+
+@dataclass(frozen=True, eq=False)
+class Averages:
+    """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps."""
+
+    starts: np.ndarray
+    window_s: float
+    time: FloatArray
+
+    def of(self, rows: FloatArray) -> FloatArray:
+        """Averages of a series of rows, shape (m,) to (k,)."""
+        counts = np.diff(self.starts, append=len(rows))
+        return np.asarray((np.add.reduceat(rows, self.starts) / counts)[self.full])
+
+    full: np.ndarray
+
+
+def averages(o: Observation, averaging_s: float = AVERAGING_S) -> Averages:
+    """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
+    width = max(1, round(averaging_s / o.row_s))
+    breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1
+    edges = [0, *breaks.tolist(), len(o)]
+    starts = np.concatenate([np.arange(a, b, width) for a, b in zip(edges[:-1], edges[1:])])
+    counts = np.diff(starts, append=len(o))
+    full = counts == width
+    if not full.any():
+        full = counts > 0
+    time = np.add.reduceat(o.time, starts) / counts
+    return Averages(starts, width * o.row_s, time[full], full)
+
+
+def how_far(
+    o: Observation,
+    constants: Sequence[Constant],
+    recalibrated: Fit,
+    after: Fit,
+    noise: Noise,
+    rng: np.random.Generator,
+    widen: Callable[[float], float] = lambda deviation: deviation,
+) -> HowFar:
+    """Before, recalibrated, after and floor of a held-out run, and what is closed.
+
+    Parameters
+    ----------
+    o
+        The held-out run.
+    constants
+        With their priors' means: the twin before.
+    recalibrated, after
+        Fits without and with the effects, from the fit runs.
+    noise
+        The noise model.
+    rng
+        Draws parameters and noises for the interval.
+    widen
+        Calibration of the interval's standard deviation.
+    """
+    windows = averages(o)
+    means = {c.name: c.mean for c in constants}
+
+    def gap(values: dict[str, float] | Fit, effects: tuple[EffectValue, ...] = ()) -> FloatArray:
+        held, on = (values.constants, values.effects) if isinstance(values, Fit) else (values, effects)
+        return windows.of(o.recorded - o.averaged(o.model.output(held, on)))
+
+    squares = {name: _mean_square(gap(f)) for name, f in (("rec", recalibrated), ("after", after))}
+    before = _mean_square(gap(means))
+    floor, floor_deviation = _floor(windows, noise, rng)
+    closed, interval, note = None, None, ""
+    denominator = squares["rec"] - floor
+    if denominator <= _Z90 * floor_deviation:
+        note = "the recalibrated twin is at the floor within its noise: nothing left to close"
+    else:
+        closed = (squares["rec"] - squares["after"]) / denominator
+        deviation = floor_deviation / denominator
+        if after.effects:
+            base = gap(after)
+            moved = [_mean_square(gap(c, e) - base) for c, e in after.draws(rng, DRAWS)]
+            deviation = float(np.hypot(deviation, np.mean(moved) / denominator))
+        deviation = widen(deviation)
+        interval = (closed - _Z90 * deviation, closed + _Z90 * deviation)
+    return HowFar(
+        run=o.run.name,
+        averaging_s=windows.window_s,
+        before=before**0.5,
+        recalibrated=squares["rec"] ** 0.5,
+        after=squares["after"] ** 0.5,
+        floor=floor**0.5,
+        closed=closed,
+        closed_ci90=interval,
+        note=note,
+    )
+
+
+def _mean_square(values: FloatArray) -> float:
+    return float(np.mean(values**2))
+
+
+def _floor(windows: Averages, noise: Noise, rng: np.random.Generator) -> tuple[float, float]:
+    """Expected mean square of the noise's averages, and the deviation of one run's from it."""
+    floor = expected_mean_square(noise.model, windows.time, windows.window_s)
+    drawn = mean_square_draws(noise.model, windows.time, windows.window_s, 200, rng)
+    models = [expected_mean_square(m, windows.time, windows.window_s) for m in noise.fit.draw(rng, 12)]
+    return float(floor), float(np.hypot(np.std(drawn), np.std(models)))

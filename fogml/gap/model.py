@@ -1,0 +1,147 @@
+"""What a diagnosis asks of a model of a gyro: any that offers this can take the twin's place.
+
+A model is linear in a few constants with priors, replays a run's inputs, and offers candidate
+effects, each linear in its amplitude at given shape parameters. `fogml.gap.twin_model.TwinModel` is
+the twin in this form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Protocol, runtime_checkable
+
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.quantities import Quantity
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A constant of the model with its normal prior.
+
+    ``mean`` and ``sd`` are in ``unit``.
+    """
+
+    name: str
+    unit: str
+    mean: float
+    sd: float
+
+
+@dataclass(frozen=True)
+class NoisePrior:
+    """Coefficients of the noise and the factors of their log-normal priors.
+
+    ``N`` deg/sqrt(h), ``B`` deg/h, ``K`` deg/h/sqrt(h); a factor of 1 holds a coefficient fixed.
+    """
+
+    N: float
+    B: float
+    K: float
+    factor_N: float = 3.0
+    factor_B: float = 3.0
+    factor_K: float = 3.0
+
+
+@dataclass(frozen=True)
+class EffectValue:
+    """An effect with numbers: its amplitude and its shape parameters in the card's units."""
+
+    id: str
+    amplitude: float
+    shape: Mapping[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "shape", MappingProxyType(dict(self.shape)))
+
+
+@runtime_checkable
+class Candidate(Protocol):
+    """An effect that a diagnosis may name; every `fogml.twin.effect.Effect` is one."""
+
+    @property
+    def id(self) -> str:
+        """Name in reports."""
+
+    @property
+    def title(self) -> str:
+        """A few words."""
+
+    @property
+    def stage(self) -> Any:
+        """Where in the chain it acts, one of `fogml.twin.effect.STAGES`."""
+
+    @property
+    def amplitude(self) -> Quantity:
+        """The linear coefficient: unit, usual range, limits, whether either sign occurs."""
+
+    @property
+    def shape(self) -> tuple[Quantity, ...]:
+        """Parameters that the response is not linear in, with their usual ranges."""
+
+    @property
+    def confused_with(self) -> Mapping[str, str]:
+        """Id of a look-alike to what separates the two; may be empty."""
+
+
+class ModelOnRun(Protocol):
+    """A model with the inputs that one run recorded."""
+
+    def columns(self) -> Mapping[str, FloatArray]:
+        """Response of the output [deg/h] to a unit of each constant, each of shape (n,).
+
+        A constant that this run can't show may be left out.
+        """
+
+    def output(self, constants: Mapping[str, float], effects: tuple[EffectValue, ...] = ()) -> FloatArray:
+        """The replay: noise-free output [deg/h], shape (n,)."""
+
+    def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
+        """What the noise of the inputs makes of the replay, as a standard deviation [deg/h], shape (n,)."""
+
+    def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
+        """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
+
+
+class GyroModel(Protocol):
+    """A model of a gyro that can be diagnosed."""
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+
+    @property
+    def grade(self) -> Any:
+        """Whose ranges are the usual sizes of candidates: ``tactical`` or ``navigation``."""
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """The constants, shared by all runs of a unit, with their priors."""
+
+    @property
+    def noise(self) -> NoisePrior:
+        """What is known of the noise."""
+
+    def candidates(self) -> Mapping[str, Candidate]:
+        """Effects to choose from, by id."""
+
+    def on(self, run: Run) -> ModelOnRun:
+        """The model with a run's inputs.
+
+        Raises
+        ------
+        InputError
+            If the run lacks what the model needs.
+        """
+
+    def write(
+        self,
+        path: Path,
+        constants: Mapping[str, float],
+        effects: tuple[EffectValue, ...],
+        noise: NoisePrior,
+        standard_errors: Mapping[str, float],
+    ) -> None:
+        """Write the fitted model with the effects added, ready to replay."""

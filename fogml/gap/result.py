@@ -1,0 +1,373 @@
+"""The result of a diagnosis, and ``gap.json``, schema ``fogml.gap/1``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.runs.run import FloatArray
+
+SCHEMA = "fogml.gap/1"
+NAMED = 0.5
+"""An effect is named from this probability on."""
+Verdict = Literal["no_gap", "explained", "ambiguous", "partly_explained", "unknown"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its standard error and unit."""
+
+    value: float
+    se: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class RunAmplitude:
+    """An effect's amplitude from one run alone, the other effects and constants as found."""
+
+    run: str
+    value: float
+    se: float
+
+
+@dataclass(frozen=True)
+class Found:
+    """An effect that was found.
+
+    Attributes
+    ----------
+    effect, stage
+        Id and stage.
+    members
+        Ids that these runs can't tell from it, itself included.
+    probability
+        That one of the members acts.
+    amplitude
+        In the card's unit.
+    parameters
+        Shape parameters by name.
+    by_run
+        The amplitude from each run that can show it.
+    consistent
+        Whether those agree in sign and size.
+    """
+
+    effect: str
+    stage: str
+    members: tuple[str, ...]
+    probability: float
+    amplitude: Estimate
+    parameters: Mapping[str, Estimate] = field(default_factory=dict)
+    by_run: tuple[RunAmplitude, ...] = ()
+    consistent: bool = True
+
+    @property
+    def named(self) -> bool:
+        """Whether it is named."""
+        return self.probability >= NAMED
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """What no candidate explains: its probability, and what it looks like in plain words."""
+
+    probability: float
+    looks_like: str
+
+
+@dataclass(frozen=True)
+class Share:
+    """A part of the structural gap's energy above the floor, with a 90 % interval."""
+
+    name: str
+    share: float
+    share_ci90: tuple[float, float] | None = None
+    excess_rms: float | None = None
+    excess_rms_ci90: tuple[float, float] | None = None
+    significant: bool = False
+    unit: str = "deg/h"
+
+
+@dataclass(frozen=True)
+class TemperatureExcess:
+    """The structural gap over the floor in a span of temperature [degC], with up and down apart."""
+
+    from_degc: float
+    to_degc: float
+    excess_rms: float
+    significant: bool
+    mean_up: float | None
+    mean_down: float | None
+
+
+@dataclass(frozen=True)
+class TimescaleExcess:
+    """Ratio of the structural gap to the floor at an averaging time [s], with a 90 % interval."""
+
+    tau_s: float
+    excess: float
+    ci90: tuple[float, float]
+    significant: bool
+
+
+@dataclass(frozen=True)
+class GapSegment:
+    """A stretch in which the structural gap exceeds the floor."""
+
+    run: str
+    from_s: float
+    to_s: float
+    excess_rms: float
+    unit: str = "deg/h"
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where the structural gap lies."""
+
+    stage: tuple[Share, ...] = ()
+    regime: tuple[Share, ...] = ()
+    temperature: tuple[TemperatureExcess, ...] = ()
+    timescale: tuple[TimescaleExcess, ...] = ()
+    segments: tuple[GapSegment, ...] = ()
+
+
+@dataclass(frozen=True)
+class HowFar:
+    """How far the gap closes on a held-out run; rms of averages over `averaging_s` [deg/h]."""
+
+    run: str
+    averaging_s: float
+    before: float
+    recalibrated: float
+    after: float
+    floor: float
+    closed: float | None
+    closed_ci90: tuple[float, float] | None
+    note: str = ""
+    unit: str = "deg/h"
+
+
+@dataclass(frozen=True)
+class SeparatingRun:
+    """The programme that tells classes' members apart or shows what can't be seen."""
+
+    separates: tuple[str, ...]
+    programme: str
+    distance: float
+    hours: float
+    steps: tuple[str, ...] = ()
+    alternatives: tuple[Mapping[str, Any], ...] = ()
+
+
+@dataclass(frozen=True)
+class ConstantFit:
+    """A constant of the model: prior and fitted value."""
+
+    name: str
+    unit: str
+    prior_mean: float
+    prior_sd: float
+    value: float
+    se: float
+
+
+@dataclass(frozen=True)
+class NoiseReport:
+    """The noise model.
+
+    ``coefficients`` and ``relative_se`` by the names N, B, K. ``source`` says what it was fitted
+    on; ``white`` and ``failed`` are the check on the held-out runs' innovations.
+    """
+
+    coefficients: Mapping[str, float]
+    relative_se: Mapping[str, float]
+    source: str
+    white: bool | None = None
+    p_value: float | None = None
+    failed: tuple[str, ...] = ()
+    lags_s: tuple[float, ...] = ()
+    autocorrelation: tuple[float, ...] = ()
+    scales_s: tuple[float, ...] = ()
+    variance_ratio: tuple[float, ...] = ()
+    samples: int = 0
+
+
+@dataclass(frozen=True)
+class CandidateEvidence:
+    """How a candidate alone does: gain in log evidence over no effect [nats], and what the runs can show."""
+
+    effect: str
+    title: str
+    stage: str
+    gain: float
+    probability: float
+    usual_length: float
+    status: Literal["named", "possible", "no_sign", "undetectable", "in_constants"]
+
+
+@dataclass(frozen=True, eq=False)
+class RunSeries:
+    """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
+
+    ``recorded`` is less the reference; ``gap_before``, ``gap_recalibrated`` and ``gap_after`` are
+    recorded less replayed; ``explained`` is what the effects found add; ``rate_degc_min`` tells up
+    and down apart.
+    """
+
+    run: str
+    role: Literal["fit", "held_out"]
+    averaging_s: float
+    time_s: FloatArray
+    temperature_degc: FloatArray
+    rate_degc_min: FloatArray
+    regime: NDArray[np.int8]
+    recorded: FloatArray
+    replayed_before: FloatArray
+    replayed_recalibrated: FloatArray
+    replayed_after: FloatArray
+    gap_before: FloatArray
+    gap_recalibrated: FloatArray
+    gap_after: FloatArray
+    floor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """The result of `fogml.gap.diagnose`.
+
+    Attributes
+    ----------
+    fit, held_out, noise_run
+        Names of the runs.
+    held_out_is_part
+        Whether the last stretch of the last run was held out for want of a run.
+    verdict
+        In one word.
+    found
+        Effects with some probability, the most certain first.
+    unknown
+        What no candidate explains.
+    where, how_far
+        Of the structural gap, and what is closed on each held-out run.
+    undetectable
+        Candidates that these runs could not show at their usual size.
+    separating_run
+        What to measure next; None where nothing is open.
+    constants
+        The recalibrated constants.
+    evidence
+        Each candidate by itself.
+    noise
+        The noise model.
+    series
+        For drawing.
+    unusable
+        Runs that could not be used, with the reason.
+    assumed
+        What was assumed, in words.
+    model
+        Name of the model.
+    """
+
+    fit: tuple[str, ...]
+    held_out: tuple[str, ...]
+    noise_run: str | None
+    held_out_is_part: bool
+    verdict: Verdict
+    found: tuple[Found, ...]
+    unknown: Unknown
+    where: Where
+    how_far: tuple[HowFar, ...]
+    undetectable: tuple[str, ...]
+    separating_run: SeparatingRun | None
+    constants: tuple[ConstantFit, ...]
+    evidence: tuple[CandidateEvidence, ...]
+    noise: NoiseReport
+    series: tuple[RunSeries, ...]
+    unusable: tuple[tuple[str, str], ...] = ()
+    assumed: tuple[str, ...] = ()
+    model: str = "nominal"
+
+    @property
+    def named(self) -> tuple[Found, ...]:
+        """The effects that are named."""
+        return tuple(found for found in self.found if found.named)
+
+    def as_dict(self) -> dict[str, Any]:
+        """The content of ``gap.json``."""
+        return {
+            "schema": SCHEMA,
+            "runs": {
+                "fit": list(self.fit),
+                "held_out": list(self.held_out),
+                "noise": self.noise_run,
+                "held_out_is_part_of_last_run": self.held_out_is_part,
+                "unusable": [{"run": run, "reason": reason} for run, reason in self.unusable],
+            },
+            "model": self.model,
+            "verdict": self.verdict,
+            "which": [_found(found) for found in self.found],
+            "unknown": asdict(self.unknown),
+            "where": _where(self.where),
+            "how_far": [_plain(asdict(item)) for item in self.how_far],
+            "undetectable": list(self.undetectable),
+            "separating_run": None if self.separating_run is None else _plain(asdict(self.separating_run)),
+            "constants": {
+                c.name: {"value": c.value, "se": c.se, "unit": c.unit, "prior": [c.prior_mean, c.prior_sd]}
+                for c in self.constants
+            },
+            "noise": _plain(asdict(self.noise)),
+            "evidence": [_plain(asdict(item)) for item in self.evidence],
+            "assumed": list(self.assumed),
+        }
+
+
+def _found(found: Found) -> dict[str, Any]:
+    return {
+        "effect": found.effect,
+        "class": list(found.members),
+        "probability": found.probability,
+        "amplitude": asdict(found.amplitude),
+        "parameters": {name: asdict(value) for name, value in found.parameters.items()},
+        "stage": found.stage,
+        "by_run": [asdict(item) for item in found.by_run],
+        "consistent": found.consistent,
+    }
+
+
+def _where(where: Where) -> dict[str, Any]:
+    return {
+        "stage": [_plain(asdict(item)) for item in where.stage],
+        "regime": [_plain(asdict(item)) for item in where.regime],
+        "temperature": [
+            {
+                "from": t.from_degc,
+                "to": t.to_degc,
+                "excess_rms": t.excess_rms,
+                "unit": "deg/h",
+                "significant": t.significant,
+                "mean_up": t.mean_up,
+                "mean_down": t.mean_down,
+            }
+            for t in where.temperature
+        ],
+        "timescale": [_plain(asdict(item)) for item in where.timescale],
+        "segments": [asdict(item) for item in where.segments],
+    }
+
+
+def _plain(values: Any) -> Any:
+    """Tuples as lists, numpy numbers as Python's."""
+    if isinstance(values, dict):
+        return {key: _plain(value) for key, value in values.items()}
+    if isinstance(values, list | tuple):
+        return [_plain(value) for value in values]
+    if isinstance(values, np.generic):
+        return values.item()
+    return values

@@ -1,0 +1,39 @@
+"""Whitening of one run's rows: the gyro's noise, and what the noise of temperature readings adds."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from fogml.gap.observation import Observation
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_model import NoiseModel
+from fogml.signals.whitening import Whitener
+
+
+class RunWhitener:
+    """Whitens series over the rows of a run.
+
+    Rows in which the readings' noise matters, such as fast turns with a scale factor that depends on
+    temperature, weigh less: readings' noise is white, so it adds to the innovations' variance.
+
+    Parameters
+    ----------
+    noise
+        The gyro's noise.
+    o
+        The run.
+    constants
+        At which the readings' noise is taken.
+    """
+
+    def __init__(self, noise: NoiseModel, o: Observation, constants: Mapping[str, float]) -> None:
+        self._whitener = Whitener(noise, o.time, o.row_s)
+        reading = np.sqrt(o.averaged(o.model.reading_noise(constants) ** 2) / o.width)
+        self.weights: FloatArray = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
+
+    def whiten(self, values: FloatArray) -> FloatArray:
+        """White rows of unit variance, shape as given: (m,) or (m, k)."""
+        white = self._whitener.whiten(values)
+        return np.asarray(white * (self.weights if white.ndim == 1 else self.weights[:, None]))

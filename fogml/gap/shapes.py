@@ -1,0 +1,138 @@
+"""Grids over a candidate's shape parameters.
+
+A shape parameter that the response depends on in proportion, and an angle, need no grid: what they
+can do is a few columns beside each other, with the second moments of their priors. The others get
+nodes close enough that a response between two of them is like one of both.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from fogml.gap.model import Candidate
+from fogml.runs.run import FloatArray
+from fogml.twin.quantities import Quantity
+
+Response = Callable[[Mapping[str, float]], FloatArray]
+NODES = {1: 9, 2: 5, 3: 4}
+"""Nodes for each parameter that needs a grid, by how many there are."""
+CYCLES_BETWEEN_NODES = 0.3
+"""A line's frequency is known to this many cycles over the longest run."""
+MOST_LINES = 1500
+
+
+@dataclass(frozen=True)
+class Node:
+    """A point of the grid: a stated shape, and the shapes whose responses span what it can do.
+
+    Attributes
+    ----------
+    shape
+        Shape parameters at the node, linear ones in the middle of their range.
+    draws
+        Shapes to evaluate; the node's covariance is the mean of their responses' outer products.
+    """
+
+    shape: Mapping[str, float]
+    draws: tuple[Mapping[str, float], ...]
+
+
+def grid(
+    candidate: Candidate, grade: str, response: Response, spans: Mapping[str, float]
+) -> tuple[Node, ...]:
+    """The nodes of a candidate.
+
+    Parameters
+    ----------
+    candidate
+        The candidate.
+    grade
+        Whose ranges hold.
+    response
+        Its response on some run [deg/h], for the test of proportionality.
+    spans
+        ``"s"``: longest run [s]; ``"degC"``: widest span of temperature [degC]; ``"sample"``: row [s].
+    """
+    if not candidate.shape:
+        return (Node({}, ({},)),)
+    usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+    turning = [q for q in candidate.shape if _is_angle(q)]
+    rest = [q for q in candidate.shape if q not in turning]
+    linear = [q for q in rest if not _is_line(q) and _in_proportion(q, grade, response, usual)]
+    bent = [q for q in rest if q not in linear]
+    axes = [_axis(q, grade, NODES[min(len(bent), 3)], spans) for q in bent]
+    nodes = []
+    for values in product(*axes):
+        shape = usual | {q.name: value for q, value in zip(bent, values)}
+        # Lines are many: their linear parameters stay in the middle.
+        spread = _spread([] if any(map(_is_line, bent)) else linear, turning, grade)
+        nodes.append(Node(shape, tuple(shape | more for more in spread)))
+    return tuple(nodes)
+
+
+def _is_angle(quantity: Quantity) -> bool:
+    low, high = quantity.tactical
+    return quantity.unit == "deg" and high - low >= 180.0
+
+
+def _is_line(quantity: Quantity) -> bool:
+    return "period" in quantity.name or "frequency" in quantity.name
+
+
+def _in_proportion(quantity: Quantity, grade: str, response: Response, usual: Mapping[str, float]) -> bool:
+    low, high = quantity.range(grade)  # type: ignore[arg-type]
+    a, m, b = (response({**usual, quantity.name: x}) for x in (low, 0.5 * (low + high), high))
+    size = np.linalg.norm(a) + np.linalg.norm(b)
+    return bool(np.linalg.norm(m - 0.5 * (a + b)) <= 1e-9 * size)
+
+
+def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]) -> Sequence[float]:
+    low, high = quantity.range(grade)  # type: ignore[arg-type]
+    if _is_line(quantity):
+        return _lines(quantity, low, high, spans)
+    if low > 0.0 and high / low > 3.0:
+        return [float(x) for x in np.geomspace(low, high, count)]
+    return [float(x) for x in np.linspace(low, high, count)]
+
+
+def _lines(quantity: Quantity, low: float, high: float, spans: Mapping[str, float]) -> Sequence[float]:
+    """Values of a period or a frequency, evenly spaced in frequency."""
+    is_period = "period" in quantity.name
+    first, last = (1.0 / high, 1.0 / low) if is_period else (low, high)
+    span = spans["degC"] if quantity.unit.startswith("degC") else spans["s"]
+    if not quantity.unit.startswith("degC") and quantity.unit in ("s", "Hz"):
+        last = min(last, 0.5 / spans["sample"])
+    elif quantity.unit not in ("s", "Hz", "degC"):
+        span = (10.0 if is_period else 1.0) * CYCLES_BETWEEN_NODES * 8.0 / max(last - first, 1e-12)
+    if last <= first:
+        return [high if is_period else low]
+    count = int(np.clip(math.ceil((last - first) * span / CYCLES_BETWEEN_NODES) + 1, 2, MOST_LINES))
+    frequencies = np.linspace(first, last, count)
+    return [float(x) for x in (1.0 / frequencies if is_period else frequencies)]
+
+
+def _spread(linear: Sequence[Quantity], turning: Sequence[Quantity], grade: str) -> list[dict[str, float]]:
+    """Points whose second moments are those of the priors of linear parameters and angles."""
+    middles, spreads = {}, {}
+    for quantity in linear:
+        low, high = quantity.range(grade)  # type: ignore[arg-type]
+        middles[quantity.name] = 0.5 * (low + high)
+        spreads[quantity.name] = (high - low) / math.sqrt(12.0)
+    points = [middles]
+    if linear:
+        # Sigma points: the mean and pairs about it along each axis, equal weights.
+        reach = math.sqrt(len(linear) + 0.5)
+        points = [
+            middles | {name: middles[name] + sign * reach * spreads[name]}
+            for name in spreads
+            for sign in (-1.0, 1.0)
+        ] + [middles]
+    for quantity in turning:
+        low = quantity.tactical[0]
+        points = [point | {quantity.name: low + turn} for point in points for turn in (0.0, 90.0)]
+    return points

@@ -1,0 +1,186 @@
+"""The twin as a model that can be diagnosed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
+from fogml.gap.noise_effects import Line, noise_response
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.inputs import STAND_INS, Inputs
+from fogml.twin.nominal import NAMES, UNITS, NominalConstants, nominal_columns, temperature_slopes
+from fogml.twin.plant.estimate import estimate_nodes
+from fogml.twin.replay import Replayer, inputs_of_run
+from fogml.twin.registry import effect, effects
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import save_twin
+
+
+class TwinModel:
+    """A twin, its nominal constants with their priors, and the catalogue's candidates.
+
+    Parameters
+    ----------
+    twin
+        The twin to start from; effects that are on in it are part of it and no candidates.
+    """
+
+    def __init__(self, twin: Twin) -> None:
+        self.twin = twin
+        self.name = twin.name
+        self.grade = twin.grade
+
+    @property
+    def constants(self) -> tuple[Constant, ...]:
+        """The nominal constants about the twin's values."""
+        values, deviations = asdict(self.twin.nominal), asdict(self.twin.nominal_sd)
+        return tuple(Constant(name, UNITS[name], values[name], deviations[name]) for name in NAMES)
+
+    @property
+    def noise(self) -> NoisePrior:
+        """The twin's noise and its factors."""
+        noise, factor = self.twin.noise, self.twin.noise_factor
+        return NoisePrior(noise.N, noise.B, noise.K, factor["N"], factor["B"], factor["K"])
+
+    def candidates(self) -> Mapping[str, Candidate]:
+        """Candidates of the catalogue that are not on yet and don't conflict with what is."""
+        on = set(self.twin.settings)
+        return {
+            id: Line(declared) if id == "sinusoidal" else declared
+            for id, declared in effects().items()
+            if declared.candidate and id not in on and not on & set(declared.conflicts)
+        }
+
+    def on(self, run: Run) -> TwinOnRun:
+        """The twin with a run's inputs."""
+        return TwinOnRun(self.twin, run)
+
+    def write(
+        self,
+        path: Path,
+        constants: Mapping[str, float],
+        effects: tuple[EffectValue, ...],
+        noise: NoisePrior,
+        standard_errors: Mapping[str, float],
+    ) -> None:
+        """Write a twin file: constants as fitted, their standard errors as priors, effects on."""
+        twin = with_effects(self.twin, constants, effects)
+        deviations = asdict(self.twin.nominal_sd) | {
+            name: value for name, value in standard_errors.items() if value > 0.0
+        }
+        twin = replace(
+            twin,
+            name=f"{self.twin.name}-diagnosed",
+            description="Fitted to recordings, with the effects that a diagnosis named",
+            nominal_sd=NominalConstants(**deviations),
+            noise=replace(self.twin.noise, N=noise.N, B=noise.B, K=noise.K),
+            noise_factor={"N": noise.factor_N, "B": noise.factor_B, "K": noise.factor_K},
+        )
+        save_twin(twin, path)
+
+
+def with_effects(twin: Twin, constants: Mapping[str, float], effects: tuple[EffectValue, ...]) -> Twin:
+    """The twin with constants set and effects on."""
+    changed = twin.with_nominal(**constants)
+    for value in effects:
+        known = {q.name for q in effect(value.id).shape}
+        shape = {name: number for name, number in value.shape.items() if name in known}
+        changed = changed.with_effect(value.id, value.amplitude, **shape)
+    return changed
+
+
+class TwinOnRun:
+    """The twin with what one run recorded; nodes that candidates ask for follow from the plant.
+
+    Raises
+    ------
+    InputError
+        If the run holds no temperature.
+    """
+
+    def __init__(self, twin: Twin, run: Run) -> None:
+        if not run.temperature_columns:
+            raise InputError(
+                f"{run.name}: holds no temperature; a replay needs a column 'T [degC]' or 'T_in [degC]'"
+            )
+        self._twin, self._run = twin, run
+        self._recorded, windows = inputs_of_run(run)
+        self._replayer = Replayer(run)
+        missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
+        nodes: Mapping[str, FloatArray] = {}
+        if missing:
+            nodes = estimate_nodes(
+                twin.network,
+                self._recorded.time,
+                self._recorded.temperatures,
+                powered=windows,
+                fan=self._recorded.drives.get("fan"),
+                table_rate=self._recorded.table_rate,
+            )
+        self._full = replace(self._recorded, temperatures={**nodes, **self._recorded.temperatures}, cache={})
+        self._outputs: dict[tuple[float, ...], tuple[FloatArray, Mapping[str, FloatArray]]] = {}
+
+    def columns(self) -> Mapping[str, FloatArray]:
+        """Response to a unit of each nominal constant [deg/h], each of shape (n,)."""
+        return nominal_columns(self._recorded.afresh())
+
+    def output(self, constants: Mapping[str, float], effects: tuple[EffectValue, ...] = ()) -> FloatArray:
+        """The replay [deg/h], shape (n,)."""
+        return self._replayer.output(with_effects(self._twin, constants, effects))
+
+    def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
+        """Change of the output per unit of an effect's amplitude [deg/h], shape (n,)."""
+        declared = effect(id)
+        if isinstance(declared, NoiseEffect):
+            return noise_response(id, shape, self._recorded.time)
+        inputs = self._met(constants) if self._meets_output(declared) else self._full.afresh()
+        return np.asarray(declared.response(inputs, **shape), dtype=np.float64)
+
+    def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
+        """What the noise of the temperature readings makes of the replay, as a standard deviation.
+
+        Shape (n,) [deg/h]; the readings' noise is told from their second differences, and from
+        their least step.
+        """
+        slopes = temperature_slopes(self._recorded.afresh(), NominalConstants(**dict(constants)))
+        variance = np.zeros(len(self._recorded))
+        for name, slope in slopes.items():
+            place = self._recorded.place(name)
+            if place is not None:
+                variance += (slope * _reading_noise(self._recorded.temperatures[place])) ** 2
+        return np.sqrt(variance)
+
+    def _meets_output(self, declared: Effect) -> bool:
+        return bool({"output", "slopes"} & set(declared.needs))
+
+    def _met(self, constants: Mapping[str, float]) -> Inputs:
+        """Inputs with the output and the slopes at given constants."""
+        key = tuple(constants.get(name, 0.0) for name in NAMES)
+        if key not in self._outputs:
+            if len(self._outputs) > 4:
+                self._outputs.clear()
+            nominal = NominalConstants(**dict(constants))
+            self._outputs[key] = (
+                self.output(constants),
+                temperature_slopes(self._recorded.afresh(), nominal),
+            )
+        output, slopes = self._outputs[key]
+        return replace(self._full.afresh(), output=output, slopes=slopes)
+
+
+def _reading_noise(temperature: FloatArray) -> float:
+    """Standard deviation of a temperature's readings [degC]."""
+    if len(temperature) < 16:
+        return 0.0
+    second = np.abs(np.diff(temperature, 2))
+    steps = np.abs(np.diff(temperature))
+    steps = steps[steps > 1e-9]
+    least = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
+    quantised = least / np.sqrt(12.0) if len(np.unique(temperature)) < len(temperature) / 2 else 0.0
+    return float(max(np.median(second) / 0.6745 / np.sqrt(6.0), quantised))
