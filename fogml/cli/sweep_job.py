@@ -1,0 +1,204 @@
+"""The job of ``fogml sweep``."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Literal
+
+import yaml
+from pydantic import Field, field_validator
+
+from fogml import __version__
+from fogml.cli.runs import open_run, open_runs
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.outputs import whole_folder
+from fogml.runs.run import Run
+from fogml.tuning.plan import OBJECTIVES, Plan
+from fogml.tuning.space import Space
+
+if TYPE_CHECKING:
+    import optuna
+
+    from fogml.validation.results import Judgement
+
+
+class SweepSettings(Settings):
+    """Settings of ``fogml sweep``: a file of schema ``fogml.sweep/1``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
+    schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
+    name: str = "sweep"
+    runs: list[str] = []
+    test: list[str] = []
+    space: Space
+    objectives: list[str] = ["rms"]
+    folds: Literal["auto", "time", "runs"] = "auto"
+    fold_count: int = 5
+    trials: int = 50
+    sampler: str = "tpe"
+    prune: bool = True
+    workers: int = 1
+    storage: str | None = None
+    heartbeat_s: float = 10.0
+    averaging: float = 100.0
+    repair: bool = False
+    out: str = "sweep-results"
+
+    @field_validator("objectives", mode="before")
+    @classmethod
+    def _from_text(cls, value: object) -> object:
+        if isinstance(value, str):
+            return [name.strip() for name in value.split(",") if name.strip()]
+        return value
+
+    @field_validator("space", mode="before")
+    @classmethod
+    def _understood(cls, value: Any) -> Space:
+        """The space; a fault names its place."""
+        from pydantic import ValidationError
+
+        try:
+            return value if isinstance(value, Space) else Space.model_validate(value)
+        except ValidationError as error:
+            first = error.errors()[0]
+            place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
+            reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
+            raise ValueError(f"{place}: {reason}" if place else reason) from None
+
+    def yaml(self, command: str) -> str:
+        """The settings in full as the text of a configuration file; a password is never written."""
+        from fogml.tuning.storage import without_password
+
+        head = f"# fogml {__version__}: run it again with  fogml {command} config.yaml\n"
+        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        if self.storage is not None:
+            values["storage"] = without_password(self.storage)
+        return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+    def plan(self, runs: list[Run]) -> Plan:
+        """What workers are told."""
+        return Plan(
+            name=self.name,
+            read=partial(_read, tuple(self.runs), self.repair, [run.hash for run in runs]),
+            space=self.space,
+            objectives=tuple(self.objectives),
+            folds=self.folds,
+            fold_count=self.fold_count,
+            trials=self.trials,
+            sampler=self.sampler,
+            prune=self.prune,
+            seed=self.seed,
+            storage=self.storage,
+            folder=self.out,
+            heartbeat_s=self.heartbeat_s,
+        )
+
+
+def _read(paths: tuple[str, ...], repair: bool, hashes: list[str]) -> list[Run]:
+    """The training runs, which have to be those that the sweep began with."""
+    runs = [open_run(path, repair=repair) for path in paths]
+    for path, run, wanted in zip(paths, runs, hashes, strict=True):
+        if run.hash != wanted:
+            raise InputError(f"{path}: has changed since the sweep began; finished trials are kept")
+    return runs
+
+
+def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
+    """Run the trials that are missing, judge the winner once on the test runs, write the results."""
+    from fogml.report.sweep_page import sweep_page
+    from fogml.tuning.results import study_json
+    from fogml.tuning.sweep import run_sweep
+
+    if not settings.runs:
+        raise InputError("no training run is given; state 'runs' in the file, or --run")
+    if not settings.averaging > 0.0:
+        raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
+    runs = open_runs(settings.runs, terminal, repair=settings.repair)
+    test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else []
+    with terminal.work("sweeping", total=settings.trials) as work:
+        study = run_sweep(
+            settings.plan(runs),
+            settings.workers,
+            lambda done, what: work.reached(done, settings.trials, f"tried {what}"),
+        )
+    with whole_folder(settings.out) as folder:
+        best = best_settings(settings, study)
+        judgement = _judge(settings, best, runs, test_runs, terminal)
+        values = study_json(
+            study,
+            objectives=settings.objectives,
+            runs=settings.runs,
+            test=settings.test,
+            seed=settings.seed,
+            averaging_s=settings.averaging,
+            storage=settings.storage,
+            judgement=judgement,
+        )
+        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
+        (folder / "sweep.json").write_text(text + "\n", encoding="utf-8")
+        (folder / "best.yaml").write_text(best, encoding="utf-8")
+        (folder / "config.yaml").write_text(settings.in_full().yaml("sweep"), encoding="utf-8")
+        with terminal.work("drawing"):
+            page = sweep_page(values, judgement)
+        (folder / "sweep.html").write_text(page, encoding="utf-8")
+    _print(values, terminal)
+    terminal.result(values)
+    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'sweep.html'}")
+
+
+def best_settings(settings: SweepSettings, study: optuna.Study) -> str:
+    """The winner as the text of a configuration of ``fogml train``."""
+    from fogml.cli.train_job import TrainSettings
+    from fogml.tuning.winner import train_settings, winner
+
+    chosen = winner(study.get_trials(deepcopy=False))
+    train = TrainSettings(
+        runs=settings.runs,
+        test=settings.test,
+        averaging=settings.averaging,
+        repair=settings.repair,
+        seed=settings.seed,
+        out=str(Path(settings.out) / "best"),
+        **train_settings(chosen),
+    )
+    return train.in_full().yaml("train").replace("config.yaml", "best.yaml")
+
+
+def _judge(
+    settings: SweepSettings, best: str, runs: list[Run], test_runs: list[Run], terminal: Terminal
+) -> Judgement | None:
+    """The winner, fitted to all training runs and judged on the test runs; None where there are none."""
+    if not test_runs:
+        return None
+    from fogml.cli.train_job import TrainSettings, fit_and_judge
+
+    train = TrainSettings.model_validate(yaml.safe_load(best))
+    return fit_and_judge(train, runs, test_runs, terminal)[1]
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    counts = values["counts"]
+    terminal.say(
+        f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or refused, "
+        f"judged on held-out {values['folds']}."
+    )
+    rows = []
+    for place in values["pareto"][:20]:
+        trial = values["trials"][place]
+        mark = "winner" if trial["number"] == values["winner"]["number"] else ""
+        figures = [number(trial["rms"]), str(trial["bytes"]), str(trial["operations"])]
+        rows.append([f"{trial['model']}: {trial['features'] or 'no features'}", *figures, mark])
+    units = [f"{name} [{unit}]" for name, unit in OBJECTIVES.items()]
+    terminal.table("Trials that none beats in every objective", ["model", *units, ""], rows)
+    judged = values["winner"].get("judged")
+    for run in judged["test"] if judged else []:
+        terminal.say(
+            f"{run['run']}, judged once: rms {number(run['before']['rms'])} before, "
+            f"{number(run['after']['rms'])} deg/h after, floor {number(run['floor'])} "
+            f"({run['averaging_s']:g} s averages)"
+        )
+    terminal.say(values["winner"]["command"])

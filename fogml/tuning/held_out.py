@@ -1,0 +1,169 @@
+"""Choices judged on held-out parts of the training runs, fold after fold, on the same rows for all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.features.parse import parse_features
+from fogml.models.card import checked_runs
+from fogml.models.feature_model import FeatureModel
+from fogml.models.folds import Fold, run_folds, time_folds
+from fogml.models.names import make_model
+from fogml.models.regressors import regressor_to_saved
+from fogml.models.table import RunRows, TrainingTable, usable_rows
+from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.tuning.operations import operations_per_sample
+from fogml.tuning.space import Choice, Space
+
+FOLD_COUNTS = (2, 4, 5, 10, 20)
+"""Numbers of folds that the 20 blocks of time of a run can be dealt to evenly."""
+_BLOCKS = 20
+
+
+@dataclass(frozen=True)
+class FoldResult:
+    """What one fold tells of a choice.
+
+    Attributes
+    ----------
+    squared_errors
+        Mean squared error on each block of time held out [(deg/h)**2].
+    rows
+        Rows of each block.
+    size_bytes
+        Bytes of the fitted weights.
+    operations
+        Operations per sample.
+    """
+
+    squared_errors: list[float]
+    rows: list[int]
+    size_bytes: int
+    operations: int
+
+
+class HeldOut:
+    """Training runs parted into folds, for any number of choices out of a space.
+
+    Every choice is judged on the same rows: those at which the longest windows of the space are
+    full, averaged over the same blocks of time.
+
+    Parameters
+    ----------
+    runs
+        Training runs.
+    space
+        What there is to choose from.
+    folds
+        ``runs`` leaves out a run at a time, ``time`` blocks of time; ``auto`` takes runs where there
+        are several.
+    count
+        Number of folds of time, one of `FOLD_COUNTS`.
+    seed
+        Seed of the networks.
+
+    Raises
+    ------
+    InputError
+        If the runs don't belong together, lack a temperature that the space names, or are too short.
+    """
+
+    def __init__(
+        self,
+        runs: Sequence[Run],
+        space: Space,
+        *,
+        folds: Literal["auto", "time", "runs"] = "auto",
+        count: int = 5,
+        seed: int = 0,
+    ) -> None:
+        if count not in FOLD_COUNTS:
+            raise InputError(f"{count} folds: one of {', '.join(map(str, FOLD_COUNTS))} was expected")
+        self.runs = checked_runs(runs)
+        self.seed = seed
+        self._used = [_rows_of_all(run, space) for run in self.runs]
+        by_run = folds == "runs" or (folds == "auto" and len(self.runs) > 1)
+        self.folds: list[Fold] = (
+            run_folds(self._table)
+            if by_run
+            else time_folds(self._table, count, blocks_per_fold=_BLOCKS // count)
+        )
+        self.by_run = by_run
+
+    @cached_property
+    def _table(self) -> TrainingTable:
+        """The rows without features."""
+        rows = [
+            RunRows(np.empty((int(used.sum()), 0)), run.error_deg_h[used], run.time[used])
+            for run, used in zip(self.runs, self._used, strict=True)
+        ]
+        table = bare_table(averaged_rows(rows))
+        if len(table) < 2 * _BLOCKS:
+            raise InputError(
+                f"the training runs hold {len(table)} rows with full windows; give longer runs, or shorter "
+                "windows in the space"
+            )
+        return table
+
+    def judged(self, choice: Choice) -> Iterator[FoldResult]:
+        """The choice on each fold in turn.
+
+        Raises
+        ------
+        InputError
+            If it can't be fitted to these runs.
+        """
+        for (fitted, held), (predicted, bytes_, operations) in zip(
+            self.folds, self._predictions(choice), strict=True
+        ):
+            squares = (self._table.y[held] - predicted) ** 2
+            starts = np.flatnonzero(np.diff(self._table.block[held], prepend=-1))
+            counts = np.diff(starts, append=len(held))
+            means = np.add.reduceat(squares, starts) / counts
+            yield FoldResult(means.tolist(), counts.tolist(), bytes_, operations)
+
+    def _predictions(self, choice: Choice) -> Iterator[tuple[FloatArray, int, int]]:
+        if not choice.features:
+            for fitted, held in self.folds:
+                yield np.full(len(held), self._table.y[fitted].mean()), 8, 1
+            return
+        features = parse_features(choice.features)
+        atoms = self._atoms(features.text)
+        model = make_model(choice.model, choice.features, self.seed, choice.parameters)
+        assert isinstance(model, FeatureModel)
+        for fitted, held in self.folds:
+            regressor = model.unfitted_regressor(len(features))
+            predicted, _, regressor = held_out_prediction(
+                regressor, features, atoms, self._table, fitted, held
+            )
+            if not np.isfinite(predicted).all():
+                raise InputError(f"{choice.model} of {choice.features}: values that are not finite")
+            yield predicted, weight_bytes(regressor), operations_per_sample(features, regressor)
+
+    def _atoms(self, text: str) -> FloatArray:
+        features = parse_features(text)
+        rows = []
+        for run, used in zip(self.runs, self._used, strict=True):
+            atoms, _ = features.atom_values(run)
+            rows.append(RunRows(atoms[used], run.error_deg_h[used], run.time[used]))
+        return np.concatenate([part.atoms for part in averaged_rows(rows)])
+
+
+def weight_bytes(regressor: Any) -> int:
+    """Bytes of a fitted regressor's saved arrays."""
+    return int(sum(array.nbytes for array in regressor_to_saved(regressor)[1].values()))
+
+
+def _rows_of_all(run: Run, space: Space) -> BoolArray:
+    """Rows of a run at which every window of the space is full."""
+    full = np.ones(len(run), dtype=np.bool_)
+    for text in space.extreme_texts():
+        full &= parse_features(text).atom_values(run)[1]
+    return usable_rows(run, full)[0]

@@ -1,0 +1,112 @@
+"""A study's journal file that survives killed writers and full disks."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
+
+try:
+    import fcntl
+except ImportError:  # not a POSIX system
+    fcntl = None  # type: ignore[assignment]
+
+
+class FileLock:
+    """A lock that the system takes back from a process that ends, however it ends.
+
+    Optuna's own locks are files that a killed process leaves behind.
+
+    Parameters
+    ----------
+    path
+        File that is locked, made if it is missing.
+    """
+
+    def __init__(self, path: str) -> None:
+        self._path = path
+        self._held: int | None = None
+
+    def acquire(self) -> bool:
+        """Wait for the lock."""
+        handle = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
+        fcntl.flock(handle, fcntl.LOCK_EX)
+        self._held = handle
+        return True
+
+    def release(self) -> None:
+        """Give it back."""
+        if self._held is not None:
+            os.close(self._held)
+            self._held = None
+
+
+class WholeLines(JournalFileBackend):
+    """Optuna's journal file, of which every line is whole.
+
+    A line that could not be written to its end is taken back, so the file stays readable when the
+    disk fills; what a writer that was killed left of a line is dropped by the next one.
+    """
+
+    def __init__(self, file_path: str) -> None:
+        path = Path(file_path)
+        if fcntl is None:
+            lock: Any = JournalFileOpenLock(file_path)
+        else:
+            lock = FileLock(str(path.with_name(f".{path.name}.lock")))
+        self._journal, self._guard = path, lock
+        super().__init__(file_path, lock_obj=lock)
+
+    def append_logs(self, logs: list[dict[str, Any]]) -> None:
+        """Append entries, all or none."""
+        text = "".join(json.dumps(log, separators=(",", ":")) + "\n" for log in logs)
+        with self._locked(), self._journal.open("r+b", buffering=0) as file:
+            end = _end_of_lines(file)
+            file.seek(end)
+            try:
+                _write_all(file, text.encode())
+                os.fsync(file.fileno())
+            except OSError:
+                file.truncate(end)
+                raise
+
+    @contextmanager
+    def _locked(self) -> Iterator[None]:
+        self._guard.acquire()
+        try:
+            yield
+        finally:
+            self._guard.release()
+
+
+def _write_all(file: Any, data: bytes) -> None:
+    """Write every byte: a disk that fills takes some of them first, and says so only on the next."""
+    while data:
+        data = data[file.write(data) :]
+
+
+def _end_of_lines(file: Any) -> int:
+    """Where the last whole line ends; what follows it is cut off."""
+    end = file.seek(0, os.SEEK_END)
+    if end == 0:
+        return 0
+    file.seek(end - 1)
+    if file.read(1) == b"\n":
+        return int(end)
+    whole = end
+    while whole > 0:
+        start = max(0, whole - 65536)
+        file.seek(start)
+        piece = file.read(whole - start)
+        found = piece.rfind(b"\n")
+        if found >= 0:
+            whole = start + found + 1
+            break
+        whole = start
+    file.truncate(whole)
+    return int(whole)

@@ -1,0 +1,187 @@
+"""Where studies are kept: a journal file for one machine, a database for many."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from fogml.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from optuna.storages import BaseStorage
+
+JOURNAL = "study.journal"
+_ANSWER_S = 10
+
+
+def open_storage(url: str | None, folder: str | Path) -> BaseStorage:
+    """The storage of a study.
+
+    Parameters
+    ----------
+    url
+        ``postgresql://user@host/database`` or another URL that SQLAlchemy knows; None for a journal
+        file in `folder`.
+    folder
+        Where the journal lies; made if it is missing.
+
+    Raises
+    ------
+    InputError
+        If the database does not answer, or the file can't be read or written.
+    """
+    import_optuna()
+    return _journal(Path(folder)) if url is None else _database(url)
+
+
+def shown(url: str | None) -> str:
+    """A storage's name without its password."""
+    if url is None:
+        return JOURNAL
+    from sqlalchemy.engine import make_url
+
+    return make_url(url).render_as_string(hide_password=True)
+
+
+def without_password(url: str | None) -> str | None:
+    """A storage's URL as it may be written to a file: libpq finds the password in PGPASSWORD or ~/.pgpass."""
+    if url is None:
+        return None
+    from sqlalchemy.engine import make_url
+
+    return make_url(url).set(password=None).render_as_string(hide_password=False)
+
+
+def import_optuna() -> Any:
+    """Optuna, silenced: what there is to say, fogml says.
+
+    Raises
+    ------
+    InputError
+        If it is not installed.
+    """
+    try:
+        import optuna
+    except ImportError:
+        raise InputError("a sweep needs Optuna: pip install 'fogml[sweep]'") from None
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    return optuna
+
+
+@contextmanager
+def storage_errors(url: str | None) -> Iterator[None]:
+    """Turn what a storage raises when it fails into one clear message.
+
+    Raises
+    ------
+    InputError
+        If the storage stops answering or can't be written.
+    """
+    from optuna.exceptions import StorageInternalError
+
+    failures: tuple[type[BaseException], ...] = (StorageInternalError,)
+    if url is not None:
+        from sqlalchemy.exc import SQLAlchemyError
+
+        failures += (SQLAlchemyError,)
+    try:
+        yield
+    except failures as error:
+        cause: BaseException = error
+        while cause.__cause__ is not None:
+            cause = cause.__cause__
+        told = str(cause).strip().split("\n")[0]
+        raise InputError(
+            f"storage {shown(url)}: does not answer ({told}); finished trials are kept, run the command again "
+            "once it does"
+        ) from error
+    except OSError as error:
+        if error.filename is not None and Path(error.filename).name != JOURNAL:
+            raise
+        raise InputError(
+            f"{JOURNAL}: cannot be written ({error.strerror or error}); finished trials are kept, make room "
+            "and run the command again"
+        ) from error
+
+
+def _journal(folder: Path) -> BaseStorage:
+    from optuna.storages import JournalStorage
+    from optuna.storages.journal import JournalFileBackend
+
+    from fogml.tuning.journal import WholeLines
+
+    if folder.exists() and not folder.is_dir():
+        raise InputError(f"{folder}: is a file, a folder was expected; choose another --out")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        path = folder / JOURNAL
+        with path.open("ab"):
+            pass
+    except OSError as error:
+        raise InputError(f"{folder}: cannot be written ({error.strerror}); choose another --out") from error
+    assert issubclass(WholeLines, JournalFileBackend)
+    try:
+        return JournalStorage(WholeLines(str(path)))
+    except (ValueError, KeyError, TypeError, AttributeError):
+        raise InputError(f"{path}: is no study's journal; move it away, or choose another --out") from None
+
+
+def _database(url: str) -> BaseStorage:
+    from optuna.storages import RDBStorage
+    from sqlalchemy.engine import make_url
+    from sqlalchemy.exc import ArgumentError, NoSuchModuleError, SQLAlchemyError
+
+    try:
+        parsed = make_url(url)
+    except ArgumentError:
+        raise InputError(
+            "--storage: no URL of a database; write it as postgresql://user@host/database"
+        ) from None
+    if parsed.drivername in ("postgresql", "postgres"):
+        parsed = parsed.set(drivername="postgresql+psycopg")
+    engine: dict[str, Any] = {"pool_pre_ping": True}
+    if parsed.get_backend_name() == "postgresql":
+        engine["connect_args"] = {"connect_timeout": _ANSWER_S}
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return cast(
+                "BaseStorage",
+                RDBStorage(parsed.render_as_string(hide_password=False), engine_kwargs=engine),
+            )
+    except (ImportError, NoSuchModuleError) as error:
+        raise InputError(
+            f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: pip install 'fogml[sweep]'"
+        ) from None
+    except (SQLAlchemyError, OSError, RuntimeError) as error:
+        told = str(getattr(error, "orig", None) or error).strip().split("\n")[0]
+        raise InputError(
+            f"--storage {shown(url)}: does not answer ({told}); start the database, or state another"
+        ) from None
+
+
+def process_is_alive(pid: int, started: str) -> bool:
+    """Whether a process of this machine still runs, and is the one that was meant."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return process_start(pid) == started
+
+
+def process_start(pid: int) -> str:
+    """What tells a process from a later one of the same number; empty where the system does not say."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2]
+    except OSError:
+        return ""
+    state, *rest = fields.split()
+    # A process that has ended but was not waited for runs no trial.
+    return "ended" if state == "Z" else rest[18]

@@ -1,0 +1,135 @@
+"""Studies: opening or joining one, counting its trials, and trying again what a dead worker left."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import time
+import warnings
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from fogml.errors import InputError
+from fogml.runs.run import Run
+from fogml.tuning.plan import Plan
+from fogml.tuning.storage import import_optuna, open_storage, process_is_alive, process_start, shown
+
+if TYPE_CHECKING:
+    import optuna
+    from optuna.trial import FrozenTrial
+
+IDENTITY, WORKER, BEAT = "fogml_identity", "worker", "beat"
+_SILENT_BEATS = 3
+
+
+def open_study(plan: Plan, runs: Sequence[Run] | None = None) -> optuna.Study:
+    """The plan's study, made where it is not there yet.
+
+    Parameters
+    ----------
+    plan
+        What to do.
+    runs
+        The training runs, to tell whether trials that are there already belong to them; None where
+        that is known.
+
+    Raises
+    ------
+    InputError
+        If the storage does not answer, or holds a study of this name made for something else.
+    """
+    found = import_optuna()
+    from fogml.tuning.sampling import SeededByTrial
+
+    study = found.create_study(
+        storage=open_storage(plan.storage, plan.folder),
+        sampler=SeededByTrial(plan.sampler, plan.seed),
+        pruner=found.pruners.NopPruner(),
+        study_name=plan.name,
+        directions=["minimize"] * len(plan.objectives),
+        load_if_exists=True,
+    )
+    if runs is not None:
+        _check_identity(study, plan, runs)
+    return study
+
+
+def _check_identity(study: optuna.Study, plan: Plan, runs: Sequence[Run]) -> None:
+    wanted = plan.identity(runs)
+    stored = study.user_attrs.get(IDENTITY)
+    if stored is None:
+        if study.get_trials(deepcopy=False):
+            raise InputError(f"study '{plan.name}' in {shown(plan.storage)}: was not made by fogml sweep")
+        study.set_user_attr(IDENTITY, json.dumps(wanted))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            study.set_metric_names(list(plan.objectives))
+        return
+    was = json.loads(stored)
+    other = [key for key, value in wanted.items() if was.get(key) != value]
+    if other:
+        raise InputError(
+            f"study '{plan.name}' in {shown(plan.storage)}: was made with another {' and '.join(other)}; "
+            "its trials can't be gone on with; state another --name, or another --out"
+        )
+
+
+def is_finished(trial: FrozenTrial) -> bool:
+    """Whether a trial counts towards those asked for: whole, or pruned."""
+    return trial.state.name in ("COMPLETE", "PRUNED")
+
+
+def finished_count(study: optuna.Study) -> int:
+    """Number of trials that count."""
+    return sum(is_finished(trial) for trial in study.get_trials(deepcopy=False))
+
+
+def sign_up(trial: optuna.Trial) -> None:
+    """Note on a trial which process runs it."""
+    pid = os.getpid()
+    trial.set_user_attr(WORKER, {"host": socket.gethostname(), "pid": pid, "started": process_start(pid)})
+
+
+class Recovery:
+    """Finds trials whose worker is gone, and puts them up to be tried again.
+
+    On this machine a worker is gone if its process is. Of another machine's workers a trial is
+    given up once its heartbeat has not changed for three times the heartbeat's interval, by this
+    machine's clock: clocks of machines differ.
+    """
+
+    def __init__(self, heartbeat_s: float) -> None:
+        self._patience_s = _SILENT_BEATS * heartbeat_s
+        self._heard: dict[int, tuple[Any, float]] = {}
+
+    def __call__(self, study: optuna.Study) -> int:
+        """Put up again what dead workers left; how many trials."""
+        running = [trial for trial in study.get_trials(deepcopy=False) if trial.state.name == "RUNNING"]
+        return sum(_try_again(study, trial) for trial in running if self._is_dead(trial))
+
+    def _is_dead(self, trial: FrozenTrial) -> bool:
+        worker = trial.user_attrs.get(WORKER)
+        here = worker is not None and worker["host"] == socket.gethostname() and worker["started"]
+        if here and not process_is_alive(worker["pid"], worker["started"]):
+            return True
+        now, beat = time.monotonic(), trial.user_attrs.get(BEAT)
+        before = self._heard.get(trial.number)
+        if before is None or before[0] != beat:
+            self._heard[trial.number] = (beat, now)
+            return False
+        return now - before[1] > self._patience_s
+
+
+def _try_again(study: optuna.Study, trial: FrozenTrial) -> bool:
+    """Fail a trial and put its parameters up again; False if somebody else did."""
+    from optuna.exceptions import UpdateFinishedTrialError
+    from optuna.trial import TrialState
+
+    try:
+        if not study._storage.set_trial_state_values(trial._trial_id, TrialState.FAIL):
+            return False
+    except UpdateFinishedTrialError:
+        return False
+    study.enqueue_trial(trial.params, user_attrs={"retry_of": trial.number})
+    return True

@@ -1,0 +1,149 @@
+"""Running a sweep: one worker here, or several processes that are started again when they die."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import TYPE_CHECKING
+
+from fogml.errors import FogmlError, InputError
+from fogml.tuning.held_out import HeldOut
+from fogml.tuning.plan import Plan
+from fogml.tuning.storage import storage_errors
+from fogml.tuning.study import Recovery, finished_count, open_study
+
+if TYPE_CHECKING:
+    import optuna
+
+Progress = Callable[[int, str], None]
+_POLL_S = 0.2
+_MOST_DEATHS = 5
+# Workers that end by themselves without a trial finished in between, before the sweep gives up.
+
+
+def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) -> optuna.Study:
+    """Run the plan's trials, or those that are still missing, and give the study.
+
+    Several processes, here or on other machines, may run the same plan at once; each ends when
+    the trials asked for are finished.
+
+    Parameters
+    ----------
+    plan
+        What to do.
+    workers
+        Processes; with one, trials run in this process.
+    progress
+        Called with (finished trials, what was tried last).
+
+    Raises
+    ------
+    InputError
+        If the plan can't be run, or the storage fails; finished trials are kept.
+    """
+    if workers < 1:
+        raise InputError(f"workers {workers}: at least 1 is needed")
+    plan.check()
+    held_out = _held_out(plan)
+    with storage_errors(plan.storage):
+        study = open_study(plan, held_out.runs)
+        Recovery(plan.heartbeat_s)(study)
+        if workers == 1:
+            _work_alone(study, plan, held_out, progress)
+        elif finished_count(study) < plan.trials:
+            del held_out
+            _Crew(study, plan, min(workers, plan.trials), progress).run()
+    return study
+
+
+def _held_out(plan: Plan) -> HeldOut:
+    return HeldOut(plan.read(), plan.space, folds=plan.folds, count=plan.fold_count, seed=plan.seed)
+
+
+def _work_alone(study: optuna.Study, plan: Plan, held_out: HeldOut, progress: Progress | None) -> None:
+    from threadpoolctl import threadpool_limits
+
+    from fogml.tuning.worker import work
+
+    # One thread, as in a crew: sums come out the same however many workers there are.
+    with threadpool_limits(limits=1):
+        work(study, plan, held_out, progress)
+
+
+def _worker_process(plan: Plan, told: Connection) -> None:
+    """What a worker's process does; bad input is told to the one that started it."""
+    try:
+        with storage_errors(plan.storage):
+            _work_alone(open_study(plan), plan, _held_out(plan), None)
+    except FogmlError as error:
+        told.send(str(error))
+    finally:
+        told.close()
+
+
+class _Crew:
+    """Worker processes; one that dies is replaced, and its trial tried again."""
+
+    def __init__(self, study: optuna.Study, plan: Plan, count: int, progress: Progress | None) -> None:
+        self._study, self._plan, self._progress = study, plan, progress
+        # Forked processes would share threads and locks of numerical libraries that don't survive it.
+        self._context = multiprocessing.get_context("spawn")
+        self._members = [self._start() for _ in range(count)]
+        self._recover = Recovery(plan.heartbeat_s)
+        self._deaths = 0
+        self._done = finished_count(study)
+
+    def run(self) -> None:
+        """Watch until the trials asked for are finished."""
+        try:
+            while self._members:
+                time.sleep(_POLL_S)
+                self._count()
+                self._members = [member for old in self._members for member in self._look_after(old)]
+        finally:
+            for process, _ in self._members:
+                process.terminate()
+                process.join()
+
+    def _count(self) -> None:
+        done = finished_count(self._study)
+        if done > self._done:
+            self._done, self._deaths = done, 0
+        if self._progress is not None:
+            self._progress(min(done, self._plan.trials), f"trial {done} of {self._plan.trials}")
+
+    def _look_after(self, member: tuple[BaseProcess, Connection]) -> list[tuple[BaseProcess, Connection]]:
+        process, told = member
+        if process.is_alive():
+            return [member]
+        process.join()
+        message = _said(told)
+        if message is not None:
+            raise InputError(message)
+        if process.exitcode == 0:
+            return []
+        self._deaths += 1
+        if self._deaths > _MOST_DEATHS:
+            raise InputError(
+                f"{self._deaths} workers in a row ended without finishing a trial (exit {process.exitcode}); "
+                "finished trials are kept; is there enough memory? Try fewer --workers"
+            )
+        self._recover(self._study)
+        return [self._start()]
+
+    def _start(self) -> tuple[BaseProcess, Connection]:
+        receiver, sender = self._context.Pipe(duplex=False)
+        process = self._context.Process(target=_worker_process, args=(self._plan, sender), daemon=True)
+        process.start()
+        sender.close()
+        return process, receiver
+
+
+def _said(told: Connection) -> str | None:
+    try:
+        return str(told.recv()) if told.poll() else None
+    except EOFError:
+        return None

@@ -1,0 +1,128 @@
+"""What a study found: the Pareto set, the winner, and what mattered."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.tuning.worker import score_of
+
+if TYPE_CHECKING:
+    from optuna.trial import FrozenTrial
+
+_TREES = 200
+_LEAST_TRIALS = 10
+
+
+def complete(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
+    """The trials that went through every fold, by number."""
+    return sorted((t for t in trials if t.state.name == "COMPLETE"), key=lambda t: t.number)
+
+
+def pareto(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
+    """The trials that no other is at least as good as in every objective and better in one.
+
+    Of trials that are equal in all objectives the first is kept. Sorted by error.
+    """
+    kept: list[FrozenTrial] = []
+    for trial in complete(trials):
+        others = [other for other in complete(trials) if other.number != trial.number]
+        if not any(_at_least_as_good(other, trial) for other in others):
+            kept.append(trial)
+    return sorted(kept, key=lambda t: (figure(t, "rms"), t.number))
+
+
+def _at_least_as_good(other: FrozenTrial, trial: FrozenTrial) -> bool:
+    if other.values == trial.values:
+        return other.number < trial.number
+    return all(a <= b for a, b in zip(other.values, trial.values, strict=True))
+
+
+def figure(trial: FrozenTrial, name: str) -> float:
+    """Held-out rms [deg/h], bytes or operations of a complete trial."""
+    if name != "rms":
+        return float(trial.user_attrs[name])
+    return float(np.sqrt(score_of(trial).mean_square))
+
+
+def winner(trials: Sequence[FrozenTrial]) -> FrozenTrial:
+    """The smallest trial that the one with the least error does not beat beyond noise.
+
+    Raises
+    ------
+    InputError
+        If no trial went through every fold.
+    """
+    found = complete(trials)
+    if not found:
+        reasons = [t.user_attrs["reason"] for t in trials if "reason" in t.user_attrs]
+        why = f": {reasons[0]}" if reasons else ""
+        raise InputError(f"no trial could be fitted{why}")
+    best = min(found, key=lambda t: (figure(t, "rms"), t.number))
+    score = score_of(best)
+    as_good = [t for t in found if not score.beats(score_of(t))]
+    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "rms"), t.number))
+
+
+def train_settings(trial: FrozenTrial) -> dict[str, Any]:
+    """Model, features and parameters of a trial, as a configuration of ``fogml train`` takes them."""
+    attributes = trial.user_attrs
+    values: dict[str, Any] = {"model": attributes["model"]}
+    if attributes["features"]:
+        values["features"] = attributes["features"]
+    if attributes["parameters"]:
+        values["parameters"] = dict(attributes["parameters"])
+    return values
+
+
+def command_line(
+    trial: FrozenTrial, runs: Sequence[str], test: Sequence[str], seed: int, averaging_s: float
+) -> str:
+    """The command that trains a trial's model on all training runs, for a shell."""
+    values = train_settings(trial)
+    words = ["fogml", "train", *runs, *(["--test", *test] if test else []), "--model", values["model"]]
+    if "features" in values:
+        words += ["--features", values["features"]]
+    for name, value in values.get("parameters", {}).items():
+        words += ["--set", f"{name}={value}"]
+    words += ["--averaging", f"{averaging_s:g}", "--seed", str(seed)]
+    return shlex.join(words)
+
+
+def importance(trials: Sequence[FrozenTrial], seed: int = 0) -> dict[str, float]:
+    """Share of each parameter in what the logarithm of the error varies by, the largest first.
+
+    By a random forest of the complete trials, and how much worse it gets when a parameter's values
+    are exchanged among trials (L. Breiman, Machine Learning 45 (2001) 5). Parameters that a trial
+    did not need count as a value of their own. Empty where there are fewer than ten trials.
+    """
+    found = complete(trials)
+    names = sorted({name for trial in found for name in trial.params})
+    errors = np.log([max(figure(trial, "rms"), 1e-300) for trial in found])
+    if len(found) < _LEAST_TRIALS or not names or np.ptp(errors) == 0.0:
+        return {}
+    from sklearn.ensemble import RandomForestRegressor
+    from sklearn.inspection import permutation_importance
+
+    columns = np.column_stack([_numbers([trial.params.get(name) for trial in found]) for name in names])
+    forest = RandomForestRegressor(_TREES, random_state=seed, n_jobs=1).fit(columns, errors)
+    worse = permutation_importance(forest, columns, errors, n_repeats=10, random_state=seed, n_jobs=1)
+    shares = np.maximum(worse.importances_mean, 0.0)
+    if not shares.sum() > 0.0:
+        return {}
+    shares = shares / shares.sum()
+    return {names[i]: float(shares[i]) for i in np.argsort(-shares, kind="stable")}
+
+
+def _numbers(values: list[Any]) -> Any:
+    """Values as numbers: numbers themselves, texts by their place in order; below all where missing."""
+    present = [value for value in values if value is not None]
+    if all(isinstance(value, int | float) for value in present):
+        least = min(present) - 1.0
+        return np.array([least if value is None else float(value) for value in values])
+    order = {text: place for place, text in enumerate(sorted({str(value) for value in present}))}
+    return np.array([-1.0 if value is None else float(order[str(value)]) for value in values])
