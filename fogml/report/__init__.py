@@ -1,5 +1,6 @@
 """Figures, self-contained HTML pages, certificates and spreadsheets."""
 
+from fogml.report.blind_page import blind_page
 from fogml.report.certificate import certificate
 from fogml.report.compare_page import compare_page
 from fogml.report.index_page import index_page
@@ -11,6 +12,7 @@ from fogml.report.spreadsheet import spreadsheet
 from fogml.report.train_page import train_page
 
 __all__ = [
+    "blind_page",
     "certificate",
     "compare_page",
     "index_page",

@@ -82,7 +82,7 @@ class BlindFolder:
         InputError
             If there are none.
         """
-        found = sorted(path.name for path in self.cases.glob("*") if path.is_dir()) if self.cases else []
+        found = sorted(p.name for p in self.cases.glob("[0-9]*") if p.is_dir() and p.name.isdigit())
         if not found:
             raise InputError(f"{self.cases}: holds no cases; make them first (fogml blind make)")
         return tuple(found)

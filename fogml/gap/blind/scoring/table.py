@@ -99,9 +99,9 @@ def curve(marks: Sequence[Mark]) -> Any:
     return open_set([m.unknown for m in chosen], [bool(m.truth.unknown) for m in chosen])
 
 
-def calibration(marks: Sequence[Mark]) -> Any:
-    """The reliability bins of every listed item."""
-    items = [item for m in marks for item in m.items]
+def calibration(marks: Sequence[Mark], named_only: bool = False) -> Any:
+    """The reliability bins of every listed item, or of those that are named."""
+    items = [item for m in marks for item in (m.named if named_only else m.items)]
     return reliability([item.probability for item in items], [item.right for item in items])
 
 
@@ -175,6 +175,10 @@ FIGURES: tuple[Figure, ...] = (
         "calibration_error", "expected calibration error",
         lambda marks: calibration_error(calibration(marks)), KINDS, high=0.03, format="number",
         prototype="0.077",
+    ),
+    Figure(
+        "calibration_error_named", "expected calibration error, named effects alone",
+        lambda marks: calibration_error(calibration(marks, True)), KINDS, format="number",
     ),
     Figure(
         "closed_ratio", "closed / what the true effect, fitted, closes (median)",

@@ -1,0 +1,147 @@
+"""``fogml blind``: make blind cases, let a method answer them, score the answers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fogml.cli import options
+from fogml.cli.terminal import Terminal
+
+app = typer.Typer(
+    **options.APP_SETTINGS,
+    no_args_is_help=True,
+    help="The check on withheld effects: make cases, answer them sealed off from the truth, score.",
+)
+
+Folder = Annotated[str | None, typer.Argument(metavar="DIR", help="The suite's folder.")]
+Workers = Annotated[int | None, typer.Option("--workers", help="Processes (2).")]
+
+
+@app.command()
+def make(
+    directory: Folder = None,
+    count: Annotated[int | None, typer.Option("--count", "-n", help="Cases (1000).")] = None,
+    sample: Annotated[
+        float | None, typer.Option("--sample", metavar="SECONDS", help="Interval (10).")
+    ] = None,
+    kinds: Annotated[
+        list[str] | None, typer.Option("--kind", help="Only cases of this kind; may be repeated.")
+    ] = None,
+    leave_one_out: Annotated[
+        bool | None,
+        typer.Option("--leave-one-out", help="Only cases with an effect left out, each effect in turn."),
+    ] = None,
+    workers: Workers = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Make cases from a reality that is not the twin, and their truth apart from them.
+
+    Seeds from 1000000 on are kept for final figures. An interrupted call goes on where it was.
+    """
+    from fogml.cli.blind_job import MakeSettings, make_and_tell
+
+    flags = {
+        "directory": directory,
+        "count": count,
+        "sample": sample,
+        "kinds": kinds,
+        "leave_one_out": leave_one_out,
+        "workers": workers,
+        "seed": seed,
+    }
+    make_and_tell(MakeSettings.gather(config, flags), Terminal(as_json, quiet))
+
+
+@app.command()
+def run(
+    directory: Folder = None,
+    methods: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--method",
+            help="diagnosis (default), a baseline's name, 'baselines', or module:function; may be repeated.",
+        ),
+    ] = None,
+    code: Annotated[
+        str | None, typer.Option("--code", metavar="FOLDER", help="Where module:function lies.")
+    ] = None,
+    name: Annotated[str | None, typer.Option("--name", help="What the answers are called.")] = None,
+    workers: Workers = None,
+    threads: Annotated[int | None, typer.Option("--threads", help="Threads of each process (1).")] = None,
+    limit: Annotated[
+        float | None, typer.Option("--limit", metavar="SECONDS", help="Time that a case may take (600).")
+    ] = None,
+    shard: Annotated[
+        str | None, typer.Option("--shard", metavar="I/N", help="Every N-th case from the I-th on.")
+    ] = None,
+    retry: Annotated[bool | None, typer.Option("--retry", help="Try failed cases again.")] = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Answer the cases that have no answer yet, in sealed processes that see a case's files alone."""
+    from fogml.cli.blind_job import RunSettings, run_and_tell
+
+    flags = {
+        "directory": directory,
+        "methods": methods,
+        "code": code,
+        "name": name,
+        "workers": workers,
+        "threads": threads,
+        "limit": limit,
+        "shard": shard,
+        "retry": retry,
+    }
+    run_and_tell(RunSettings.gather(config, flags), Terminal(as_json, quiet))
+
+
+@app.command()
+def score(
+    directory: Folder = None,
+    methods: Annotated[
+        list[str] | None, typer.Option("--method", help="Score these alone; may be repeated.")
+    ] = None,
+    gates: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--gate", metavar="FIGURE=VALUE", help="Limit on a figure of the diagnosis; 'wanted' for all."
+        ),
+    ] = None,
+    final: Annotated[
+        bool | None,
+        typer.Option("--final", help="Use a final seed; the use is recorded in the ledger and the page."),
+    ] = None,
+    ledger: Annotated[
+        str | None,
+        typer.Option("--ledger", metavar="FILE", help="(experiments/gap_blind/final_uses.json)"),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option("--out", "-o", help="Folder for score.json and score.html (DIR).")
+    ] = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Score every method's answers against the truth; exit status 1 where a gate is not met.
+
+    Writes score.json and score.html.
+    """
+    from fogml.cli.blind_job import ScoreSettings, score_and_write
+
+    flags = {
+        "directory": directory,
+        "methods": methods,
+        "gates": gates,
+        "final": final,
+        "ledger": ledger,
+        "out": str(out) if out else None,
+    }
+    if not score_and_write(ScoreSettings.gather(config, flags), Terminal(as_json, quiet)):
+        raise typer.Exit(1)

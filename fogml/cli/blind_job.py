@@ -1,0 +1,204 @@
+"""The jobs of ``fogml blind``."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import field_validator
+
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.outputs import whole_folder
+
+LEDGER = "experiments/gap_blind/final_uses.json"
+_WANTED = "wanted"
+_BASELINES = "baselines"
+
+
+class SuiteSettings(Settings):
+    """What every job on a suite takes."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("directory",)
+    directory: str | None = None
+
+    def folder(self) -> BlindFolder:
+        """The suite.
+
+        Raises
+        ------
+        InputError
+            If none is named.
+        """
+        if not self.directory:
+            raise InputError("no folder is given; name the suite's folder")
+        return BlindFolder(Path(self.directory))
+
+
+class MakeSettings(SuiteSettings):
+    """Settings of ``fogml blind make``."""
+
+    count: int = 1000
+    sample: float = 10.0
+    kinds: list[str] = []
+    leave_one_out: bool = False
+    workers: int = 2
+
+
+class RunSettings(SuiteSettings):
+    """Settings of ``fogml blind run``."""
+
+    methods: list[str] = [DIAGNOSIS]
+    code: str | None = None
+    name: str | None = None
+    workers: int = 2
+    threads: int = 1
+    limit: float = 600.0
+    shard: str = "1/1"
+    retry: bool = False
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """The shard as numbers."""
+        i, slash, n = self.shard.partition("/")
+        if not (slash and i.strip().isdigit() and n.strip().isdigit()):
+            raise InputError(f"shard '{self.shard}': write I/N, e.g. 2/8")
+        return int(i), int(n)
+
+
+class ScoreSettings(SuiteSettings):
+    """Settings of ``fogml blind score``."""
+
+    methods: list[str] = []
+    gates: dict[str, float] = {}
+    final: bool = False
+    ledger: str = LEDGER
+    out: str | None = None
+
+    @field_validator("gates", mode="before")
+    @classmethod
+    def _from_flags(cls, value: Any) -> Any:
+        """``["figure=value", "wanted", ...]`` as flags give them, or a mapping as YAML does."""
+        if not isinstance(value, list):
+            return value
+        from fogml.gap.blind.score import wanted_gates
+
+        gates: dict[str, float] = wanted_gates() if _WANTED in value else {}
+        for text in value:
+            if text == _WANTED:
+                continue
+            name, _, number = str(text).partition("=")
+            try:
+                gates[name.strip()] = float(number)
+            except ValueError:
+                raise ValueError(f"'{text}' is no gate; write FIGURE=VALUE, or '{_WANTED}'") from None
+        return gates
+
+
+def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
+    """Make cases, and say how many there are."""
+    from fogml.gap.blind.make import make_cases
+
+    folder, kinds = settings.folder(), settings.kinds or None
+    if settings.leave_one_out:
+        if kinds:
+            raise InputError("--leave-one-out and --kind exclude each other; give one of them")
+        kinds = ["unknown_left_out"]
+    with terminal.work("making cases", total=settings.count) as work:
+        made = make_cases(
+            folder.path,
+            settings.count,
+            settings.seed,
+            sample_s=settings.sample,
+            workers=settings.workers,
+            kinds=kinds,
+            progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
+        )
+    config = settings.in_full().yaml("blind make")
+    (folder.path / "make.yaml").write_text(config, encoding="utf-8")
+    terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})
+    terminal.say(
+        f"{settings.count} cases in {folder.cases}, {made} of them new; answer them: fogml blind run"
+    )
+
+
+def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
+    """Answer cases by each method, and say how many failed."""
+    from fogml.gap.blind.methods import BASELINES, ORACLE
+    from fogml.gap.blind.oracle_run import run_oracle
+    from fogml.gap.blind.run import RunPlan, run_cases
+
+    methods = [m for name in settings.methods for m in (BASELINES if name == _BASELINES else (name,))]
+    if len(methods) > 1 and settings.name:
+        raise InputError("--name: the answers of several methods can't have one name")
+    told = {}
+    for method in methods:
+        plan = RunPlan(
+            folder=settings.folder(),
+            method=method,
+            name=settings.name or (method if ":" not in method else method.partition(":")[2]),
+            code=Path(settings.code) if settings.code else None,
+            workers=settings.workers,
+            threads=settings.threads,
+            limit_s=settings.limit,
+            shard=settings.part,
+            retry=settings.retry,
+        )
+        with terminal.work(method, total=len(plan.left())) as work:
+
+            def progress(case: str, work: Any = work, method: str = method) -> None:
+                work.advance(doing=f"{method}: {case}")
+
+            answered, failed = (run_oracle if method == ORACLE else run_cases)(plan, progress)
+        told[plan.name] = {"answered": answered, "failed": failed}
+        terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
+    terminal.result(told)
+
+
+def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
+    """Score a suite, write ``score.json`` and ``score.html``; whether every gate is met."""
+    from fogml.gap.blind.score import gate, score
+    from fogml.report.blind_page import blind_page
+
+    folder = settings.folder()
+    methods = settings.methods or list(folder.methods())
+    cases = len(folder.names())
+    ledger = Path(settings.ledger) if settings.final else None
+    with terminal.work("scoring", total=cases * len(methods)) as work:
+        values = score(folder, methods, ledger, lambda what: work.advance(doing=what))
+    judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
+    values["gates"] = gate(values, settings.gates, judged)
+    out = Path(settings.out) if settings.out else folder.path
+    with whole_folder(out) as staging:
+        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
+        (staging / "score.json").write_text(text + "\n", encoding="utf-8")
+        (staging / "score.html").write_text(blind_page(values, _link(folder.path, out)), encoding="utf-8")
+    _print(values, judged, terminal)
+    terminal.result(values)
+    terminal.say(f"Written to {out}: open {out / 'score.html'}")
+    return all(one["met"] for one in values["gates"])
+
+
+def _link(suite: Path, out: Path) -> str:
+    """The way from the page to the suite, for links to reports."""
+    return "" if suite.resolve() == out.resolve() else os.path.relpath(suite, out) + "/"
+
+
+def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
+    from fogml.report.blind_words import figure_text, wanted_text
+
+    rows = [
+        [row["words"], figure_text(row), wanted_text(row), str(row["n"])]
+        for row in values["methods"][method]["rows"]
+    ]
+    title = f"{method}: {values['cases']} blind cases (synthetic), seed {values['seed']}"
+    terminal.table(title, ["figure", "reached", "wanted", "n"], rows)
+    for one in values["gates"]:
+        bound = "at least" if one["at_least"] else "at most"
+        value = "no value" if one["value"] is None else f"{one['value']:.4g}"
+        outcome = "met" if one["met"] else "NOT met"
+        terminal.say(f"gate {one['key']}: {value}, {bound} {one['limit']:g}: {outcome}")

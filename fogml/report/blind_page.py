@@ -1,0 +1,268 @@
+"""The page of ``fogml blind score``: every figure against what is wanted, and what lies behind it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from fogml.report.blind_words import figure_text, kind_words, value_text, wanted_text
+from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
+from fogml.report.page import render
+from fogml.report.tables import Row, Table
+from fogml.report.words import MISSING, listed, number, percent, plural
+
+_DIAGNOSIS = "diagnosis"
+_ORACLE = "oracle"
+_STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_kept", "mixed_false_name")
+
+
+def blind_page(values: Mapping[str, Any], link: str = "") -> str:
+    """The self-contained HTML page of a ``score.json``.
+
+    Parameters
+    ----------
+    values
+        Schema ``fogml.blind_score/1``.
+    link
+        The way from the page to the suite's folder, with a slash at its end, for links to reports.
+    """
+    methods = values["methods"]
+    name = _DIAGNOSIS if _DIAGNOSIS in methods else next(iter(methods))
+    judged, rows = methods[name], methods[name]["rows"]
+    by_key = {row["key"]: row for row in rows}
+    areas = {m: {r["key"]: r["value"] for r in v["rows"]}["auroc"] for m, v in methods.items()}
+    return render(
+        "blind.html",
+        title=f"{name} – the check on withheld effects",
+        method=name,
+        values=values,
+        verdict=_verdict(name, rows, values),
+        warnings=_warnings(rows, values, judged),
+        figures=_figures(rows),
+        others=_others(methods, name) if len(methods) > 1 else None,
+        by_kind=_by_kind(values),
+        strata=_strata(rows),
+        strata_plot=strata_plot([by_key[key] for key in _STRATA_DRAWN if key in by_key]),
+        reliability=reliability_plot(judged["reliability"], by_key["calibration_error"]["value"]),
+        open_set=open_set_plot({m: v["open_set"] for m, v in methods.items()}, areas),
+        confusion=confusion_plot(judged["confusion"]) if judged["confusion"]["true"] else None,
+        left_out=_left_out(judged["left_out"]) if judged["left_out"] else None,
+        worst=_worst(judged["worst"], link),
+        gates=_gates(values["gates"]) if values["gates"] else None,
+        uses=_uses(values["final_uses"]) if values["final_uses"] else None,
+        about=_about(values),
+    )
+
+
+def _verdict(name: str, rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> list[str]:
+    held = [row for row in rows if row["met"] is not None]
+    met = [row for row in held if row["met"]]
+    missed = [row["words"] for row in held if not row["met"]]
+    first = (
+        f"The {name} meets {len(met)} of {plural(len(held), 'wanted figure')} on "
+        f"{plural(values['cases'], 'blind case')}."
+    )
+    return [first, *([f"Not met: {listed(missed, 6)}."] if missed else [])]
+
+
+def _warnings(
+    rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any], judged: Mapping[str, Any]
+) -> list[str]:
+    found = []
+    thin = [row["words"] for row in rows if row["met"] is not None and not row["enough"]]
+    if thin:
+        found.append(f"These rest on fewer than 400 cases: {listed(thin, 5)}.")
+    if not values["final"]:
+        found.append("The seed is one to develop on: these are no final figures.")
+    if judged["failed"]:
+        count = plural(len(judged["failed"]), "case")
+        found.append(f"{count} failed, and count as wrong: {judged['failed'][0]['reason']}")
+    return found
+
+
+def _outcome(row: Mapping[str, Any]) -> str:
+    return {True: "✓ met", False: "✗ not met", None: ""}[row["met"]]
+
+
+def _figures(rows: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        columns=(
+            ("Figure", "", "text"),
+            ("Reached", "95 % interval", "figure"),
+            ("Wanted", "", "figure"),
+            ("Outcome", "", "text"),
+            ("n", "", "figure"),
+            ("Cases", "", "figure"),
+            ("Prototype", "", "figure"),
+        ),
+        rows=tuple(
+            Row(
+                (
+                    row["words"],
+                    figure_text(row),
+                    wanted_text(row),
+                    _outcome(row),
+                    str(row["n"]),
+                    str(row["cases"]),
+                    row["prototype"],
+                )
+            )
+            for row in rows
+        ),
+        caption="n is what a figure rests on: cases, named effects, listed effects or intervals.",
+    )
+
+
+def _others(methods: Mapping[str, Any], name: str) -> Table:
+    order = [name, *(m for m in methods if m not in (name, _ORACLE)), *(m for m in methods if m == _ORACLE)]
+    columns = [("Figure", "", "text"), ("Wanted", "", "figure"), *((m, "", "figure") for m in order)]
+    tables = {m: {row["key"]: row for row in methods[m]["rows"]} for m in order}
+    rows = []
+    for row in methods[name]["rows"]:
+        cells = (value_text(tables[m][row["key"]]["value"], row["format"]) for m in order)
+        rows.append(Row((row["words"], wanted_text(row), *cells)))
+    return Table(tuple(columns), tuple(rows), "The same cases and the same scorer for every method.")
+
+
+def _strata(rows: Sequence[Mapping[str, Any]]) -> Table:
+    names = list(dict.fromkeys(name for row in rows for name in row["by_stratum"]))
+    names.sort(key=lambda name: (name.startswith("over"), not name.startswith("under"), _first(name)))
+    shown = [row for row in rows if row["by_stratum"]]
+    return Table(
+        columns=(("Figure", "", "text"), *((f"d′ {name}", "", "figure") for name in names)),
+        rows=tuple(
+            Row(
+                (
+                    row["words"].replace(", d′ > 10", ""),
+                    *(_part(row, row["by_stratum"].get(n)) for n in names),
+                )
+            )
+            for row in shown
+        ),
+        caption="By d′ of a case's weakest missing effect; n in brackets.",
+    )
+
+
+def _first(name: str) -> float:
+    return float("".join(c if c.isdigit() or c == "." else " " for c in name).split()[0])
+
+
+def _part(row: Mapping[str, Any], part: Mapping[str, Any] | None) -> str:
+    if part is None or part["value"] is None:
+        return MISSING
+    return f"{value_text(part['value'], row['format'])} ({part['n']})"
+
+
+def _by_kind(values: Mapping[str, Any]) -> Table:
+    return Table(
+        columns=(("Kind", "", "text"), ("Cases", "", "figure")),
+        rows=tuple(Row((kind_words(kind), str(n))) for kind, n in values["kinds"].items()),
+    )
+
+
+def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
+    rows = []
+    for part in parts:
+        flagged, wrong = part["flagged"], part["wrong_name"]
+        names = [f"{name} {count}" for name, count in part["wrong_names"].items()]
+        relatives = [f"{name} {count}" for name, count in part["relatives"].items()]
+        rows.append(
+            Row(
+                (
+                    part["effect"],
+                    "left out" if part["in_library"] else "in no library",
+                    str(flagged["n"]),
+                    number(part["d_prime"]),
+                    percent(flagged["value"]),
+                    percent(wrong["value"]),
+                    listed(names, 3) or MISSING,
+                    listed(relatives, 3) or MISSING,
+                )
+            )
+        )
+    return Table(
+        columns=(
+            ("Unknown", "", "text"),
+            ("Kind", "", "text"),
+            ("Cases", "", "figure"),
+            ("d′", "median", "figure"),
+            ("Seen as unknown", "", "figure"),
+            ("Wrong name", "", "figure"),
+            ("Wrong names", "", "text"),
+            ("Relatives named", "", "text"),
+        ),
+        rows=tuple(rows),
+        caption="A relative's best-fitted signature can't be told from the unknown: its name is not wrong.",
+    )
+
+
+def _worst(cases: Sequence[Mapping[str, Any]], link: str) -> list[dict[str, str]]:
+    told = []
+    for case in cases:
+        named = [f"{listed(item['class'], 4)} ({number(item['probability'], 2)})" for item in case["named"]]
+        told.append(
+            {
+                "case": case["case"],
+                "href": link + case["report"],
+                "kind": kind_words(case["kind"]),
+                "d_prime": number(case["d_prime"]) if case["true"] else MISSING,
+                "true": listed(case["true"], 4) or "nothing",
+                "left_out": listed(case["left_out"], 4) or MISSING,
+                "named": "; ".join(named) or "nothing",
+                "unknown": number(case["unknown"], 2),
+                "wrong": case["wrong"],
+            }
+        )
+    return told
+
+
+def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        columns=(
+            ("Gate", "", "text"),
+            ("Limit", "", "figure"),
+            ("Reached", "", "figure"),
+            ("Outcome", "", "text"),
+        ),
+        rows=tuple(
+            Row(
+                (
+                    one["key"],
+                    f"{'≥' if one['at_least'] else '≤'} {number(one['limit'])}",
+                    number(one["value"]),
+                    "✓ met" if one["met"] else "✗ not met",
+                )
+            )
+            for one in gates
+        ),
+    )
+
+
+def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        columns=(
+            ("When", "UTC", "text"),
+            ("Seed", "", "figure"),
+            ("Cases", "", "figure"),
+            ("Methods", "", "text"),
+            ("Hash of the truth", "first digits", "text"),
+        ),
+        rows=tuple(
+            Row((u["when"], str(u["seed"]), str(u["cases"]), listed(list(u["figures"]), 9), u["truth"][:12]))
+            for u in uses
+        ),
+        caption="Every use of a final seed so far. A seed that was used once is no longer fresh.",
+    )
+
+
+def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    runs = ", ".join(f"{n} with {count}" for count, n in values["fit_runs"].items())
+    return [
+        ("data", values["data"]),
+        ("cases", str(values["cases"])),
+        ("seed", f"{values['seed']} ({'final' if values['final'] else 'to develop on'})"),
+        ("sample interval", ", ".join(f"{number(s)} s" for s in values["sample_s"])),
+        ("fit runs", runs),
+        ("with table rates", str(values["turning"])),
+        ("hash of the truth", values["truth"]),
+    ]
