@@ -1,5 +1,7 @@
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -51,7 +53,7 @@ def test_averaging_times_of_their_own():
     model, fine = NoiseModel(N=0.003, B=0.05, K=0.4), np.arange(1.0, edges[-1] + 1)
     whitener = Whitener(model, edges[1:], counts.astype(float))
     mean = np.zeros((60, len(fine)))
-    for i, (a, b) in enumerate(zip(edges[:-1], edges[1:])):
+    for i, (a, b) in enumerate(pairwise(edges)):
         mean[i, a:b] = 1 / (b - a)
     covariance = mean @ model.covariance(fine, 1.0, whitener.ladder) @ mean.T
     values = RNG.normal(size=60)
@@ -91,7 +93,7 @@ def test_linear_column_by_column_and_block_by_block(seed, columns, scale, cut):
     np.testing.assert_array_equal(whitener.whiten(x[:, one]), white[:, one])
     np.testing.assert_array_equal(whitener.whiten(np.asfortranarray(x)), white)
     edges = [0, *sorted(cut), 120]
-    blocks = list(whitener.whiten_blocks(x[a:b] for a, b in zip(edges[:-1], edges[1:])))
+    blocks = list(whitener.whiten_blocks(x[a:b] for a, b in pairwise(edges)))
     np.testing.assert_array_equal(np.concatenate(blocks), white)
 
 
