@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, ClassVar
 
 from fogml.cli.lab_outputs import say_where, tell
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.lab.misalignment_input import read_measurements
@@ -20,11 +20,6 @@ class MisalignmentSettings(Settings):
     file: str | None = None
     cross_tilt: bool | None = None
     out: str | None = None
-
-    def in_full(self) -> MisalignmentSettings:
-        """The settings with every path in full."""
-        paths = {name: absolute(path) for name in ("file", "out") if (path := getattr(self, name))}
-        return self.model_copy(update=paths)
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:

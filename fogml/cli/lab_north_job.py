@@ -8,7 +8,7 @@ from pydantic import field_validator
 
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
@@ -56,11 +56,6 @@ class NorthSettings(Settings):
         if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
             raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
         return pairs
-
-    def in_full(self) -> NorthSettings:
-        """The settings with every path in full."""
-        paths = {name: absolute(path) for name in ("positions", "out") if (path := getattr(self, name))}
-        return self.model_copy(update=paths)
 
 
 def _numbers(text: str, example: str) -> list[float]:

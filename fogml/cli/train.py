@@ -24,6 +24,7 @@ def train(
     ] = None,
     design_index: options.DesignIndex = None,
     limit: options.Limits = None,
+    turn_on_band: options.TurnOnBand = None,
     train_again: Annotated[
         bool | None,
         typer.Option(
@@ -32,6 +33,10 @@ def train(
         ),
     ] = None,
     averaging: options.Averaging = None,
+    navigation: Annotated[
+        float | None,
+        typer.Option("--navigation", metavar="LATITUDE", help="Show what the drift costs a navigator there."),
+    ] = None,
     repair: options.Repair = None,
     strict: options.Strict = None,
     any_unit: options.AnyUnit = None,
@@ -58,8 +63,10 @@ def train(
             "parameters": parameters,
             "design_index": design_index,
             "limits": limit,
+            "turn_on_band": turn_on_band,
             "train_again": train_again,
             "averaging": averaging,
+            "navigation": navigation,
             "repair": repair,
             "strict": strict,
             "any_unit": any_unit,

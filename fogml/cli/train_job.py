@@ -16,9 +16,10 @@ from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.judge import judge
 from fogml.validation.limits import check_design_index, check_limits
-from fogml.validation.report_json import judgement_json
+from fogml.validation.report_json import finite_json, judgement_json
 from fogml.validation.results import Judgement
 from fogml.validation.strict import hold_strict
+from fogml.validation.turn_on import check_turn_on_band
 
 if TYPE_CHECKING:
     from fogml.cli.compare_job import CompareSettings
@@ -35,6 +36,7 @@ class TrainSettings(LimitSettings):
     features: str | None = None
     parameters: dict[str, Any] = {}
     train_again: bool = False
+    navigation: float | None = None
     repair: bool = False
     strict: bool = False
     any_unit: bool = False
@@ -55,7 +57,7 @@ def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:
         model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal)
         write_results(folder, settings, model, judgement, terminal)
     print_judgement(judgement, terminal)
-    terminal.result(judgement_json(judgement))
+    terminal.result(_report(settings, judgement))
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'report.html'}")
     return judgement
 
@@ -70,6 +72,11 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
     """
     check_limits(settings.limits)
     check_design_index(settings.design_index)
+    check_turn_on_band(settings.turn_on_band)
+    if isinstance(settings, TrainSettings) and settings.navigation is not None:
+        from fogml.lab.navigation import error_matrices
+
+        error_matrices(settings.navigation, "north")
     if not settings.averaging > 0.0:
         raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
     if settings.features is not None:
@@ -126,6 +133,7 @@ def fit_and_judge(
             averaging_s=settings.averaging,
             design_index=settings.design_index,
             limits=settings.limits,
+            turn_on_band=settings.turn_on_band,
             any_unit=settings.any_unit,
             notes=notes,
         )
@@ -153,13 +161,24 @@ def write_results(
 
     with terminal.work("writing"):
         save_model(model, folder / "model")
-        text = json.dumps(judgement_json(judgement), indent=2, allow_nan=False, ensure_ascii=False)
+        report = _report(settings, judgement)
+        text = json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False)
         (folder / "report.json").write_text(text + "\n", encoding="utf-8")
-        (folder / "report.html").write_text(train_page(judgement), encoding="utf-8")
+        (folder / "report.html").write_text(train_page(judgement, report.get("navigation")), encoding="utf-8")
         spreadsheet(judgement, folder / "report.xlsx")
         if judgement.limits or judgement.design_index:
             (folder / "certificate.html").write_text(certificate(judgement), encoding="utf-8")
         (folder / "config.yaml").write_text(settings.in_full().yaml("train"), encoding="utf-8")
+
+
+def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:
+    """The values of ``report.json``, with the cost in navigation where it is asked for."""
+    values = judgement_json(judgement)
+    if settings.navigation is not None:
+        from fogml.lab.navigation_cost import navigation_costs
+
+        values["navigation"] = finite_json(navigation_costs(judgement, settings.navigation))
+    return values
 
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
@@ -183,6 +202,16 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
                 terminal.say(f"{run.run}: {label(name)}: {text} [{unit_of(name)}]")
         if run.outside_training:
             terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
+    spread = judgement.repeatability
+    if spread is not None:
+        over = f"over {spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
+        for name, figure in (
+            ("bias_repeatability", spread.bias),
+            ("scale_factor_repeatability", spread.scale_factor),
+        ):
+            if figure is not None:
+                text = f"{number(figure.before)} before, {number(figure.after)} after"
+                terminal.say(f"{label(name)} {over}: {text} [{unit_of(name)}]")
     stated = [*judgement.limits]
     if judgement.design_index is not None:
         stated.insert(0, judgement.design_index)
@@ -194,5 +223,13 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         terminal.say(note)
 
 
-_TOLD_BY_SOME = ("scale_factor_error", "scale_factor_error_largest", "temperature_sensitivity", "hysteresis")
-"""Figures that only runs with turns or soaks tell."""
+_TOLD_BY_SOME = (
+    "scale_factor_error",
+    "scale_factor_error_largest",
+    "scale_factor_nonlinearity",
+    "scale_factor_asymmetry",
+    "temperature_sensitivity",
+    "hysteresis",
+    "turn_on_time",
+)
+"""Figures that only runs with turns, soaks or a stated power-on tell."""

@@ -108,7 +108,7 @@ def _ways(values: Mapping[str, Any]) -> Table:
             ("Standard error of noise, rms", "deg", "figure"),
         ),
         rows=tuple(rows),
-        caption=f"Every way takes {duration(values['duration_s'])} with its transfers. Dwell: of the fine seek.",
+        caption=f"Every way takes {duration(values['duration_s'])} with transfers. Dwell: of the fine one.",
     )
 
 

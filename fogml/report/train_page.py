@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from fogml.report import figures_judgement
+from fogml.report.navigation_section import navigation_sections
 from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
     Noticed,
@@ -14,6 +16,7 @@ from fogml.report.tables import (
     coefficients_table,
     metrics_table,
     noticed,
+    repeatability_table,
     runs_table,
 )
 from fogml.report.verdict import improves, model_card, stated_limits, subject, unseen, verdict, worst_run
@@ -35,13 +38,15 @@ class RunSection:
     left_out: str
 
 
-def train_page(judgement: Judgement) -> str:
+def train_page(judgement: Judgement, navigation: Mapping[str, Any] | None = None) -> str:
     """The self-contained HTML page of a judgement.
 
     Parameters
     ----------
     judgement
         As :func:`fogml.validation.judge.judge` gives it.
+    navigation
+        What the drift costs a navigator, as :func:`fogml.lab.navigation_cost.navigation_costs` gives it.
 
     Returns
     -------
@@ -59,6 +64,7 @@ def train_page(judgement: Judgement) -> str:
         tiles=headline_tiles(judgement),
         sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
         test_table=runs_table(judgement.test),
+        repeatability=repeatability_table(judgement.repeatability),
         unseen=unseen(judgement),
         train_table=runs_table(
             judgement.train,
@@ -70,6 +76,7 @@ def train_page(judgement: Judgement) -> str:
         train_findings=[(run.run, noticed(run.findings)) for run in judgement.train if run.findings],
         notes=_notes(judgement),
         unit_of=unit_of,
+        navigation=navigation_sections(navigation) if navigation else [],
     )
 
 
