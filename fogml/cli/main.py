@@ -29,6 +29,10 @@ COMMANDS = {
     "effects": ("fogml.cli.effects", "The catalogue of effects that a twin can have, or the card of one."),
     "simulate": ("fogml.cli.simulate", "A synthetic run from a programme and a twin."),
     "replay": ("fogml.cli.replay", "A twin's output for a run's inputs, or what one effect changes."),
+    "diagnose": (
+        "fogml.cli.diagnose",
+        "Where the twin's gap lies, which effect causes it, how far it closes.",
+    ),
     "blind": ("fogml.cli.blind", "The check on withheld effects: make cases, answer them, score."),
 }
 """Name of each command: its module, and its help in one line."""

@@ -1,4 +1,4 @@
-"""Everything that may explain the runs, whitened and brought to a few columns: data, constants, unknown, candidates.
+"""Everything that may explain the runs, whitened and brought to a few columns.
 
 All that follows is linear algebra on inner products of whitened columns, so that its cost does not
 depend on the runs' length.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,9 +16,9 @@ from numpy.typing import NDArray
 from fogml.gap.dictionary import Group
 from fogml.gap.model import Candidate, Constant
 from fogml.gap.observation import Observation
+from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.shapes import Node, grid
 from fogml.runs.run import FloatArray
-from fogml.signals.whitening import Whitener
 
 MOST_NODES = 16
 """Nodes that are kept of a candidate with more: those that fit best."""
@@ -25,7 +26,7 @@ SEARCHED_FROM = 40
 LARGEST_RANK = 4
 _KEPT = 2e-3
 LEAST_SHARE = 0.01
-"""A candidate that keeps less than this share of its whitened length beside the constants is one with them."""
+"""A candidate that keeps less of its whitened length beside the constants is one with them."""
 _FLAT = 1e6
 
 
@@ -90,7 +91,7 @@ class Basis:
 
 def build_basis(
     observations: Sequence[Observation],
-    whiteners: Sequence[Whitener],
+    whiteners: Sequence[RunWhitener],
     candidates: Mapping[str, Candidate],
     constants: Sequence[Constant],
     values: Mapping[str, float],
@@ -118,7 +119,7 @@ def build_basis(
         Told of each candidate.
     """
     edges = np.cumsum([0, *(len(o) for o in observations)])
-    parts = [slice(a, b) for a, b in zip(edges[:-1], edges[1:])]
+    parts = [slice(a, b) for a, b in pairwise(edges)]
 
     def white(columns: Sequence[FloatArray]) -> FloatArray:
         """Columns of each run, shape (m_r, k), whitened and stacked."""
@@ -190,11 +191,11 @@ class _Search:
     def __init__(self, residual: FloatArray, fixed: FloatArray, groups: Sequence[FloatArray]) -> None:
         smooth = [g for g in groups if g.shape[1] <= 24]
         beside = np.concatenate([fixed, *smooth], axis=1) if smooth else fixed
-        self._sets = []
+        self._sets: list[tuple[FloatArray, FloatArray, FloatArray]] = []
         for held in (fixed, beside):
             inverse = np.linalg.inv(held.T @ held + np.eye(held.shape[1]))
             left = residual[:, 0] - held @ (inverse @ (held.T @ residual[:, 0]))
-            self._sets.append((held, inverse, left))
+            self._sets.append((held, np.asarray(inverse, dtype=np.float64), left))
 
     def gains(self, columns: FloatArray, starts: Sequence[int]) -> list[FloatArray]:
         """Gain of each node, whose columns begin at `starts`, in nats, beside each of the two."""
@@ -204,13 +205,32 @@ class _Search:
             fit = left @ columns
             edges = [*starts, columns.shape[1]]
             gain = np.empty(len(starts))
-            for i, (a, b) in enumerate(zip(edges[:-1], edges[1:])):
-                part, c = columns[:, a:b], cross[:, a:b]
-                gram = part.T @ part - c.T @ inverse @ c
-                gram += 1e-6 * max(np.trace(gram), 1e-30) * np.eye(b - a)
-                gain[i] = 0.5 * fit[a:b] @ np.linalg.solve(gram, fit[a:b])
+            width = columns.shape[1] // len(starts)
+            if width * len(starts) == columns.shape[1] and np.all(np.diff(starts) == width):
+                gain = _even_gains(columns, cross, inverse, fit, width)
+            else:
+                edges = [*starts, columns.shape[1]]
+                for i, (a, b) in enumerate(pairwise(edges)):
+                    gain[i] = _even_gains(columns[:, a:b], cross[:, a:b], inverse, fit[a:b], b - a)[0]
             gains.append(gain)
         return gains
+
+
+def _even_gains(
+    columns: FloatArray, cross: FloatArray, inverse: FloatArray, fit: FloatArray, width: int
+) -> FloatArray:
+    """Gains of nodes of the same number of columns, in nats, shape (nodes,)."""
+    count = columns.shape[1] // width
+    grams = np.empty((count, width, width))
+    weighed = inverse @ cross
+    for a in range(width):
+        for b in range(a, width):
+            own = np.einsum("ij,ij->j", columns[:, a::width], columns[:, b::width])
+            grams[:, a, b] = own - np.einsum("ij,ij->j", cross[:, a::width], weighed[:, b::width])
+            grams[:, b, a] = grams[:, a, b]
+    grams += 1e-6 * np.maximum(np.trace(grams, axis1=1, axis2=2), 1e-30)[:, None, None] * np.eye(width)
+    fits = fit.reshape(count, width)
+    return np.asarray(0.5 * np.einsum("ni,ni->n", fits, np.linalg.solve(grams, fits[:, :, None])[:, :, 0]))
 
 
 def _candidate_columns(
@@ -238,7 +258,7 @@ def _candidate_columns(
         gains = [search.gains(part, starts.tolist()) for part in parts]
         order = [np.argsort(sum(gain))[::-1][:MOST_NODES] for gain in zip(*gains)]
         kept = sorted(set(np.concatenate(order).tolist()))
-    low, high = candidate.amplitude.range(grade)  # type: ignore[arg-type]
+    low, _ = candidate.amplitude.range(grade)  # type: ignore[arg-type]
     usual_amplitude = candidate.amplitude.typical(grade)  # type: ignore[arg-type]
     found = []
     for i in kept:

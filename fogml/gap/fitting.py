@@ -14,8 +14,8 @@ import numpy as np
 
 from fogml.gap.model import Candidate, Constant, EffectValue
 from fogml.gap.observation import Observation
+from fogml.gap.run_whitener import RunWhitener
 from fogml.runs.run import FloatArray
-from fogml.signals.whitening import Whitener
 from fogml.twin.quantities import Quantity
 
 MOST_STEPS = 12
@@ -78,7 +78,7 @@ class Fit:
 
 def fit_model(
     observations: Sequence[Observation],
-    whiteners: Sequence[Whitener],
+    whiteners: Sequence[RunWhitener],
     constants: Sequence[Constant],
     effects: Sequence[EffectValue] = (),
     candidates: Mapping[str, Candidate] | None = None,
@@ -135,7 +135,7 @@ def fit_model(
         found_constants,
         found_effects,
         problem.names,
-        covariance * np.outer(scale, scale),
+        np.asarray(covariance * np.outer(scale, scale), dtype=np.float64),
         float(data @ data),
         problem.rows,
     )
@@ -147,7 +147,7 @@ class _Problem:
     def __init__(
         self,
         observations: Sequence[Observation],
-        whiteners: Sequence[Whitener],
+        whiteners: Sequence[RunWhitener],
         constants: Sequence[Constant],
         effects: Sequence[EffectValue],
         candidates: Mapping[str, Candidate],

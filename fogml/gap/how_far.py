@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -41,7 +42,7 @@ def averages(o: Observation, averaging_s: float = AVERAGING_S) -> Averages:
     width = max(1, round(averaging_s / o.row_s))
     breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1
     edges = [0, *breaks.tolist(), len(o)]
-    starts = np.concatenate([np.arange(a, b, width) for a, b in zip(edges[:-1], edges[1:])])
+    starts = np.concatenate([np.arange(a, b, width) for a, b in pairwise(edges)])
     counts = np.diff(starts, append=len(o))
     full = counts == width
     if not full.any():

@@ -64,7 +64,7 @@ def prior_of(model: GyroModel, noise_run: Run | None) -> tuple[NoisePrior, str]:
         most=MOST_ROWS,
     )
     spread = np.hypot(np.minimum(fit.standard_errors, np.log(3.0)), np.log(UNIT_FACTOR))
-    return NoisePrior(fit.model, tuple(np.exp(spread))), f"static run {noise_run.name}"  # type: ignore[arg-type]
+    return NoisePrior(fit.model, tuple(np.exp(spread))), f"static run {noise_run.name}"
 
 
 def noise_of(

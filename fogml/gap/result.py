@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.gap.model import EffectValue, GyroModel, NoisePrior
 from fogml.runs.run import FloatArray
 
 SCHEMA = "fogml.gap/1"
@@ -265,6 +268,8 @@ class Diagnosis:
         Each candidate by itself.
     noise
         The noise model.
+    effects
+        The named effects as fitted, to be added to the model.
     series
         For drawing.
     unusable
@@ -289,6 +294,7 @@ class Diagnosis:
     constants: tuple[ConstantFit, ...]
     evidence: tuple[CandidateEvidence, ...]
     noise: NoiseReport
+    effects: tuple[EffectValue, ...]
     series: tuple[RunSeries, ...]
     unusable: tuple[tuple[str, str], ...] = ()
     assumed: tuple[str, ...] = ()
@@ -298,6 +304,18 @@ class Diagnosis:
     def named(self) -> tuple[Found, ...]:
         """The effects that are named."""
         return tuple(found for found in self.found if found.named)
+
+    def write_model(self, model: GyroModel, path: Path) -> None:
+        """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``."""
+        noise, spread = self.noise.coefficients, self.noise.relative_se
+        factors = {f"factor_{name}": max(math.exp(spread.get(name, 0.0)), 1.0) for name in "NBK"}
+        model.write(
+            path,
+            {c.name: c.value for c in self.constants},
+            self.effects,
+            NoisePrior(noise["N"], noise["B"], noise["K"], **factors),
+            {c.name: c.se for c in self.constants},
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """The content of ``gap.json``."""

@@ -166,7 +166,7 @@ class Search:
     def _weight(self, chosen: Chosen) -> float:
         """Logarithm of the prior weight of a node and a length, and of a sign that is known."""
         node = self.field_.basis.nodes[chosen.node]
-        place = int(np.flatnonzero(LENGTHS == chosen.length)[0])
+        place = int(np.flatnonzero(chosen.length == LENGTHS)[0])
         return node.log_weight + math.log(LENGTH_WEIGHTS[place]) + (math.log(2.0) if node.sign else 0.0)
 
     def _best_group(self, effects: Sequence[Chosen]) -> tuple[tuple[str, float], float]:

@@ -16,8 +16,8 @@ from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.inputs import STAND_INS, Inputs
 from fogml.twin.nominal import NAMES, UNITS, NominalConstants, nominal_columns, temperature_slopes
 from fogml.twin.plant.estimate import estimate_nodes
-from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.registry import effect, effects
+from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
 

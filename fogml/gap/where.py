@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -149,7 +150,7 @@ def _temperatures(held: Sequence[_Averaged]) -> tuple[TemperatureExcess, ...]:
     floors = np.concatenate([np.full(len(h.gap), h.floor) for h in held])
     rising = np.concatenate([h.rising for h in held])
     bins = []
-    for low, high in zip(edges[:-1], edges[1:]):
+    for low, high in pairwise(edges):
         inside = (every >= low) & (every < high)
         if inside.sum() < 3:
             continue

@@ -49,7 +49,23 @@ def load_method(text: str) -> Method:
 
 
 def diagnosis(case: CaseFiles, out: Path) -> None:
-    """The diagnosis itself, as ``fogml diagnose`` runs it."""
-    from fogml.gap import diagnose  # type: ignore[attr-defined]
+    """The diagnosis itself, as ``fogml diagnose`` runs it; the page is written where asked for."""
+    import json
 
-    raise NotImplementedError(diagnose)
+    from fogml.gap.diagnosis import as_model, diagnose
+    from fogml.outputs import whole_folder
+    from fogml.runs.reading import read_run
+    from fogml.twin.twin_file import load_twin
+
+    model = as_model(load_twin("nominal"))
+    found = diagnose(
+        model,
+        [read_run(path) for path in case.fit],
+        [read_run(path) for path in case.held_out],
+        noise=read_run(case.noise) if case.noise else None,
+        without=case.without,
+    )
+    with whole_folder(out) as folder:
+        text = json.dumps(found.as_dict(), indent=1, allow_nan=False)
+        (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
+        found.write_model(model, folder / "twin.yaml")

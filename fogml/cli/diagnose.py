@@ -1,0 +1,58 @@
+"""``fogml diagnose``: where the gap lies, which effect causes it, how far it closes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from fogml.cli import options
+from fogml.cli.terminal import Terminal
+
+app = typer.Typer(**options.APP_SETTINGS)
+
+
+@app.command()
+def diagnose(
+    runs: Annotated[list[str] | None, typer.Argument(metavar="RUN...", help="Runs to fit on.")] = None,
+    held_out: Annotated[
+        list[str] | None,
+        typer.Option("--held-out", metavar="RUN", help="Run for the final figure; may be repeated."),
+    ] = None,
+    noise: Annotated[
+        str | None, typer.Option("--noise", metavar="RUN", help="Static run of the unit, for its noise.")
+    ] = None,
+    twin: Annotated[
+        str | None, typer.Option("--twin", metavar="TWIN", help="Twin file, or one that ships (nominal).")
+    ] = None,
+    without: Annotated[
+        list[str] | None,
+        typer.Option("--without", metavar="EFFECT", help="Effect that is no candidate; may be repeated."),
+    ] = None,
+    repair: options.Repair = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Where the gap between twin and recordings lies, which effect causes it, how far it closes.
+
+    Writes gap.json, gap.html, twin.yaml (the twin with the effect added) and config.yaml.
+    """
+    from fogml.cli.diagnose_job import DiagnoseSettings, diagnose_and_write
+
+    settings = DiagnoseSettings.gather(
+        config,
+        {
+            "runs": runs,
+            "held_out": held_out,
+            "noise": noise,
+            "twin": twin,
+            "without": without,
+            "repair": repair,
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
+    )
+    diagnose_and_write(settings, Terminal(as_json, quiet))

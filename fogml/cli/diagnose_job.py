@@ -1,0 +1,104 @@
+"""The job of ``fogml diagnose``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import ClassVar
+
+from fogml.cli.runs import open_run, open_runs
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.gap.diagnosis import as_model, diagnose
+from fogml.gap.result import Diagnosis
+from fogml.outputs import whole_folder
+from fogml.twin.twin_file import load_twin, twin_names
+
+
+class DiagnoseSettings(Settings):
+    """Settings of ``fogml diagnose``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "held_out", "noise", "twin")
+    runs: list[str] = []
+    held_out: list[str] = []
+    noise: str | None = None
+    twin: str = "nominal"
+    without: list[str] = []
+    repair: bool = False
+    out: str = "diagnosis"
+
+    def _ships(self, key: str, value: str) -> bool:
+        return super()._ships(key, value) or (key == "twin" and value in twin_names())
+
+
+def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis:
+    """Diagnose, write ``gap.json``, ``gap.html`` and ``twin.yaml``, and print the verdict."""
+    if not settings.runs:
+        raise InputError("no run is given; name the runs to diagnose before --held-out")
+    both = sorted(set(settings.runs) & set(settings.held_out))
+    if both:
+        raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")
+    model = as_model(load_twin(settings.twin))
+    with whole_folder(settings.out) as folder:
+        runs = open_runs(settings.runs, terminal, repair=settings.repair)
+        held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
+        noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
+        with terminal.work("diagnosing") as work:
+            found = diagnose(
+                model,
+                runs,
+                held_out,
+                noise=noise,
+                without=settings.without,
+                seed=settings.seed,
+                progress=work.doing,
+            )
+            work.doing("writing")
+            _write(folder, settings, found)
+            found.write_model(model, folder / "twin.yaml")
+    _print(found, terminal)
+    terminal.result(found.as_dict())
+    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
+    return found
+
+
+def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
+    from fogml.report import gap_page
+
+    text = json.dumps(found.as_dict(), indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
+    (folder / "config.yaml").write_text(settings.in_full().yaml("diagnose"), encoding="utf-8")
+
+
+def _print(found: Diagnosis, terminal: Terminal) -> None:
+    terminal.say(f"Verdict: {found.verdict.replace('_', ' ')}")
+    if found.found:
+        rows = [
+            [
+                f.effect,
+                ", ".join(m for m in f.members if m != f.effect) or "–",
+                f"{f.probability:.2f}",
+                f"{number(f.amplitude.value)} ± {number(f.amplitude.se)} {f.amplitude.unit}",
+            ]
+            for f in found.found
+        ]
+        terminal.table("Effects found", ["effect", "can't be told from", "probability", "amplitude"], rows)
+    if found.unknown.probability >= 0.05:
+        terminal.say(f"Unknown: probability {found.unknown.probability:.2f}; {found.unknown.looks_like}")
+    rows = [
+        [
+            item.run,
+            *(number(value) for value in (item.before, item.recalibrated, item.after, item.floor)),
+            "–" if item.closed is None else f"{item.closed:.2f}",
+        ]
+        for item in found.how_far
+    ]
+    if rows:
+        title = f"Rms of {found.how_far[0].averaging_s:g} s averages, held out [deg/h]"
+        terminal.table(title, ["run", "before", "recalibrated", "after", "floor", "closed"], rows)
+    if found.held_out_is_part:
+        terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
+    for run, reason in found.unusable:
+        terminal.note(f"{run} not used: {reason}")
