@@ -23,7 +23,7 @@ _FASTER = 0.1
 """Flicker faster than this share of the averaging time counts as white: its averages are."""
 _SLOWER = 3.0
 """The ladder goes on to this many run lengths: 1/f is short of 3.4 % at one over the run length."""
-_HIDDEN = 0.02
+_HIDDEN = 0.002
 """Flicker faster than the time at which all that is faster makes this share of the white noise is
 white too: no frequency's total density is off by more."""
 ADJOINING = 1.5
