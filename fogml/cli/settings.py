@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, ClassVar, Self
 
 import yaml
-from pydantic import BaseModel, ConfigDict, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from fogml import __version__
 from fogml.errors import InputError
@@ -26,7 +26,7 @@ class Settings(BaseModel):
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ("out",)
     """Settings that name files or folders to write."""
-    seed: int = 0
+    seed: int = Field(0, ge=0)
 
     @classmethod
     def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
@@ -75,6 +75,7 @@ class LimitSettings(Settings):
     averaging: float = 100.0
     design_index: float | None = None
     limits: dict[str, float] = {}
+    turn_on_band: float | None = None
 
     @field_validator("limits", mode="before")
     @classmethod
@@ -161,4 +162,4 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
     if first["type"] == "missing":
         return f"{place}nothing is given for '{key}'"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
-    return f"{place}{key.replace('_', ' ')}: {reason} (found {first['input']!r})"
+    return f"{place}'{key}': {reason} (found {first['input']!r})"

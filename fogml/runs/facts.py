@@ -176,16 +176,20 @@ def read_yaml(path: Path) -> Any:
     Raises
     ------
     InputError
-        Naming the file and the line, if it is not YAML.
+        Naming the file and the line, if it is not YAML or states a key twice.
     """
     import yaml
 
+    from fogml.runs.yaml_text import RepeatedKeyError, parse_yaml
+
     try:
-        return yaml.safe_load(path.read_text(encoding="utf-8-sig"))
+        return parse_yaml(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror})") from None
     except (yaml.YAMLError, ValueError, RecursionError) as error:
         # A ValueError is text that is not UTF-8, or a date or number that there is none of.
         place = getattr(error, "problem_mark", None)
         where = f", line {place.line + 1}" if place is not None else ""
+        if isinstance(error, RepeatedKeyError):
+            raise InputError(f"{path.name}{where}: {error.problem}; keep one of the two") from None
         raise InputError(f"{path.name}{where}: not readable as YAML; correct or remove it") from None

@@ -41,7 +41,8 @@ def lag_kernel(
                 # Share of the newest input in the ramp-invariant step.
                 weight = 1.0 + math.expm1(-ratio) / ratio if ratio > 1e-9 else 0.5 * ratio
                 step_known = step
-            y = decay * y + (1.0 - decay - weight) * before_x + weight * x[i]
+            # In differences, so that a constant x at rest stays exactly that.
+            y = before_x + decay * (y - before_x) + weight * (x[i] - before_x)
         out[i] = y
         before_t, before_x = time[i], x[i]
     return out, y

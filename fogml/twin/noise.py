@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, fields
 
 import numpy as np
 
+from fogml.errors import InputError
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
@@ -92,7 +93,20 @@ NAMES = tuple(field.name for field in fields(NoiseConstants))
 
 def stream(seed: int, name: str) -> np.random.Generator:
     """A generator of its own for a named source, so that adding a source leaves the others alone."""
-    return np.random.default_rng([seed, zlib.crc32(name.encode())])
+    return generator(seed, zlib.crc32(name.encode()))
+
+
+def generator(seed: int, number: int) -> np.random.Generator:
+    """The generator of this number out of a seed's.
+
+    Raises
+    ------
+    InputError
+        If the seed is negative.
+    """
+    if seed < 0:
+        raise InputError(f"'seed' is {seed}; a whole number of 0 or above is needed")
+    return np.random.default_rng([seed, number])
 
 
 class NoiseSource:

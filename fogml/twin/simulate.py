@@ -88,7 +88,7 @@ def simulate(
     Raises
     ------
     InputError
-        If something can't be recorded, or the unit is never on.
+        If something can't be recorded, the seed is negative, or the unit is never on.
     """
     world = _world(programme, twin, sample_s, seed, columns, facts, truth)
     length = len(world.timeline)

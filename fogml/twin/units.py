@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.twin.effect import Effect
-from fogml.twin.noise import NoiseConstants
+from fogml.twin.noise import NoiseConstants, generator
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.twin import EffectSetting, Twin
 
@@ -57,12 +57,12 @@ def draw_units(twin: Twin, count: int, *, repeats: int = 1, seed: int = 0) -> tu
     Raises
     ------
     InputError
-        If a number is below 1.
+        If a number is below 1, or the seed negative.
     """
     _at_least_one("units", count)
     units = []
     for number in range(count):
-        rng = np.random.default_rng([seed, number])
+        rng = generator(seed, number)
         serial = f"{twin.name}-{number + 1:03d}"
         unit = replace(
             twin.named(serial),
@@ -82,12 +82,12 @@ def repeat_unit(unit: Twin, count: int, *, seed: int = 0) -> tuple[Twin, ...]:
     Raises
     ------
     InputError
-        If the count is below 1.
+        If the count is below 1, or the seed negative.
     """
     _at_least_one("repeats", count)
     repeats = []
     for number in range(count):
-        rng = np.random.default_rng([seed, number])
+        rng = generator(seed, number)
         settings: dict[str, EffectSetting] = dict(unit.settings)
         for declared, setting in unit.on:
             if declared.drawn_per_run:

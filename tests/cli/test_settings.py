@@ -72,7 +72,7 @@ def test_a_missing_file_and_a_folder_are_errors(tmp_path):
 
 
 def test_a_value_of_the_wrong_kind_names_its_key(tmp_path):
-    with pytest.raises(InputError, match=r"settings.yaml: averaging: .*'long'"):
+    with pytest.raises(InputError, match=r"settings.yaml: 'averaging': .*'long'"):
         TrainSettings.gather(config(tmp_path, "averaging: long\n"), {})
 
 

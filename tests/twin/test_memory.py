@@ -121,6 +121,13 @@ def test_lag_of_a_ramp_in_closed_form() -> None:
         assert found == pytest.approx(wanted, rel=1e-10, abs=1e-9)
 
 
+@pytest.mark.parametrize("clock", CLOCKS)
+def test_lag_of_a_constant_is_exactly_that(clock: str) -> None:
+    time = CLOCKS[clock]
+    constant = np.full(len(time), 25.1)
+    assert np.array_equal(Memory().lag("a", time, constant, 1234.5), constant)
+
+
 def test_play_is_centred_at_the_first_sample_and_follows_at_its_half_width() -> None:
     up = np.linspace(0.0, 50.0, 101)
     found = Memory().play("a", np.concatenate([up, up[::-1]]), 5.0)

@@ -227,6 +227,7 @@ def test_attitude():
         ({"columns": ("gyro",)}, "'gyro' can't be recorded"),
         ({"columns": ("rate", "rate")}, "named twice"),
         ({"sample_s": 0.0}, "'sample_s' is 0"),
+        ({"seed": -1}, "'seed' is -1"),
     ],
 )
 def test_refused(more, message):
