@@ -105,6 +105,7 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
             averaging_s=settings.averaging,
             design_index=settings.design_index,
             limits=settings.limits,
+            turn_on_band=settings.turn_on_band,
             any_unit=settings.any_unit,
             step=step,
         )

@@ -39,6 +39,14 @@ Limits = Annotated[
     list[str] | None,
     typer.Option("--limit", metavar="NAME=VALUE", help="Limit on another figure; may be repeated."),
 ]
+TurnOnBand = Annotated[
+    float | None,
+    typer.Option(
+        "--turn-on-band",
+        metavar="DEG/H",
+        help="Tell the time from power-on until the bias stays this near to its settled value.",
+    ),
+]
 Tests = Annotated[
     list[str] | None,
     typer.Option("--test", metavar="RUN...", help="Runs to judge on; takes several, may be repeated."),

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from fogml.outputs import whole_file
-from fogml.report.tables import coefficients_of, noticed
+from fogml.report.tables import coefficients_of, noticed, repeatability_table
 from fogml.report.verdict import model_card, stated_limits, subject, verdict
 from fogml.report.words import label, unit_of
 from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudgement
@@ -136,6 +136,16 @@ def _summary(writer: _Writer, judgement: Judgement) -> None:
         for run in judgement.test
     ]
     row = writer.table(sheet, heads, rows, row + 1) + 1
+    repeatability = repeatability_table(judgement.repeatability)
+    if repeatability is not None and judgement.repeatability is not None:
+        found = judgement.repeatability
+        figures = [("bias_repeatability", found.bias), ("scale_factor_repeatability", found.scale_factor)]
+        spreads = [
+            (label(name), figure.before, figure.after, unit_of(name))
+            for name, figure in figures
+            if figure is not None
+        ]
+        row = writer.table(sheet, (repeatability.caption, "before", "after", "unit"), spreads, row) + 1
     outcomes = stated_limits(judgement)
     if outcomes:
         limits = [(label(o.quantity), o.limit, o.value, unit_of(o.quantity), o.met) for o in outcomes]

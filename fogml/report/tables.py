@@ -8,7 +8,7 @@ from typing import Any
 
 from fogml.report.words import averages, label, number, percent, unit_of
 from fogml.runs.findings import Finding
-from fogml.validation.results import Metrics, RunJudgement
+from fogml.validation.results import Metrics, Repeatability, RunJudgement
 
 Column = tuple[str, str, str]
 """Heading, unit, and ``text`` or ``figure``."""
@@ -104,6 +104,28 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
         ),
         rows=tuple(rows),
         caption=f"{averages(runs[0].averaging_s).capitalize()}, before → after{caption}.",
+    )
+
+
+def repeatability_table(found: Repeatability | None) -> Table | None:
+    """Repeatability of bias and scale factor over test runs, where there are enough of them."""
+    if found is None:
+        return None
+    told = {"bias_repeatability": found.bias, "scale_factor_repeatability": found.scale_factor}
+    cycles = "power cycles" if found.power_cycles else "runs, each taken as one power cycle"
+    return Table(
+        columns=(
+            ("Figure", "", "text"),
+            ("Before", "", "figure"),
+            ("After", "", "figure"),
+            ("Unit", "", "text"),
+        ),
+        rows=tuple(
+            Row((label(name), number(figure.before), number(figure.after), unit_of(name)))
+            for name, figure in told.items()
+            if figure is not None
+        ),
+        caption=f"Standard deviation over {found.runs} {cycles}.",
     )
 
 

@@ -13,6 +13,11 @@ _LABELS = {
     "rms": "Rms",
     "scale_factor_error": "Scale-factor error",
     "scale_factor_error_largest": "Scale-factor error, largest of single turns",
+    "scale_factor_nonlinearity": "Scale-factor nonlinearity",
+    "scale_factor_asymmetry": "Scale-factor asymmetry",
+    "scale_factor_repeatability": "Scale-factor repeatability",
+    "bias_repeatability": "Bias repeatability",
+    "turn_on_time": "Turn-on time",
     "temperature_sensitivity": "Bias temperature sensitivity",
     "hysteresis": "Thermal hysteresis",
     "design_index": "Design index (largest rms)",
@@ -20,6 +25,10 @@ _LABELS = {
 _UNITS = {
     "scale_factor_error": "ppm",
     "scale_factor_error_largest": "ppm",
+    "scale_factor_nonlinearity": "ppm",
+    "scale_factor_asymmetry": "ppm",
+    "scale_factor_repeatability": "ppm",
+    "turn_on_time": "s",
     "temperature_sensitivity": "deg/h/°C",
     "design_index": "deg/h",
 }

@@ -13,6 +13,7 @@ from fogml.validation.leave_one_out import merged_folds, splits_of
 from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.results import Judgement
 from fogml.validation.run_errors import RunErrors, common_rows, run_errors
+from fogml.validation.turn_on import check_turn_on_band
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -38,6 +39,7 @@ def compare(
     averaging_s: float = DEFAULT_AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
+    turn_on_band: float | None = None,
     any_unit: bool = False,
     step: Callable[[str], None] | None = None,
 ) -> Comparison:
@@ -54,7 +56,7 @@ def compare(
         What each is fitted on.
     test_runs
         What each is judged on; None: each training run in turn is left out and judged.
-    averaging_s, design_index, limits, any_unit
+    averaging_s, design_index, limits, turn_on_band, any_unit
         As in :func:`~fogml.validation.judge.judge`.
     step
         Called with a model's name before each of its fits.
@@ -71,7 +73,8 @@ def compare(
     """
     limits = check_limits(limits or {})
     check_design_index(design_index)
-    contest = _Contest(dict(makers), averaging_s, any_unit, step or (lambda name: None))
+    check_turn_on_band(turn_on_band)
+    contest = _Contest(dict(makers), averaging_s, turn_on_band, any_unit, step or (lambda name: None))
     if test_runs is not None:
         judgements = contest.judged(train_runs, test_runs, design_index, limits)
     else:
@@ -95,11 +98,17 @@ class _Contest:
     """Models still in the contest, and why the others are not."""
 
     def __init__(
-        self, makers: dict[str, ModelMaker], averaging_s: float, any_unit: bool, step: Callable[[str], None]
+        self,
+        makers: dict[str, ModelMaker],
+        averaging_s: float,
+        turn_on_band: float | None,
+        any_unit: bool,
+        step: Callable[[str], None],
     ) -> None:
         self.makers = makers
         self.failed: dict[str, str] = {}
         self._averaging_s = averaging_s
+        self._turn_on_band = turn_on_band
         self._any_unit = any_unit
         self._step = step
 
@@ -133,6 +142,7 @@ class _Contest:
                     averaging_s=self._averaging_s,
                     design_index=design_index,
                     limits=limits,
+                    turn_on_band=self._turn_on_band,
                 )
             except _REFUSALS as error:
                 self._drop(name, error)

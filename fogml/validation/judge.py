@@ -16,6 +16,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.validation.floors import floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
+from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors, training_means
 
@@ -34,6 +35,7 @@ def judge(
     averaging_s: float = DEFAULT_AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
+    turn_on_band: float | None = None,
     any_unit: bool = False,
     beside: Sequence[DriftModel] = (),
     notes: Sequence[str] = (),
@@ -58,7 +60,10 @@ def judge(
         Greatest ``after.rms`` allowed on the test runs [deg/h].
     limits
         Greatest absolute values allowed of other figures of `after`, by the names in
-        :class:`~fogml.validation.results.Metrics`.
+        :class:`~fogml.validation.results.Metrics`, or of repeatability over the test runs.
+    turn_on_band
+        Band about the settled bias that tells the turn-on time of runs that state their power-on
+        [deg/h].
     any_unit
         Judge runs of another unit or axis than the model's as well.
     beside
@@ -88,6 +93,7 @@ def judge(
         averaging_s=averaging_s,
         design_index=design_index,
         limits=limits,
+        turn_on_band=turn_on_band,
         notes=notes,
     )
 
@@ -100,6 +106,7 @@ def judgement_of(
     averaging_s: float,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
+    turn_on_band: float | None = None,
     notes: Sequence[str] = (),
 ) -> Judgement:
     """The judgement of a model from its errors on training runs and on test runs, as in :func:`judge`."""
@@ -107,9 +114,10 @@ def judgement_of(
     train_runs, test_runs = [e.run for e in train], [e.run for e in test]
     earth_known = all(run.earth_known for run in (*train_runs, *test_runs))
     constant = (0.0, 0.0) if earth_known else training_means(train)
-    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known) for e in train)
+    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known, turn_on_band) for e in train)
     judged_test = tuple(
-        _judge_run(e, averaging_s, constant, earth_known, seen=_seen(e.run, train_runs)) for e in test
+        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, _seen(e.run, train_runs))
+        for e in test
     )
     return Judgement(
         model=model.describe(),
@@ -118,6 +126,7 @@ def judgement_of(
         design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
         notes=(*notes, *_notes(train_runs, test_runs)),
+        repeatability=repeatability_of(judged_test),
     )
 
 
@@ -144,10 +153,11 @@ def _judge_run(
     averaging_s: float,
     constant: tuple[float, float],
     earth_known: bool,
+    turn_on_band: float | None = None,
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
     run, used = errors.run, errors.used
-    metrics = RunMetrics(run, used, averaging_s, full=errors.full)
+    metrics = RunMetrics(run, used, averaging_s, full=errors.full, turn_on_band=turn_on_band)
     before = errors.before - constant[0]
     after = errors.after - constant[1]
     outside = int((errors.flag[used] == OUTSIDE).sum())
@@ -174,6 +184,7 @@ def _judge_run(
         noise=_noise(run),
         findings=findings,
         notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes),
+        power_on_known=run.facts.powered_on is not None,
     )
 
 

@@ -9,6 +9,7 @@ from fogml.errors import InputError
 from fogml.runs.run import Run
 from fogml.validation.judge import DEFAULT_AVERAGING_S, judge, judgement_of
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
+from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import Judgement
 from fogml.validation.run_errors import run_errors
 
@@ -25,6 +26,7 @@ def leave_one_run_out(
     averaging_s: float = DEFAULT_AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
+    turn_on_band: float | None = None,
     any_unit: bool = False,
 ) -> Judgement:
     """Judge a kind of model on every run, each time fitted on the others.
@@ -35,7 +37,7 @@ def leave_one_run_out(
         Makes the unfitted model.
     runs
         At least two.
-    averaging_s, design_index, limits, any_unit
+    averaging_s, design_index, limits, turn_on_band, any_unit
         As in :func:`~fogml.validation.judge.judge`.
 
     Returns
@@ -52,12 +54,19 @@ def leave_one_run_out(
     limits = check_limits(limits or {})
     check_design_index(design_index)
     folds = [
-        judge(make().fit(others), others, held_out, averaging_s=averaging_s, any_unit=any_unit)
+        judge(
+            make().fit(others),
+            others,
+            held_out,
+            averaging_s=averaging_s,
+            turn_on_band=turn_on_band,
+            any_unit=any_unit,
+        )
         for others, held_out in splits_of(runs)
     ]
     model = make().fit(runs)
     errors = [run_errors(model, run, any_unit=True) for run in runs]
-    whole = judgement_of(model, errors, [], averaging_s=averaging_s)
+    whole = judgement_of(model, errors, [], averaging_s=averaging_s, turn_on_band=turn_on_band)
     return merged_folds(whole, folds, design_index, limits)
 
 
@@ -87,4 +96,5 @@ def merged_folds(
         design_index=outcome_of("rms", design_index, test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, test) for name, limit in limits.items()),
         notes=(*whole.notes, note),
+        repeatability=repeatability_of(test),
     )

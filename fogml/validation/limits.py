@@ -7,9 +7,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 from fogml.errors import InputError
+from fogml.validation.repeatability import LEAST_RUNS, repeatability_of
 from fogml.validation.results import LimitOutcome, Metrics, RunJudgement
 
-QUANTITIES = tuple(field.name for field in dataclasses.fields(Metrics))
+_OVER_RUNS = {"bias_repeatability": "bias", "scale_factor_repeatability": "scale_factor"}
+QUANTITIES = (*(field.name for field in dataclasses.fields(Metrics)), *_OVER_RUNS)
 """Names of the figures that a limit may be put on."""
 
 
@@ -43,12 +45,19 @@ def _positive(value: float, what: str) -> float:
 
 def outcome_of(quantity: str, limit: float, test: Sequence[RunJudgement]) -> LimitOutcome:
     """A limit against the largest absolute value over the test runs that tell it."""
-    values = [getattr(run.after, quantity) for run in test]
+    if quantity in _OVER_RUNS:
+        spread = repeatability_of(test)
+        found = getattr(spread, _OVER_RUNS[quantity]) if spread is not None else None
+        values = [found.after if found is not None else None]
+    else:
+        values = [getattr(run.after, quantity) for run in test]
     told = [abs(value) for value in values if value is not None]
     if not told:
         raise InputError(
             f"limit on '{quantity}': no test run tells it (scale factor needs turns of the table, "
-            "temperature sensitivity and hysteresis need soaks); drop the limit or give such a run"
+            "nonlinearity several rates, temperature sensitivity and hysteresis soaks, turn-on time a "
+            f"stated power-on and --turn-on-band, repeatability {LEAST_RUNS} test runs of one unit and "
+            "axis); drop the limit or give such runs"
         )
     value = max(told)
     return LimitOutcome(quantity=quantity, limit=limit, value=value, met=bool(value <= limit))

@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike
 from fogml.errors import InputError
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.signals.averages import BlockAverages, block_averages
+from fogml.validation.rate_ladder import find_ladder, ladder_figures
 from fogml.validation.results import Metrics
 from fogml.validation.scale_factor import find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
+from fogml.validation.turn_on import check_turn_on_band, turn_on_time
 
 SHORT_AVERAGING_S = 10.0
 
@@ -63,6 +65,8 @@ class RunMetrics:
         Averaging time [s].
     full
         Rows whose windows are full, shape (n,), turning or not; all of them by default.
+    turn_on_band
+        Band about the settled bias that tells the turn-on time [deg/h]; None: not told.
 
     Raises
     ------
@@ -72,8 +76,16 @@ class RunMetrics:
     """
 
     def __init__(
-        self, run: Run, used: BoolArray, averaging_s: float, *, full: BoolArray | None = None
+        self,
+        run: Run,
+        used: BoolArray,
+        averaging_s: float,
+        *,
+        full: BoolArray | None = None,
+        turn_on_band: float | None = None,
     ) -> None:
+        check_turn_on_band(turn_on_band)
+        self._turn_on_band = turn_on_band
         if not (np.isfinite(averaging_s) and averaging_s > 0.0):
             raise InputError(f"averaging time {averaging_s} s: a positive number of seconds is needed")
         if averaging_s < run.sample_s * (1.0 - 1e-9):
@@ -87,6 +99,7 @@ class RunMetrics:
         self._time = run.time[used]
         self._soaks = find_soaks(run, used, least_s=averaging_s)
         self._steps = find_steps(run, np.ones(len(run), dtype=bool) if full is None else full)
+        self._ladder = find_ladder(self._steps) if self._steps is not None else None
         found = len(self.averages(self._time))
         if found < 2:
             raise InputError(
@@ -101,9 +114,13 @@ class RunMetrics:
     def figures(self, error_deg_h: FloatArray) -> Metrics:
         """The figures of an error series [deg/h] of the whole run, shape (n,)."""
         error = error_deg_h[self.used]
-        main = figures_of_averages(self.averages(error).values[0])
+        averages = self.averages(error)
+        main = figures_of_averages(averages.values[0])
         biases = [float(error_deg_h[soak.rows].mean()) for soak in self._soaks]
         scale = scale_factor_error(self._steps, error_deg_h) if self._steps is not None else None
+        ladder = None
+        if self._steps is not None and self._ladder is not None:
+            ladder = ladder_figures(self._ladder, self._steps.of(error_deg_h))
         return Metrics(
             bias=main.bias,
             bias_stability=main.bias_stability,
@@ -112,9 +129,20 @@ class RunMetrics:
             bias_stability_10s=self._short_stability(error),
             scale_factor_error=scale.overall if scale else None,
             scale_factor_error_largest=scale.largest if scale else None,
+            scale_factor_nonlinearity=ladder.nonlinearity if ladder else None,
+            scale_factor_asymmetry=ladder.asymmetry if ladder else None,
             temperature_sensitivity=temperature_sensitivity(self._soaks, biases),
             hysteresis=hysteresis(self._soaks, biases),
+            turn_on_time=self._turn_on_time(averages),
         )
+
+    def _turn_on_time(self, averages: BlockAverages) -> float | None:
+        """Time from the stated power-on until the bias stays within the stated band [s]."""
+        powered_on = self.run.facts.powered_on
+        if self._turn_on_band is None or powered_on is None:
+            return None
+        (values,) = averages.values
+        return turn_on_time(averages.time_s, values, powered_on, self._turn_on_band, self.averaging_s)
 
     def _short_stability(self, error: FloatArray) -> float | None:
         """Bias stability at 10 s, where a window holds at least two samples and lasts no longer."""

@@ -6,7 +6,7 @@ import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
-from fogml.validation.results import Judgement, LimitOutcome, Metrics, RunJudgement
+from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
 
 if TYPE_CHECKING:
     from fogml.validation.compare import Comparison
@@ -44,6 +44,8 @@ def _body(judgement: Judgement) -> dict[str, Any]:
     if judgement.design_index is not None:
         outcome = judgement.design_index
         values["design_index"] = {"limit": outcome.limit, "value": outcome.value, "met": outcome.met}
+    if judgement.repeatability is not None:
+        values["repeatability"] = _repeatability(judgement.repeatability)
     values["limits"] = [_limit(outcome) for outcome in judgement.limits]
     values["met"] = judgement.met
     values["notes"] = list(judgement.notes)
@@ -67,6 +69,16 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "noise": judged.noise,
         "findings": [finding.as_dict() for finding in judged.findings],
         "notes": list(judged.notes),
+    }
+
+
+def _repeatability(found: Repeatability) -> dict[str, Any]:
+    """Bias in deg/h, scale factor in ppm."""
+    told = {"bias": found.bias, "scale_factor": found.scale_factor}
+    return {
+        "runs": found.runs,
+        "over": "power cycles" if found.power_cycles else "runs",
+        **{name: asdict(figure) for name, figure in told.items() if figure is not None},
     }
 
 

@@ -18,9 +18,10 @@ FloatArray = NDArray[np.float64]
 class Metrics:
     """Figures of the averages over ``averaging_s``, in deg/h; rms**2 = bias**2 + bias_stability**2.
 
-    ``scale_factor_error`` (over all turns, with its sign) and ``scale_factor_error_largest`` (of
-    single turns, without) in ppm, ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in
-    deg/h; None where the run does not tell.
+    ``scale_factor_error`` (over all turns, with its sign), ``scale_factor_error_largest`` (of
+    single turns, without), ``scale_factor_nonlinearity`` and ``scale_factor_asymmetry`` in ppm,
+    ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in deg/h, ``turn_on_time`` in s; None
+    where the run does not tell.
     """
 
     bias: float
@@ -30,8 +31,33 @@ class Metrics:
     bias_stability_10s: float | None = None
     scale_factor_error: float | None = None
     scale_factor_error_largest: float | None = None
+    scale_factor_nonlinearity: float | None = None
+    scale_factor_asymmetry: float | None = None
     temperature_sensitivity: float | None = None
     hysteresis: float | None = None
+    turn_on_time: float | None = None
+
+
+@dataclass(frozen=True)
+class BeforeAfter:
+    """A figure before and after compensation."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Spread over test runs of one unit and axis: of the bias [deg/h], and of the scale factor [ppm].
+
+    ``power_cycles`` tells whether every run states its power-on; the scale factor's is None where
+    a run has no turns.
+    """
+
+    runs: int
+    power_cycles: bool
+    bias: BeforeAfter
+    scale_factor: BeforeAfter | None
 
 
 @dataclass(frozen=True)
@@ -78,6 +104,7 @@ class RunJudgement:
     noise: Mapping[str, Any] | None = None
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
+    power_on_known: bool = False
 
 
 @dataclass(frozen=True)
@@ -100,6 +127,7 @@ class Judgement:
     design_index: LimitOutcome | None = None
     limits: tuple[LimitOutcome, ...] = ()
     notes: tuple[str, ...] = field(default=())
+    repeatability: Repeatability | None = None
 
     @property
     def met(self) -> bool:

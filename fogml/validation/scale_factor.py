@@ -29,8 +29,8 @@ class Steps:
     ----------
     before, after
         Row ranges [start, stop) among the usable rows, shape (k, 2).
-    height
-        Step of the reference rate [deg/h], shape (k,).
+    levels
+        Reference rate on both sides [deg/h], shape (k, 2).
     turn
         Which turn (from rest to rest) each step belongs to, shape (k,).
     usable
@@ -39,12 +39,27 @@ class Steps:
 
     before: NDArray[np.intp]
     after: NDArray[np.intp]
-    height: FloatArray
+    levels: FloatArray
     turn: NDArray[np.intp]
     usable: NDArray[np.intp]
 
     def __len__(self) -> int:
-        return len(self.height)
+        return len(self.levels)
+
+    @property
+    def height(self) -> FloatArray:
+        """Step of the reference rate [deg/h], shape (k,)."""
+        return np.asarray(self.levels[:, 1] - self.levels[:, 0])
+
+    def of(self, error_deg_h: FloatArray) -> FloatArray:
+        """Steps of the whole run's error series [deg/h], shape (k,)."""
+        values = error_deg_h[self.usable]
+        sums = np.concatenate(([0.0], np.cumsum(values - values.mean())))
+
+        def mean(rows: NDArray[np.intp]) -> FloatArray:
+            return np.asarray((sums[rows[:, 1]] - sums[rows[:, 0]]) / (rows[:, 1] - rows[:, 0]))
+
+        return mean(self.after) - mean(self.before)
 
 
 @dataclass(frozen=True)
@@ -82,7 +97,7 @@ def find_steps(run: Run, full: BoolArray) -> Steps | None:
     reference = 3600.0 * run.rate[usable]
     gap_before = np.isin(edges[1:-1], np.searchsorted(usable, run.gap_starts))
     means = np.add.reduceat(reference, edges[:-1]) / np.diff(edges)
-    before, after, height, at_rest = [], [], [], []
+    before, after, levels, at_rest = [], [], [], []
     steps = np.abs(np.diff(means))
     least = LEAST_STEP * steps.max()
     resting = np.abs(means) < least
@@ -93,13 +108,13 @@ def find_steps(run: Run, full: BoolArray) -> Steps | None:
         last = int(np.searchsorted(time, time[middle] + length, side="right"))
         before.append((first, middle))
         after.append((middle, last))
-        height.append(reference[middle:last].mean() - reference[first:middle].mean())
+        levels.append((reference[first:middle].mean(), reference[middle:last].mean()))
         at_rest.append(bool(resting[i]))
-    if not height:
+    if not levels:
         return None
     turn = np.cumsum(np.array(at_rest, dtype=np.intp))
     pairs = [np.array(rows, dtype=np.intp).reshape(-1, 2) for rows in (before, after)]
-    return Steps(pairs[0], pairs[1], np.array(height), turn, usable)
+    return Steps(pairs[0], pairs[1], np.array(levels), turn, usable)
 
 
 def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorError:
@@ -110,13 +125,7 @@ def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorErro
     error_deg_h
         Output less reference rate [deg/h], shape (n,): the whole run's.
     """
-    values = error_deg_h[steps.usable]
-    sums = np.concatenate(([0.0], np.cumsum(values - values.mean())))
-
-    def mean(rows: NDArray[np.intp]) -> FloatArray:
-        return np.asarray((sums[rows[:, 1]] - sums[rows[:, 0]]) / (rows[:, 1] - rows[:, 0]))
-
-    products = (mean(steps.after) - mean(steps.before)) * steps.height
+    products = steps.of(error_deg_h) * steps.height
     squares = steps.height**2
     turns, member = np.unique(steps.turn, return_inverse=True)
     each = np.bincount(member, products, len(turns)) / np.bincount(member, squares, len(turns))

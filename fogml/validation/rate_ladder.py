@@ -1,0 +1,115 @@
+"""Scale factor nonlinearity and asymmetry from a ladder of table rates.
+
+The steps between neighbouring plateaus give the output at each rate above that at rest, by least
+squares over all of them, so a bias that drifts steadily cancels over a way up and back. A line
+through these outputs gives the nonlinearity, slopes of either sense the asymmetry
+(IEEE Std 952, IEEE Std 1431).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.runs.run import FloatArray
+from fogml.validation.scale_factor import LEAST_STEP, Steps
+
+LEAST_LEVELS = 4
+"""A line through fewer outputs leaves nothing that could be called nonlinearity."""
+
+
+@dataclass(frozen=True)
+class RateLadder:
+    """Levels of the table's rate in a run.
+
+    Attributes
+    ----------
+    rates
+        Reference rate of each level [deg/h], ascending, shape (l,).
+    sides
+        Level on both sides of each step, shape (k, 2).
+    rest
+        Which level is rest; None where the table never rests.
+    """
+
+    rates: FloatArray
+    sides: NDArray[np.intp]
+    rest: int | None
+
+
+@dataclass(frozen=True)
+class LadderFigures:
+    """Nonlinearity and asymmetry of the scale factor [ppm]; None where the ladder does not tell."""
+
+    nonlinearity: float | None
+    asymmetry: float | None
+
+
+def find_ladder(steps: Steps) -> RateLadder | None:
+    """The levels that steps go between; None where they don't hang together, as after a gap.
+
+    Rates closer than half of the smallest step that counts are one level.
+    """
+    values = steps.levels.ravel()
+    order = np.argsort(values, kind="stable")
+    apart = np.diff(values[order]) > 0.5 * LEAST_STEP * np.abs(steps.height).max()
+    labels = np.empty(len(values), dtype=np.intp)
+    labels[order] = np.concatenate(([0], np.cumsum(apart)))
+    rates = np.bincount(labels, values) / np.bincount(labels)
+    sides = labels.reshape(-1, 2)
+    if np.linalg.matrix_rank(_incidence(sides, len(rates))) < len(rates) - 1:
+        return None
+    rest = int(np.argmin(np.abs(rates)))
+    at_rest = abs(rates[rest]) < LEAST_STEP * np.abs(rates).max()
+    return RateLadder(rates, sides, rest if at_rest else None)
+
+
+def ladder_figures(ladder: RateLadder, steps_of_error: FloatArray) -> LadderFigures:
+    """Nonlinearity and asymmetry of an output.
+
+    Nonlinearity is the greatest deviation of the outputs from the least-squares line through
+    them, as a share of the largest; asymmetry is ``|K+ - K-| / K``, each slope from rest.
+
+    Parameters
+    ----------
+    steps_of_error
+        Steps of the output less the reference rate [deg/h], shape (k,), as `Steps.of` gives them.
+    """
+    base = 0 if ladder.rest is None else ladder.rest
+    others = np.delete(np.arange(len(ladder.rates)), base)
+    error = np.zeros(len(ladder.rates))
+    matrix = _incidence(ladder.sides, len(ladder.rates))[:, others]
+    error[others] = np.linalg.lstsq(matrix, steps_of_error, rcond=None)[0]
+    output = ladder.rates + error
+    return LadderFigures(_nonlinearity(ladder.rates, output), _asymmetry(ladder, output))
+
+
+def _nonlinearity(rates: FloatArray, output: FloatArray) -> float | None:
+    if len(rates) < LEAST_LEVELS:
+        return None
+    line = np.column_stack((np.ones(len(rates)), rates / np.abs(rates).max()))
+    deviation = output - line @ np.linalg.lstsq(line, output, rcond=None)[0]
+    return float(1e6 * np.abs(deviation).max() / np.abs(output).max())
+
+
+def _asymmetry(ladder: RateLadder, output: FloatArray) -> float | None:
+    if ladder.rest is None or ladder.rest in (0, len(ladder.rates) - 1):
+        return None
+    # Both from the level at rest, whose own rate may be a little off 0.
+    rates, above = ladder.rates - ladder.rates[ladder.rest], output - output[ladder.rest]
+    slopes = [
+        float(rates[part] @ above[part] / (rates[part] @ rates[part]))
+        for part in (slice(None, ladder.rest), slice(ladder.rest + 1, None))
+    ]
+    return abs(slopes[1] - slopes[0]) / (0.5 * abs(slopes[0] + slopes[1])) * 1e6
+
+
+def _incidence(sides: NDArray[np.intp], levels: int) -> FloatArray:
+    """One row per step, -1 at the level it leaves and 1 at the one it reaches, shape (k, l)."""
+    matrix = np.zeros((len(sides), levels))
+    rows = np.arange(len(sides))
+    np.add.at(matrix, (rows, sides[:, 0]), -1.0)
+    np.add.at(matrix, (rows, sides[:, 1]), 1.0)
+    return matrix

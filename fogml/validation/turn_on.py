@@ -1,0 +1,66 @@
+"""Turn-on time: from power-on until the bias stays within a band about its settled value."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray
+
+SETTLED_SHARE = 0.25
+"""The last quarter of a run's averages tells the settled bias."""
+LEAST_AVERAGES = 8
+
+
+def check_turn_on_band(band: float | None) -> None:
+    """Raise `InputError` for a band that is no positive number of deg/h."""
+    if band is not None and not (math.isfinite(band) and band > 0.0):
+        raise InputError(f"turn-on band {band:g} deg/h: a positive number is needed")
+
+
+def turn_on_time(
+    time_s: FloatArray, averages: FloatArray, powered_on_s: float, band_deg_h: float, averaging_s: float
+) -> float | None:
+    """Time from power-on until the averages stay within the band about their settled value [s].
+
+    The settled value is the mean of the last quarter of the averages. Where the band is entered
+    lies between two averages, and is interpolated.
+
+    Parameters
+    ----------
+    time_s
+        Mean time of each average [s], shape (m,).
+    averages
+        Averages of the error [deg/h], shape (m,).
+    powered_on_s
+        Time of power-on on the same clock [s].
+    band_deg_h
+        Greatest distance from the settled value [deg/h].
+    averaging_s
+        Averaging time [s].
+
+    Returns
+    -------
+    float or None
+        None where the averages don't tell: fewer than 8 after power-on, none of them outside the
+        band though the first is not right after power-on, or one outside in the last quarter.
+    """
+    on = time_s >= powered_on_s
+    time, values = time_s[on], averages[on]
+    if len(values) < LEAST_AVERAGES:
+        return None
+    first_settled = len(values) - int(SETTLED_SHARE * len(values))
+    away = values - values[first_settled:].mean()
+    outside = np.flatnonzero(np.abs(away) > band_deg_h)
+    if len(outside) == 0:
+        # Settled before the first average ended; which says little where that came late.
+        at_once = float(time[0]) - powered_on_s
+        return at_once if at_once <= averaging_s else None
+    last = int(outside[-1])
+    if last >= first_settled - 1:
+        return None
+    edge = math.copysign(band_deg_h, away[last])
+    share = (away[last] - edge) / (away[last] - away[last + 1])
+    return float(time[last] + share * (time[last + 1] - time[last]) - powered_on_s)

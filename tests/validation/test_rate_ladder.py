@@ -1,0 +1,106 @@
+"""Nonlinearity and asymmetry of the scale factor, against responses that are written out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.runs.run import Run
+from fogml.validation.metrics import RunMetrics
+from fogml.validation.rate_ladder import find_ladder, ladder_figures
+from fogml.validation.scale_factor import find_steps
+
+RATES = (5.0, 10.0, 20.0, 40.0)
+DEG_H = 3600.0
+
+
+def ladder_run(rates: tuple[float, ...] = RATES, *, rest: bool = True, plateau_s: int = 120) -> Run:
+    """Each rate one way, then the other, from rest and back to it, 1 Hz; or straight from rate to rate."""
+    levels = [0.0]
+    for rate in rates:
+        levels += [rate, 0.0, -rate, 0.0] if rest else [rate, -rate]
+    if not rest:
+        # Up and down the same way, so that a steady drift of the bias cancels.
+        levels = [*levels[1:], *levels[-2:0:-1], levels[1]]
+    table = np.repeat(levels, plateau_s)
+    return Run.from_columns(time=np.arange(len(table)), gyro=DEG_H * table, rate=table)
+
+
+def figures(run: Run, error: np.ndarray):
+    steps = find_steps(run, np.ones(len(run), dtype=bool))
+    assert steps is not None
+    ladder = find_ladder(steps)
+    assert ladder is not None
+    return ladder_figures(ladder, steps.of(error))
+
+
+def closed_form(rates: np.ndarray, output: np.ndarray) -> float:
+    slope, offset = np.polyfit(rates, output, 1)
+    return 1e6 * np.abs(output - slope * rates - offset).max() / np.abs(output).max()
+
+
+def test_a_cubic_response_gives_its_deviation_from_the_line():
+    run = ladder_run()
+    cubic = 2e-7 / 40.0**2
+    found = figures(run, 0.3 + DEG_H * cubic * run.rate**3 + 0.01 * run.time)
+    levels = np.array([0.0, *RATES, *(-r for r in RATES)])
+    expected = closed_form(levels, levels + cubic * levels**3)
+    assert found.nonlinearity == pytest.approx(expected, rel=1e-6)
+    assert found.asymmetry == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("ppm", [4.0, 250.0])
+def test_two_slopes_give_the_asymmetry(ppm):
+    run = ladder_run()
+    error = DEG_H * run.rate * np.where(run.rate > 0.0, 0.5e-6 * ppm, -0.5e-6 * ppm)
+    found = figures(run, error + 0.02 * run.time)
+    assert found.asymmetry == pytest.approx(ppm, rel=1e-6)
+    levels = np.array([0.0, *RATES, *(-r for r in RATES)])
+    assert found.nonlinearity == pytest.approx(
+        closed_form(levels, levels + 0.5e-6 * ppm * np.abs(levels)), rel=1e-6
+    )
+
+
+def test_a_constant_scale_factor_error_is_linear():
+    run = ladder_run()
+    found = figures(run, DEG_H * run.rate * 800e-6 - 3.0)
+    assert found.nonlinearity == pytest.approx(0.0, abs=1e-6)
+    assert found.asymmetry == pytest.approx(0.0, abs=1e-6)
+
+
+def test_without_rest_the_line_is_told_and_the_asymmetry_is_not():
+    run = ladder_run(rest=False)
+    cubic = 3e-7 / 40.0**2
+    found = figures(run, DEG_H * cubic * run.rate**3)
+    levels = np.array([*RATES, *(-r for r in RATES)])
+    assert found.nonlinearity == pytest.approx(closed_form(levels, levels + cubic * levels**3), rel=1e-6)
+    assert found.asymmetry is None
+
+
+def test_one_rate_both_ways_tells_the_asymmetry_alone():
+    run = ladder_run((10.0,))
+    found = figures(run, DEG_H * np.abs(run.rate) * 5e-6)
+    assert found.nonlinearity is None
+    assert found.asymmetry == pytest.approx(10.0, rel=1e-6)
+    one_way = Run.from_columns(
+        time=np.arange(360.0), gyro=np.zeros(360), rate=np.repeat([0.0, 10.0, 0.0], 120)
+    )
+    assert figures(one_way, np.zeros(360)).asymmetry is None
+
+
+def test_noise_averages_out_over_the_steps():
+    run = ladder_run(plateau_s=600)
+    noise = np.random.default_rng(0).standard_normal(len(run))
+    found = figures(run, noise)
+    # 60 s beside each step: 0.13 deg/h a piece, of 144 000 deg/h.
+    assert found.nonlinearity is not None and found.nonlinearity < 5.0
+
+
+def test_the_metrics_of_a_run_hold_them():
+    run = ladder_run(plateau_s=600)
+    used = run.rate == 0.0
+    told = RunMetrics(run, used, 100.0).figures(DEG_H * np.abs(run.rate) * 1e-5)
+    assert told.scale_factor_asymmetry == pytest.approx(20.0, rel=1e-6)
+    assert told.scale_factor_nonlinearity is not None
+    still = run.with_columns(rate=np.zeros(len(run)))
+    assert RunMetrics(still, used, 100.0).figures(np.zeros(len(run))).scale_factor_asymmetry is None
