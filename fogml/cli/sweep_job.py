@@ -183,8 +183,8 @@ def _judge(
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
     counts = values["counts"]
     terminal.say(
-        f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or refused, "
-        f"judged on held-out {values['folds']}."
+        f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or "
+        f"refused, judged on held-out {values['folds']}."
     )
     rows = []
     for place in values["pareto"][:20]:

@@ -69,8 +69,8 @@ def _verdict(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]
         return sentences
     worst = worst_run(judgement.test)
     sentences.append(
-        f"Judged once, on {worst.run}, it leaves {number(worst.after.rms)} of {number(worst.before.rms)} deg/h "
-        f"rms ({averages(worst.averaging_s)}); the noise floor is {number(worst.floor)} deg/h."
+        f"Judged once, on {worst.run}, it leaves {number(worst.after.rms)} of {number(worst.before.rms)} "
+        f"deg/h rms ({averages(worst.averaging_s)}); the noise floor is {number(worst.floor)} deg/h."
     )
     return sentences
 

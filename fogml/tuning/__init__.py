@@ -1,1 +1,1 @@
-"""Search spaces and studies: which features, model and sizes do best on held-out parts of the training runs."""
+"""Search spaces and studies: what does best on held-out parts of the training runs."""

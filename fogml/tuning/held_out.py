@@ -120,7 +120,7 @@ class HeldOut:
         InputError
             If it can't be fitted to these runs.
         """
-        for (fitted, held), (predicted, bytes_, operations) in zip(
+        for (_, held), (predicted, bytes_, operations) in zip(
             self.folds, self._predictions(choice), strict=True
         ):
             squares = (self._table.y[held] - predicted) ** 2

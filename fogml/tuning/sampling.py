@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 import optuna
@@ -31,33 +32,29 @@ class SeededByTrial(BaseSampler):
 
     def __init__(self, name: str, seed: int) -> None:
         self._name, self._seed = name, seed
-        self._sampler: BaseSampler = RandomSampler(seed=seed)
-
-    def before_trial(self, study: optuna.Study, trial: FrozenTrial) -> None:
-        """Seed the sampler for this trial."""
-        place = place_of(study, trial.number)
-        seed = int(np.random.SeedSequence([self._seed, place]).generate_state(1)[0])
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            self._sampler = TPESampler(seed=seed) if self._name == "tpe" else RandomSampler(seed=seed)
 
     def infer_relative_search_space(
         self, study: optuna.Study, trial: FrozenTrial
     ) -> dict[str, BaseDistribution]:
-        """As the sampler says."""
-        return self._sampler.infer_relative_search_space(study, trial)
+        """Nothing: which parameters there are depends on what is chosen first."""
+        return {}
 
     def sample_relative(
         self, study: optuna.Study, trial: FrozenTrial, search_space: dict[str, BaseDistribution]
     ) -> dict[str, Any]:
-        """As the sampler draws."""
-        return self._sampler.sample_relative(study, trial, search_space)
+        """Nothing: each parameter is drawn by itself."""
+        return {}
 
     def sample_independent(
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
-        """As the sampler draws."""
-        return self._sampler.sample_independent(study, trial, param_name, param_distribution)
+        """A parameter's value; it follows from seed, place and name, whatever was drawn before."""
+        key = [self._seed, place_of(study, trial.number), crc32(param_name.encode())]
+        seed = int(np.random.SeedSequence(key).generate_state(1)[0])
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            kind: Any = TPESampler if self._name == "tpe" else RandomSampler
+            return kind(seed=seed).sample_independent(study, trial, param_name, param_distribution)
 
 
 def place_of(study: optuna.Study, number: int) -> int:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import time
 import warnings
+import weakref
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -17,6 +19,7 @@ if TYPE_CHECKING:
 
 JOURNAL = "study.journal"
 _ANSWER_S = 10
+_SECOND_TRIES_S = (0.2, 0.5, 1.0, 2.0)
 
 
 def open_storage(url: str | None, folder: str | Path) -> BaseStorage:
@@ -54,7 +57,7 @@ def without_password(url: str | None) -> str | None:
         return None
     from sqlalchemy.engine import make_url
 
-    return make_url(url).set(password=None).render_as_string(hide_password=False)
+    return make_url(url)._replace(password=None).render_as_string(hide_password=False)
 
 
 def import_optuna() -> Any:
@@ -97,8 +100,8 @@ def storage_errors(url: str | None) -> Iterator[None]:
             cause = cause.__cause__
         told = str(cause).strip().split("\n")[0]
         raise InputError(
-            f"storage {shown(url)}: does not answer ({told}); finished trials are kept, run the command again "
-            "once it does"
+            f"storage {shown(url)}: does not answer ({told}); finished trials are kept, run the "
+            "command again once it does"
         ) from error
     except OSError as error:
         if error.filename is not None and Path(error.filename).name != JOURNAL:
@@ -134,7 +137,13 @@ def _journal(folder: Path) -> BaseStorage:
 def _database(url: str) -> BaseStorage:
     from optuna.storages import RDBStorage
     from sqlalchemy.engine import make_url
-    from sqlalchemy.exc import ArgumentError, NoSuchModuleError, SQLAlchemyError
+    from sqlalchemy.exc import (
+        ArgumentError,
+        IntegrityError,
+        NoSuchModuleError,
+        ProgrammingError,
+        SQLAlchemyError,
+    )
 
     try:
         parsed = make_url(url)
@@ -147,13 +156,17 @@ def _database(url: str) -> BaseStorage:
     engine: dict[str, Any] = {"pool_pre_ping": True}
     if parsed.get_backend_name() == "postgresql":
         engine["connect_args"] = {"connect_timeout": _ANSWER_S}
+    text = parsed.render_as_string(hide_password=False)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return cast(
-                "BaseStorage",
-                RDBStorage(parsed.render_as_string(hide_password=False), engine_kwargs=engine),
-            )
+            for wait_s in _SECOND_TRIES_S:
+                try:
+                    return _closing(RDBStorage(text, engine_kwargs=engine))
+                except (IntegrityError, ProgrammingError):
+                    # Somebody else makes the tables at this moment.
+                    time.sleep(wait_s)
+            return _closing(RDBStorage(text, engine_kwargs=engine))
     except (ImportError, NoSuchModuleError) as error:
         raise InputError(
             f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: pip install 'fogml[sweep]'"
@@ -163,6 +176,12 @@ def _database(url: str) -> BaseStorage:
         raise InputError(
             f"--storage {shown(url)}: does not answer ({told}); start the database, or state another"
         ) from None
+
+
+def _closing(storage: Any) -> BaseStorage:
+    """The storage, its connections closed once nobody holds it any more."""
+    weakref.finalize(storage, storage.engine.dispose)
+    return cast("BaseStorage", storage)
 
 
 def process_is_alive(pid: int, started: str) -> bool:

@@ -57,9 +57,11 @@ def open_study(plan: Plan, runs: Sequence[Run] | None = None) -> optuna.Study:
 
 def _check_identity(study: optuna.Study, plan: Plan, runs: Sequence[Run]) -> None:
     wanted = plan.identity(runs)
+    # In this order: whoever begins trials has stated what they are for.
+    begun = bool(study.get_trials(deepcopy=False))
     stored = study.user_attrs.get(IDENTITY)
     if stored is None:
-        if study.get_trials(deepcopy=False):
+        if begun:
             raise InputError(f"study '{plan.name}' in {shown(plan.storage)}: was not made by fogml sweep")
         study.set_user_attr(IDENTITY, json.dumps(wanted))
         with warnings.catch_warnings():
@@ -109,8 +111,8 @@ class Recovery:
         return sum(_try_again(study, trial) for trial in running if self._is_dead(trial))
 
     def _is_dead(self, trial: FrozenTrial) -> bool:
-        worker = trial.user_attrs.get(WORKER)
-        here = worker is not None and worker["host"] == socket.gethostname() and worker["started"]
+        worker = trial.user_attrs.get(WORKER) or {"host": "", "started": ""}
+        here = worker["host"] == socket.gethostname() and worker["started"]
         if here and not process_is_alive(worker["pid"], worker["started"]):
             return True
         now, beat = time.monotonic(), trial.user_attrs.get(BEAT)

@@ -1,0 +1,79 @@
+"""Storages: journals survive killed writers and full disks; a database that is not there is told plainly."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import resource
+
+import pytest
+from optuna.storages import JournalStorage
+
+from fogml.errors import InputError
+from fogml.tuning.journal import WholeLines
+from fogml.tuning.storage import JOURNAL, open_storage, shown, without_password
+from fogml.tuning.study import is_finished
+from fogml.tuning.sweep import run_sweep
+from tests.tuning.postgres import free_port
+from tests.tuning.world import plan
+
+
+def test_a_database_that_does_not_answer(tmp_path):
+    url = f"postgresql://somebody:secret@127.0.0.1:{free_port()}/studies"
+    with pytest.raises(InputError) as told:
+        run_sweep(plan(tmp_path, storage=url))
+    assert "does not answer" in str(told.value)
+    assert "secret" not in str(told.value)
+    assert "secret" not in shown(url)
+    assert without_password(url) == url.replace(":secret", "")
+
+
+@pytest.mark.parametrize("url", ["not a url", "nosuchdatabase://x/y"])
+def test_a_storage_that_is_not_known(tmp_path, url):
+    with pytest.raises(InputError, match="--storage"):
+        open_storage(url, tmp_path)
+
+
+def test_a_journal_that_is_none(tmp_path):
+    (tmp_path / JOURNAL).write_text('{"a": 1}\n{"b": 2}\n')
+    with pytest.raises(InputError, match="no study's journal"):
+        open_storage(None, tmp_path)
+
+
+def test_half_a_line_is_dropped_by_the_next_writer(tmp_path):
+    path = tmp_path / "journal"
+    journal = WholeLines(str(path))
+    journal.append_logs([{"a": 1}, {"b": 2}])
+    with path.open("ab") as file:
+        file.write(b'{"c": ')
+    assert list(WholeLines(str(path)).read_logs(0)) == [{"a": 1}, {"b": 2}]
+    WholeLines(str(path)).append_logs([{"d": 4}])
+    assert [json.loads(line) for line in path.read_text().splitlines()] == [{"a": 1}, {"b": 2}, {"d": 4}]
+    assert list(journal.read_logs(2)) == [{"d": 4}]
+
+
+def _sweep_on_a_small_disk(settings, most, told):
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
+    try:
+        run_sweep(settings)
+    except InputError as error:
+        told.send(str(error))
+
+
+def test_a_disk_that_fills_in_the_middle_keeps_the_finished_trials(tmp_path):
+    settings = plan(tmp_path, trials=6)
+    run_sweep(plan(tmp_path, trials=3))
+    most = (tmp_path / JOURNAL).stat().st_size + 700
+    context = multiprocessing.get_context("spawn")
+    here, there = context.Pipe()
+    process = context.Process(target=_sweep_on_a_small_disk, args=(settings, most, there))
+    process.start()
+    process.join(60)
+    assert here.poll()
+    assert "cannot be written" in here.recv()
+    text = (tmp_path / JOURNAL).read_text()
+    assert text.endswith("\n")
+    assert len(text) <= most
+    assert JournalStorage(WholeLines(str(tmp_path / JOURNAL))).get_all_studies()
+    ended = run_sweep(settings)
+    assert sum(is_finished(trial) for trial in ended.get_trials()) == 6

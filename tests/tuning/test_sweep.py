@@ -1,0 +1,175 @@
+"""Sweeps: repeatable, resumable, shared by processes and a database, and safe against killed workers."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.features.parse import parse_features
+from fogml.tuning.held_out import HeldOut
+from fogml.tuning.space import Choice, Space
+from fogml.tuning.study import is_finished, open_study
+from fogml.tuning.sweep import run_sweep
+from fogml.tuning.winner import complete, figure, pareto, winner
+from tests.tuning.world import SPACE, plan, runs
+
+pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
+
+
+def tried(study):
+    return [(t.params, t.values) for t in study.get_trials() if is_finished(t)]
+
+
+def test_the_held_out_error_is_that_of_a_plain_least_squares_fit_on_the_other_run(tmp_path):
+    held_out = HeldOut(runs(), Space.model_validate(SPACE | {"window": 4.0}))
+    choice = Choice("polynomial", "T", {"ridge": 0.0})
+    results = list(held_out.judged(choice))
+    assert len(results) == 2
+    for place, result in enumerate(results):
+        # Windows of up to 3 time constants: the first rows count for no choice.
+        held, other = runs()[place], runs()[1 - place]
+        full = parse_features("dT[exp, 4 s], dT[block, 4 s]").atom_values
+        used, rest = full(held)[1], full(other)[1]
+        slope, level = np.polyfit(other.columns["T"][rest], other.gyro[rest], 1)
+        span = other.columns["T"][rest]
+        limited = np.clip(held.columns["T"][used], span.min(), span.max())
+        # Beyond the box a polynomial goes on along its tangent, which for a line is the line.
+        error = held.gyro[used] - (level + slope * limited)
+        if np.array_equal(limited, held.columns["T"][used]):
+            found = np.average(result.squared_errors, weights=result.rows)
+            assert found == pytest.approx(np.mean(error**2), rel=1e-9)
+        assert result.size_bytes == 16
+        assert result.operations == 2
+
+
+def test_every_choice_is_judged_on_the_same_rows():
+    held_out = HeldOut(runs(), Space.model_validate(SPACE))
+    texts = ("T", "T, dT[block, 16 s]", "T, dT[exp, 64 s]")
+    rows = [[r.rows for r in held_out.judged(Choice("polynomial", text, {}))] for text in texts]
+    assert rows[0] == rows[1] == rows[2]
+
+
+def test_a_sweep_repeats_itself_and_goes_on_as_if_it_had_not_been_interrupted(tmp_path):
+    whole = run_sweep(plan(tmp_path / "whole"))
+    again = run_sweep(plan(tmp_path / "again"))
+    first = run_sweep(plan(tmp_path / "parts", trials=3))
+    assert len(tried(first)) == 3
+    resumed = run_sweep(plan(tmp_path / "parts"))
+    assert len(tried(whole)) == 8
+    assert tried(whole) == tried(again) == tried(resumed)
+    assert tried(run_sweep(plan(tmp_path / "other", seed=1))) != tried(whole)
+
+
+def test_the_right_features_win(tmp_path):
+    study = run_sweep(plan(tmp_path, objectives=("rms", "bytes"), trials=12))
+    best = winner(study.get_trials())
+    assert "dT" in best.user_attrs["features"]
+    least = min(figure(t, "rms") for t in complete(study.get_trials()))
+    assert figure(best, "rms") < 1.1 * least
+    front = pareto(study.get_trials())
+    for trial in complete(study.get_trials()):
+        assert trial in front or any(np.all(np.array(f.values) <= trial.values) for f in front)
+    for one in front:
+        assert not any(np.all(np.array(f.values) <= one.values) and f.values != one.values for f in front)
+
+
+def test_trials_that_a_finished_one_beats_are_pruned_and_the_best_never_is(tmp_path):
+    settings = {"folds": "time", "fold_count": 10, "trials": 14, "sampler": "random"}
+    kept = run_sweep(plan(tmp_path / "kept", **settings))
+    raced = run_sweep(plan(tmp_path / "raced", **settings, prune=True))
+    pruned = [t for t in raced.get_trials() if t.state.name == "PRUNED"]
+    assert pruned
+    assert all(len(t.user_attrs["fold_errors"]) < 10 for t in pruned)
+    assert [t.params for t in kept.get_trials()] == [t.params for t in raced.get_trials()]
+    assert figure(winner(raced.get_trials()), "rms") == pytest.approx(
+        figure(winner(kept.get_trials()), "rms"), rel=0.02
+    )
+
+
+def test_random_trials_are_the_same_for_any_number_of_workers(tmp_path):
+    alone = run_sweep(plan(tmp_path / "one", sampler="random", trials=6))
+    crew = run_sweep(plan(tmp_path / "two", sampler="random", trials=6), workers=2)
+    key = lambda entry: sorted(entry[0].items(), key=str)  # noqa: E731
+    assert sorted(tried(alone), key=key) == sorted(tried(crew), key=key)
+
+
+def _hang_in_the_third_trial(settings):
+    import fogml.tuning.worker as worker
+
+    evaluate = worker._evaluate
+
+    def hanging(study, plan, held_out, trial):
+        if trial.number == 2:
+            plan.space.suggest(trial)
+            time.sleep(600)
+        return evaluate(study, plan, held_out, trial)
+
+    worker._evaluate = hanging
+    run_sweep(settings)
+
+
+@pytest.mark.parametrize("kept_in", ["journal", "postgres"])
+def test_a_worker_killed_in_mid_trial_loses_nothing(tmp_path, kept_in, request):
+    storage = request.getfixturevalue("database") if kept_in == "postgres" else None
+    settings = replace(plan(tmp_path, storage=storage, trials=5), name=f"killed {tmp_path}")
+    context = multiprocessing.get_context("spawn")
+    process = context.Process(target=_hang_in_the_third_trial, args=(settings,))
+    process.start()
+    study, deadline = None, time.monotonic() + 60
+    while time.monotonic() < deadline:
+        time.sleep(0.1)
+        study = study or open_study(settings)
+        running = [t for t in study.get_trials(deepcopy=False) if t.state.name == "RUNNING"]
+        if running and running[0].number == 2 and running[0].params:
+            break
+    os.kill(process.pid, signal.SIGKILL)
+    process.join()
+    before = tried(study)
+    assert len(before) == 2
+    ended = run_sweep(settings)
+    finished = [t for t in ended.get_trials() if is_finished(t)]
+    assert len(finished) == 5
+    assert [(t.params, t.values) for t in finished][:2] == before
+    retried = [t for t in finished if t.user_attrs.get("retry_of") == 2]
+    assert len(retried) == 1
+    assert running[0].params.items() <= retried[0].params.items()
+    uninterrupted = run_sweep(plan(tmp_path / "other", trials=5))
+    assert [v for _, v in tried(uninterrupted)] == [v for _, v in tried(ended)]
+
+
+def test_two_commands_share_a_study_in_the_database(tmp_path, database):
+    settings = replace(plan(tmp_path, storage=database, trials=8), name=f"shared {tmp_path}")
+    context = multiprocessing.get_context("spawn")
+    other = context.Process(target=run_sweep, args=(settings,))
+    other.start()
+    here = run_sweep(settings)
+    other.join(60)
+    assert other.exitcode == 0
+    finished = [t for t in here.get_trials() if is_finished(t)]
+    assert len(finished) == 8
+    assert not [t for t in here.get_trials() if t.state.name in ("RUNNING", "WAITING")]
+
+
+def test_a_study_made_for_something_else_is_refused(tmp_path):
+    run_sweep(plan(tmp_path, trials=2))
+    wider = {**SPACE, "window": {"low": 8, "high": 64}}
+    with pytest.raises(InputError, match="another search space; its trials can't be gone on with"):
+        run_sweep(plan(tmp_path, trials=2, space=wider))
+    with pytest.raises(InputError, match="another seed"):
+        run_sweep(plan(tmp_path, trials=2, seed=5))
+
+
+def test_a_choice_that_cannot_be_fitted_is_told_and_the_rest_go_on(tmp_path):
+    space = {**SPACE, "models": {"sklearn.linear_model.Ridge": {"alpha": [-1.0, 1.0]}}}
+    study = run_sweep(plan(tmp_path, space=space, trials=6, sampler="random"))
+    states = {t.params["sklearn.linear_model.Ridge.alpha"]: t for t in study.get_trials()}
+    assert states[-1.0].state.name == "PRUNED"
+    assert "alpha" in states[-1.0].user_attrs["reason"]
+    assert states[1.0].state.name == "COMPLETE"
