@@ -65,9 +65,9 @@ def navigation_figure(run: Mapping[str, Any], latitude_deg: float) -> Drawing:
             f"{number(last['after'])} km after compensation."
         ),
         caption=(
-            f"The recorded drift ({averages(run['averaging_s'])}, floor {number(run['floor'])} deg/h) as that "
-            f"of the {SHOWN_AXIS} gyro, the others perfect, undamped, latitude {latitude_deg:g}°, no error at "
-            "the start. Dotted: before, solid: after compensation."
+            f"The recorded drift ({averages(run['averaging_s'])}, floor {number(run['floor'])} deg/h) as "
+            f"that of the {SHOWN_AXIS} gyro, the others perfect, undamped, latitude {latitude_deg:g}°, no "
+            "error at the start. Dotted: before, solid: after compensation."
         ),
     )
 
@@ -94,7 +94,7 @@ def _table(run: Mapping[str, Any], costs: Mapping[str, Any]) -> Table:
         caption=(
             f"Largest error until then, before → after, for a constant drift of the rms: "
             f"{number(before['drift_deg_h'])} → {number(after['drift_deg_h'])} deg/h. A gyrocompass "
-            f"alignment with an east gyro that drifts so is off by {number(before['gyrocompass_heading_deg'])} → "
-            f"{number(after['gyrocompass_heading_deg'])} deg from the start."
+            f"alignment with an east gyro that drifts so is off by "
+            f"{number(before['gyrocompass_heading_deg'])} → {number(after['gyrocompass_heading_deg'])} deg."
         ),
     )

@@ -163,10 +163,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
             ("linear drift", f"{stated(drift['linear_deg_h_per_h'])} deg/h per h"),
             ("transients", listed(transients) or MISSING),
             ("angle random walk", f"{stated(values['random_walk_deg_sqrt_h'])} deg/√h"),
-            (
-                "closed form less simulation",
-                f"{number(values['error_deg'] - values['simulated_error_deg'], 2)} deg",
-            ),
+            ("closed form less simulation", f"{number(difference, 2)} deg"),
         ]
     else:
         rows += [

@@ -1,0 +1,169 @@
+"""Scale factor and misalignment: known answers, other geometry, intervals that cover."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.lab.misalignment import TableMeasurements, decouple
+from fogml.lab.misalignment_methods import compare_methods, relative_error_ppm
+from fogml.lab.misalignment_segments import from_samples
+from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
+
+UNIT = TableUnit(K=1.2345, delta_x_deg=5.0, delta_y_deg=3.0, fixture_error_deg=0.5)
+TILTS, RATES = (0.0, 30.0, 60.0, 90.0), (-100.0, -10.0, 10.0, 100.0)
+
+
+def by_the_formulas(tilts: tuple[float, ...] = TILTS, *, cross_deg: float = 0.0) -> TableMeasurements:
+    """The known answer's case from the printed equations, sharing nothing with the simulation."""
+    e, dx, dy = np.radians([0.5, 5.0, 3.0])
+    ax, ay = np.sin(dx), np.sin(dy)
+    az = np.sqrt(1.0 - ax**2 - ay**2)
+    across = {1: ay, 2: -ay, 3: -ax, 4: ax}
+    rows = []
+    for state, component in {1: ax, 2: -ax, 3: ay, 4: -ay}.items():
+        for tilt in tilts:
+            t = np.radians(tilt) + e
+            along = az * np.cos(t) + component * np.sin(t)
+            f = np.radians(cross_deg)
+            slope = 1.2345 * (along * np.cos(f) + across[state] * np.sin(f))
+            rows += [(state, tilt, rate, slope * rate) for rate in RATES]
+    return TableMeasurements(*np.array(rows, dtype=float).T, "V")
+
+
+def test_known_answer() -> None:
+    found = decouple(by_the_formulas())
+    np.testing.assert_allclose(found.K, 1.2345, rtol=1e-12)
+    assert found.delta_x_deg == pytest.approx(5.0, abs=1e-11)
+    assert found.delta_y_deg == pytest.approx(3.0, abs=1e-11)
+    assert found.fixture_error_deg == pytest.approx((0.5, 0.5), abs=1e-11)
+    expected = np.degrees(np.arccos(np.sqrt(1 - np.sin(np.radians(5)) ** 2 - np.sin(np.radians(3)) ** 2)))
+    assert found.delta_deg == pytest.approx(expected, abs=1e-11)
+    assert not found.cross_tilt
+
+
+def test_what_the_other_methods_get_wrong() -> None:
+    classical, single, four = compare_methods(by_the_formulas())
+    assert relative_error_ppm(classical.K, 1.2345) == pytest.approx(-4458, abs=0.5)
+    assert relative_error_ppm(single.K, 1.2345) == pytest.approx(-1371, abs=0.6)
+    assert relative_error_ppm(four.K, 1.2345) == pytest.approx(0.0, abs=1e-6)
+    assert single.delta_y_deg is None and classical.delta_x_deg == pytest.approx(4.516, abs=1e-3)
+
+
+def test_a_fixture_tilted_across_is_seen() -> None:
+    turns = by_the_formulas((0.0, 20.0, 40.0, 60.0, 90.0), cross_deg=0.3)
+    found = decouple(turns)
+    assert found.cross_tilt and found.cross_tilt_deg == pytest.approx(0.3, abs=1e-4)
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((5.0, 3.0), abs=1e-10)
+    assert relative_error_ppm(found.K, 1.2345) == pytest.approx(-13.7, abs=0.02)
+    blind = decouple(turns, cross_tilt=False)
+    assert abs(blind.delta_x_deg - 5.0) > 1e-4
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    K=st.floats(0.01, 100.0),
+    x=st.floats(-30.0, 30.0),
+    y=st.floats(-30.0, 30.0),
+    e=st.floats(-5.0, 5.0),
+)
+def test_every_direction_comes_back(K: float, x: float, y: float, e: float) -> None:
+    found = decouple(measurements(TableUnit(K, x, y, e), TILTS, RATES), cross_tilt=False)
+    np.testing.assert_allclose(found.K, K, rtol=1e-9)
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((x, y), abs=1e-9)
+    assert found.fixture_error_deg == pytest.approx((e, e), abs=1e-9)
+
+
+def test_samples_with_earth_rate_drift_and_ramps() -> None:
+    unit = replace(UNIT, bias=0.2, drift_per_s=1e-7)
+    rows, time = samples(unit, TILTS, (36.0, 72.0), latitude_deg=40.0)
+    turns = from_samples(rows, time)
+    assert len(turns.output) == 4 * 4 * 4
+    found = decouple(turns)
+    # Whole turns leave nothing of the horizontal Earth rate, rests before and after nothing of the drift.
+    np.testing.assert_allclose(found.K, 1.2345, rtol=1e-9)
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((5.0, 3.0), abs=1e-8)
+
+
+def coverage(count: int, **noise: float) -> tuple[dict[str, int], list[float]]:
+    """How often intervals and region hold the truth, and the errors of x in standard errors."""
+    inside = {"K": 0, "delta_x_deg": 0, "delta_y_deg": 0, "delta_deg": 0, "region": 0}
+    true = {"K": 1.2345, "delta_x_deg": 5.0, "delta_y_deg": 3.0}
+    true["delta_deg"] = decouple(by_the_formulas()).delta_deg
+    in_errors = []
+    for seed in range(count):
+        found = decouple(measurements(UNIT, TILTS, RATES, seed=seed, **noise), cross_tilt=False)
+        for name, value in true.items():
+            low, high = found.intervals[name]
+            inside[name] += low <= value <= high
+        assert found.region is not None and found.se is not None
+        in_errors.append((found.delta_x_deg - 5.0) / found.se["delta_x_deg"])
+        long, short = found.region.half_axes_deg
+        turn = np.radians(found.region.angle_deg)
+        off = np.array([5.0 - found.delta_x_deg, 3.0 - found.delta_y_deg])
+        along, across = off @ [np.cos(turn), np.sin(turn)], off @ [-np.sin(turn), np.cos(turn)]
+        inside["region"] += bool((along / long) ** 2 + (across / short) ** 2 <= 1.0)
+    return inside, in_errors
+
+
+def test_intervals_cover() -> None:
+    inside, in_errors = coverage(400, noise=0.02)
+    # 380 of 400 at 95 %, and 3.5 standard deviations are 15; the whole angle's interval is wider.
+    for name in ("K", "delta_x_deg", "delta_y_deg", "region"):
+        assert 365 <= inside[name] <= 395, (name, inside[name])
+    assert inside["delta_deg"] >= 380
+    # Student's t with 8 degrees of freedom.
+    assert np.std(in_errors) == pytest.approx(np.sqrt(8 / 6), rel=0.15)
+
+
+def test_intervals_nearly_cover_where_tilt_settings_err() -> None:
+    """Errors of the tilts act at high tilts only, which one variance for all does not know."""
+    inside, _ = coverage(200, noise=1e-3, tilt_noise_deg=0.05)
+    assert min(inside.values()) >= 170, inside
+
+
+def test_zero_misalignment_lies_in_the_interval() -> None:
+    spans = [
+        decouple(measurements(TableUnit(2.0), TILTS, RATES, noise=0.01, seed=seed), False).intervals[
+            "delta_deg"
+        ]
+        for seed in range(40)
+    ]
+    assert sum(low == 0.0 < high for low, high in spans) >= 33
+
+
+def test_errors_of_the_tilt_settings_are_told() -> None:
+    noisy = measurements(UNIT, TILTS, (-100.0, -50.0, 50.0, 100.0), noise=1e-4, tilt_noise_deg=0.05, seed=1)
+    found = decouple(noisy)
+    assert any("tilt settings" in note for note in found.notes)
+    assert found.se is not None and found.se["delta_x_deg"] > 5e-3
+
+
+def test_two_tilts_and_no_repeats_give_no_standard_errors() -> None:
+    found = decouple(measurements(UNIT, (0.0, 90.0), (50.0,)))
+    assert found.se is None and found.region is None
+    np.testing.assert_allclose(found.K, 1.2345)
+
+
+@pytest.mark.parametrize(
+    ("tilts", "states", "cross", "message"),
+    [
+        ((0.0,), (1, 2, 3, 4), None, "only tilt 0 deg"),
+        ((0.0, 180.0), (1, 2, 3, 4), None, "at least 2 tilts"),
+        ((0.0, 90.0), (1, 2, 3, 4), True, "at least 3 tilts"),
+        (TILTS, (1, 3, 4), None, "no turns in state 2"),
+    ],
+)
+def test_too_little_is_refused(tilts, states, cross, message: str) -> None:
+    turns = measurements(UNIT, tilts, RATES)
+    kept = np.isin(turns.state, states)
+    part = TableMeasurements(
+        turns.state[kept], turns.tilt_deg[kept], turns.rate_deg_s[kept], turns.output[kept], "V"
+    )
+    with pytest.raises(InputError, match=message):
+        decouple(part, cross)

@@ -1,0 +1,132 @@
+"""Files of the misalignment procedure: every documented form gives the same turns; faults are named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.lab.misalignment import decouple
+from fogml.lab.misalignment_input import read_measurements
+from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
+
+UNIT = TableUnit(K=1.2345, delta_x_deg=5.0, delta_y_deg=3.0, fixture_error_deg=0.5)
+TILTS, RATES = (0.0, 30.0, 60.0, 90.0), (10.0, -10.0, 50.0, -50.0)
+HEADER = "state,tilt [deg],rate [deg/s],segment,output [V]"
+
+
+def lines(*, rate_on_rests: bool = True, shared_rests: bool = False) -> list[str]:
+    """Averages with a bias that drifts from row to row, so that a wrong rest shows."""
+    turns = measurements(UNIT, TILTS, RATES)
+    rows, level = [], 0.2
+    for number, (state, tilt, rate, value) in enumerate(
+        zip(turns.state, turns.tilt_deg, turns.rate_deg_s, turns.output)
+    ):
+        stated = rate if rate_on_rests else 0.0
+        first = number % len(RATES) == 0
+        marks = [("before", stated, 0.0)] if first or not shared_rests else []
+        marks += [("turn", rate, value), ("after", stated, 0.0)]
+        for mark, told, added in marks:
+            level += 1e-3
+            rows.append(
+                f"{state:g},{tilt:g},{told:g},{mark},{level + added!r}".replace("np.float64(", "").rstrip(")")
+            )
+    return rows
+
+
+def written(tmp_path: Path, rows: list[str], header: str = HEADER) -> Path:
+    path = tmp_path / "table.csv"
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("rate_on_rests", [True, False])
+@pytest.mark.parametrize("shared_rests", [True, False])
+def test_marked_averages(tmp_path: Path, rate_on_rests: bool, shared_rests: bool) -> None:
+    path = written(tmp_path, lines(rate_on_rests=rate_on_rests, shared_rests=shared_rests))
+    turns = read_measurements(path)
+    assert turns.unit == "V" and len(turns.output) == 64
+    found = decouple(turns)
+    np.testing.assert_allclose(found.K, 1.2345, rtol=1e-9)
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((5.0, 3.0), abs=1e-8)
+
+
+def test_rows_in_another_order_are_matched_by_their_rate(tmp_path: Path) -> None:
+    rows = lines()
+    np.random.default_rng(1).shuffle(rows)
+    np.testing.assert_allclose(decouple(read_measurements(written(tmp_path, rows))).K, 1.2345, rtol=1e-9)
+
+
+def test_averages_without_marks(tmp_path: Path) -> None:
+    rows = [
+        ",".join(r.split(",")[:3] + r.split(",")[4:]) for r in lines(rate_on_rests=False, shared_rests=True)
+    ]
+    path = written(tmp_path, rows, HEADER.replace("segment,", ""))
+    assert decouple(read_measurements(path)).delta_x_deg == pytest.approx(5.0, abs=1e-8)
+
+
+def test_other_units_and_separators(tmp_path: Path) -> None:
+    rows = []
+    for row in lines():
+        state, tilt, rate, mark, output = row.split(",")
+        values = (state, repr(float(np.radians(float(tilt)))), repr(float(rate) * 3600.0), mark, output)
+        rows.append(";".join(values).replace(".", ","))
+    path = written(tmp_path, rows, "state;tilt [rad];rate [deg/h];segment;output [mV]")
+    turns = read_measurements(path)
+    assert turns.unit == "mV"
+    np.testing.assert_allclose(decouple(turns).K, 1.2345, rtol=1e-9)
+
+
+def test_a_run_of_samples_with_noise(tmp_path: Path) -> None:
+    rows, time = samples(
+        UNIT, TILTS, (36.0, 72.0), noise=1e-4, sample_s=0.2, acceleration_deg_s2=40.0, seed=2
+    )
+    columns = (time, rows.output, rows.state, rows.tilt_deg, rows.rate_deg_s)
+    path = tmp_path / "run.csv"
+    header = "time [s],gyro [deg/h],state,tilt [deg],rate [deg/s]"
+    np.savetxt(path, np.column_stack(columns), delimiter=",", header=header, comments="", fmt="%.10g")
+    found = decouple(read_measurements(path))
+    assert found.se is not None
+    assert abs(found.K - 1.2345) < 5 * found.se["K"] < 1e-5
+    assert abs(found.delta_x_deg - 5.0) < 5 * found.se["delta_x_deg"] < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda t: t.replace(",output [V]", ",signal [V]"), "no column 'output'"),
+        (lambda t: t.replace("state,", "mode,", 1), "no column 'state'"),
+        (lambda t: t.replace("tilt [deg]", "tilt"), "column 'tilt' states no unit"),
+        (lambda t: t.replace("rate [deg/s]", "rate [rpm]"), "column 'rate' has unit 'rpm'"),
+        (lambda t: t.replace("output [V]", "output"), "column 'output' states no unit"),
+        (lambda t: t.replace("\n2,30,", "\n7,30,"), "7 is no mounting state"),
+        (
+            lambda t: t.replace("\n2,30,10,turn,", "\n2,30,nan,turn,"),
+            "column 'rate', line .*missing or not finite",
+        ),
+        (lambda t: t.replace(",turn,", ",spin,", 1), "'spin' is no segment"),
+        (lambda t: t.replace("\n3,", "\n1,"), "no turns in state 3"),
+    ],
+)
+def test_faults_are_named(tmp_path: Path, change, message: str) -> None:
+    path = tmp_path / "table.csv"
+    text = change("\n".join([HEADER, *lines()]) + "\n")
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        decouple(read_measurements(path))
+    assert "table.csv" in str(caught.value)
+
+
+def test_a_turn_without_a_rest_is_named(tmp_path: Path) -> None:
+    rows = lines(rate_on_rests=False)
+    del rows[2:4]
+    with pytest.raises(InputError, match="no rest after the turn at 10 deg/s"):
+        read_measurements(written(tmp_path, rows))
+
+
+def test_no_turn_at_all(tmp_path: Path) -> None:
+    rest = [row for row in lines() if ",turn," not in row]
+    with pytest.raises(InputError, match="no turn"):
+        read_measurements(written(tmp_path, rest))
