@@ -1,0 +1,371 @@
+"""What C source in fixed point is filled with: whole numbers, and the powers of two that they count.
+
+Limited atoms cannot leave a known range (see `fogml.features.box`), so the range of every feature
+and of every sum is known when the code is made; steps are chosen so that nothing overflows, and
+a model for which none can be found is refused. Arithmetic is in 64 bits; ``q31`` stores numbers
+in 32 bits, ``q15`` in 16 bits and takes temperatures in 16.
+"""
+
+from __future__ import annotations
+
+from math import factorial, floor, frexp, log, log2
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.export.c_float import array
+from fogml.export.layout import Layout
+from fogml.export.plan import Plan
+from fogml.features.atoms import DEAD_BAND
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+OUTPUT_BITS = 12
+"""Outputs are multiples of 2**-12 deg/h."""
+EXP_ERROR = 3e-8
+"""Greatest absolute error of the generated exponential, its argument's rounding included; held by the tests."""
+_VALUE_BITS = 30
+_SUM_BITS = 60
+_MOST_DRIFT_BITS = 36
+_HELD_BITS = 20
+_SIGNAL_SHIFT = 24
+_TEMPERATURE_MARGIN = 1.1
+
+
+def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
+    """The templates' values for ``q31`` or ``q15``.
+
+    Raises
+    ------
+    InputError
+        If a range is too wide for the format.
+    """
+    from fogml.export.c_source import units_of
+
+    scales = _Scales(plan, dtype)
+    bits = scales.temperature_bits
+    fixed = {
+        "temperature_unit": f"{2.0**-bits!r}",
+        "temperature_value": 2.0**-bits,
+        "temperature_most": 2.0 ** (15 if dtype == "q15" else 31) - 1.0,
+        "gyro_value": 2.0**-scales.gyro_bits,
+        "gyro_unit": repr(2.0**-scales.gyro_bits),
+        "compensated_value": 2.0**-OUTPUT_BITS,
+        "compensated_unit": repr(2.0**-OUTPUT_BITS),
+        "atom_bits": scales.atoms.tolist(),
+        "column_bits": scales.columns.tolist(),
+        "drift_bits": scales.drift,
+        "tick_us": round(windows.tick_s * 1e6),
+        "signal_note": f", steps of 2^-{_HELD_BITS}",
+        "output_note": f", steps of 2^-{OUTPUT_BITS}",
+    }
+    gyro = (
+        f"[{plan.gyro_unit}]"
+        if plan.form == "joint" and plan.gyro_unit == "count"
+        else f"output as rate, whole steps of 2^-{OUTPUT_BITS} deg/h"
+    )
+    compensated = f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below."
+    units = units_of(
+        plan, gyro, "time_us [us]", f"whole steps of 2^-{bits} degC, in the order of the places below"
+    )
+    exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
+    return {
+        "fixed": fixed,
+        "real": "int64_t",
+        "suffix": "",
+        "time_type": "int64_t",
+        "time_name": "time_us",
+        "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
+        "gyro_type": "int32_t",
+        "atom_type": "int32_t",
+        "signal_type": "int32_t",
+        "value_type": "int64_t",
+        "exp_type": "int64_t",
+        "phase_type": "int32_t",
+        "held_type": "int32_t",
+        "units": [*units, compensated],
+        "constants": _constants(plan, windows, scales, dtype),
+        "exp_error": EXP_ERROR,
+        "exp_terms": exp_terms,
+        "signal_expressions": [_signal(signal.parts, bits) for signal in windows.signals],
+        "gap": {i: f"INT64_C({round(operator.gap_s * 1e6)})" for i, operator in enumerate(windows.operators)},
+        "evaluate": _evaluations(plan, windows, scales),
+        "exponential_arguments": _exponential_arguments(windows),
+        "atom_expressions": [_atom(i, plan, windows, scales) for i in range(len(plan.atoms))],
+        "columns": _columns(plan, scales),
+    }
+
+
+class _Scales:
+    """Bits behind the binary point of every value, so that each fits 2**30."""
+
+    def __init__(self, plan: Plan, dtype: str) -> None:
+        self.plan = plan
+        self.stored_bits = 14 if dtype == "q15" else 30
+        limits = plan.limits
+        low, high = limits.low - limits.margin, limits.high + limits.margin
+        self.atoms = np.array([_bits(max(abs(a), abs(b))) for a, b in zip(low, high)], dtype=np.int64)
+        ranges: list[tuple[float, float]] = []
+        for step in plan.steps:
+            span = (1.0, 1.0) if step.column is None else ranges[step.column]
+            for atom in step.atoms:
+                span = _product(span, (float(low[atom]), float(high[atom])))
+            ranges.append(span)
+        self.most = np.array([max(abs(a), abs(b)) for a, b in ranges])
+        self.columns = np.array([_bits(value) for value in self.most], dtype=np.int64)
+        self.temperature_bits = 22 if dtype == "q31" else _sixteen_bits(plan)
+        self.gyro_bits = 0 if plan.form == "joint" and plan.gyro_unit == "count" else OUTPUT_BITS
+        arrays = plan.arrays
+        linear = arrays.get("linear", np.empty(0))
+        self.linear, self.linear_bits = _mantissas(linear, self.stored_bits)
+        total = abs(float(arrays["constant"][0])) + float(np.abs(linear) @ self.most) if len(linear) else 1.0
+        total = max(total, abs(float(arrays["constant"][0])))
+        drift = [_MOST_DRIFT_BITS]
+        if len(linear):
+            drift.append(int((self.linear_bits + self.columns).min()))
+        self.weight_bits = 0
+        if plan.centres:
+            slope = 1.0 + (2048.0 if plan.edge_columns else 0.0)
+            total += float(np.abs(arrays["weights"]).sum()) * min(slope, 64.0)
+            self.weight_bits = _common_bits(arrays["weights"], self.stored_bits)
+            drift.append(self.weight_bits + 30 - self.stored_bits)
+        if plan.form == "joint":
+            self.scale_bits = _common_bits(arrays["scale"][:1] * 1.25, _VALUE_BITS)
+            drift.append(self.scale_bits + self.gyro_bits)
+            total += float(abs(arrays["scale"][0])) * 2.0**31 / 2.0**self.gyro_bits
+        self.drift = min([*drift, floor(_SUM_BITS - log2(max(total, 1e-6)))])
+        if self.drift < OUTPUT_BITS:
+            raise InputError(
+                "export: the model's terms are so large, and cancel so finely, that fixed point cannot hold "
+                f"them ({dtype}); use float32, or train with lower powers"
+            )
+
+
+def _bits(most: float) -> int:
+    """Most bits behind the point with which numbers up to `most` stay below 2**30."""
+    return min(_VALUE_BITS, _VALUE_BITS - frexp(max(most, 1e-12))[1])
+
+
+def _common_bits(values: FloatArray, stored: int) -> int:
+    """Bits behind the point with which all values fit `stored` bits."""
+    most = float(np.max(np.abs(values), initial=0.0))
+    return stored - frexp(most)[1] if most > 0.0 else stored
+
+
+def _mantissas(values: FloatArray, stored: int) -> tuple[IntArray, IntArray]:
+    """Each value as a whole number of `stored` bits, and its own bits behind the point."""
+    bits = np.array([_common_bits(np.array([v]), stored) if v else stored for v in values], dtype=np.int64)
+    return np.round(values * 2.0**bits).astype(np.int64), bits
+
+
+def _product(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    corners = [x * y for x in a for y in b]
+    return min(corners), max(corners)
+
+
+def _sixteen_bits(plan: Plan) -> int:
+    """Bits behind the point of 16-bit temperatures: the trained ones fit with a tenth to spare."""
+    most = 100.0
+    for i, atom in enumerate(plan.atoms):
+        if atom.operator == "value" and atom.signal.is_sensor:
+            most = max(most, abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
+    return floor(log2(32767.0 / (most * _TEMPERATURE_MARGIN)))
+
+
+def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
+    factors = [
+        f"temperatures[FOGML_{name.upper()}] * INT64_C({round(c * 2.0 ** (_HELD_BITS - bits + _SIGNAL_SHIFT))})"
+        for name, c in parts
+    ]
+    return f"(int32_t)clipped(scaled({' + '.join(factors)}, {_SIGNAL_SHIFT}), INT64_C(1) << 29)"
+
+
+def _divide_bits(unit_ticks: float, step_bits: int = _HELD_BITS) -> int:
+    """Bits of a quotient with which rates up to 1024 degC per unit stay within 2**36."""
+    return max(0, floor(log2(unit_ticks)) + 26 - step_bits)
+
+
+def _operator_bits(windows: Layout, plan: Plan, scales: _Scales) -> list[int]:
+    """Bits behind the point of each operator's value: those of the atom that it makes."""
+    bits = [_HELD_BITS] * len(windows.operators)
+    for i, place in enumerate(windows.of_atom):
+        if place >= 0 and plan.atoms[i].operator != "sign":
+            bits[place] = int(scales.atoms[i])
+    return bits
+
+
+def _evaluations(plan: Plan, windows: Layout, scales: _Scales) -> dict[int, str]:
+    found: dict[int, str] = {}
+    bits = _operator_bits(windows, plan, scales)
+    for place, (i, operator) in enumerate(windows.of_method("block")):
+        unit = 0 if operator.unit_s is None else round(operator.unit_s / windows.tick_s)
+        divide = _divide_bits(unit) if unit else max(0, bits[i] - _HELD_BITS)
+        shift = _HELD_BITS + divide - bits[i]
+        place_of = f"state, &state->block[{place}], {operator.held}"
+        found[i] = f"block_value({place_of}, INT64_C({unit}), {divide}, {shift})"
+    for place, (i, operator) in enumerate(windows.of_method("slope")):
+        unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
+        unit = round(unit_s / (windows.tick_s * operator.tick_step))
+        step_bits = _HELD_BITS - round(log2(operator.x_step))
+        divide = _divide_bits(unit, step_bits)
+        arguments = f"state, &state->slope[{place}], &SLOPE[{place}], INT64_C({unit}), {divide}"
+        found[i] = f"slope_value({arguments}, {step_bits + divide - bits[i]})"
+    for place, (i, _) in enumerate(windows.of_method("exp")):
+        found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
+    for place, (i, operator) in enumerate(windows.of_method("first")):
+        difference = f"(int64_t)signal[{operator.signal}] - state->first[{place}]"
+        if operator.unit_s is None:
+            found[i] = f"scaled({difference}, {_HELD_BITS - bits[i]})"
+        else:
+            unit = round(operator.unit_s * 1e6)
+            divide = _divide_bits(unit)
+            rate = f"rate_of({difference}, interval, {divide}, INT64_C({unit}))"
+            found[i] = f"scaled({rate}, {_HELD_BITS + divide - bits[i]})"
+    return found
+
+
+def _exponential_arguments(windows: Layout) -> dict[int, str]:
+    found = {}
+    for i, operator in windows.of_method("exp"):
+        tau = round(operator.window.length_s * 1e6)
+        unit = round((operator.window.length_s if operator.unit_s is None else operator.unit_s) * 1e6)
+        found[i] = f"INT64_C({tau}), INT64_C({unit}), {_divide_bits(unit)}, INT64_C({operator.needed_ticks})"
+    return found
+
+
+def _atom(i: int, plan: Plan, windows: Layout, scales: _Scales) -> str:
+    place, bits = windows.of_atom[i], int(scales.atoms[i])
+    if place < 0:
+        value = f"scaled(signal[{windows.signal_of_atom[i]}], {_HELD_BITS - bits})"
+        return f"(int32_t)clipped({value}, INT32_MAX)"
+    value = f"value[{place}]"
+    if plan.atoms[i].operator == "sign":
+        band = round(DEAD_BAND * (1.0 + 1e-9) * 2.0 ** _operator_bits(windows, plan, scales)[place])
+        value = f"direction({value}, INT64_C({band}), INT64_C({2**bits}))"
+    return f"full ? (int32_t)clipped({value}, INT32_MAX) : 0"
+
+
+def _columns(plan: Plan, scales: _Scales) -> list[str]:
+    """Feature columns with products taken two at a time, so that none leaves 64 bits."""
+    found = []
+    limits = plan.limits
+    low, high = limits.low - limits.margin, limits.high + limits.margin
+    for place, step in enumerate(plan.steps):
+        factors = list(step.atoms)
+        if step.column is None:
+            first = factors.pop(0)
+            text, bits = f"a[{first}]", int(scales.atoms[first])
+            span = (float(low[first]), float(high[first]))
+        else:
+            text, bits, span = f"f[{step.column}]", int(scales.columns[step.column]), (0.0, 0.0)
+        for atom in factors:
+            if step.column is None:
+                span = _product(span, (float(low[atom]), float(high[atom])))
+                into = _bits(max(abs(span[0]), abs(span[1])))
+            else:
+                into = int(scales.columns[place])
+            text = f"scaled({text} * a[{atom}], {bits + int(scales.atoms[atom]) - into})"
+            bits = into
+        found.append(f"scaled({text}, {bits - int(scales.columns[place])})")
+    return found
+
+
+def _constants(plan: Plan, windows: Layout, scales: _Scales, dtype: str) -> list[str]:
+    lines = []
+    if windows.operators:
+        lines += [
+            f"#define LONGEST_GAP_US INT64_C({round(windows.longest_gap_s * 1e6)}) /* a longer one restarts all windows */",
+            "#define TICKS_LIMIT (INT64_C(1) << 61)",
+        ]
+        if round(windows.tick_s * 1e6) > 1:
+            lines.append(f"#define TICK_US INT64_C({round(windows.tick_s * 1e6)})")
+    if plan.atoms:
+        limits, steps = plan.limits, 2.0**scales.atoms
+        lines += [
+            f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
+            f"#define COLUMNS {len(plan.steps)} /* features */",
+            "",
+            f"/* The trained box, by atom: {', '.join(atom.text for atom in plan.atoms)}. */",
+        ]
+        for name, values, note in (
+            ("LOW", limits.low, "values below are levelled off"),
+            ("HIGH", limits.high, "values above are levelled off"),
+            ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
+            ("INNER", limits.inner, "values below are flagged"),
+            ("OUTER", limits.outer, "values above are flagged"),
+        ):
+            whole = np.clip(np.round(values * steps), 1.0 - 2.0**31, 2.0**31 - 1.0)
+            lines += array(name, whole, "int", "[ATOMS]", "int64_t", note)
+    arrays = plan.arrays
+    constant = round(float(arrays["constant"][0]) * 2.0**scales.drift)
+    lines += [
+        "",
+        f"#define DRIFT_SHIFT {scales.drift - OUTPUT_BITS}",
+        f"#define CONSTANT INT64_C({constant}) /* steps of 2^-{scales.drift} deg/h */",
+    ]
+    stored = "int16_t" if dtype == "q15" else "int32_t"
+    if "linear" in arrays:
+        shift = scales.linear_bits + scales.columns - scales.drift
+        shift = np.where(scales.linear == 0, 0, np.minimum(shift, 63))
+        lines += [
+            *array(
+                "LINEAR", scales.linear, "int", "[COLUMNS]", stored, "coefficients, each in steps of its own"
+            ),
+            *array("LINEAR_SHIFT", shift, "int", "[COLUMNS]", "int"),
+        ]
+    if plan.form == "joint":
+        lines += _scale_constants(plan, scales)
+    return lines + (_network_constants(plan, scales, stored) if plan.centres else [])
+
+
+def _scale_constants(plan: Plan, scales: _Scales) -> list[str]:
+    bits = scales.scale_bits
+    _, *slopes = np.abs(plan.arrays["scale"])
+    steepest = max(slopes[0] + slopes[1] * float(scales.most[0]), 1e-12)
+    # The terms in T get more bits than the whole, as long as their products fit.
+    spare = max(0, min(14, floor(61.0 - _VALUE_BITS - bits - log2(steepest))))
+    whole = np.round(plan.arrays["scale"] * 2.0 ** (bits + spare))
+    note = f"steps of 2^-{bits + spare} deg/h per unit of output, by powers of T"
+    return [
+        *array("SCALE", whole, "int", "[3]", "int64_t", note),
+        f"#define SCALE_SPARE {spare}",
+        f"#define SCALE_SHIFT {int(scales.columns[0])}",
+        f"#define GYRO_SHIFT {bits + scales.gyro_bits - scales.drift}",
+    ]
+
+
+def _network_constants(plan: Plan, scales: _Scales, stored: str) -> list[str]:
+    arrays, seen = plan.arrays, list(plan.columns)
+    spare = _VALUE_BITS - scales.stored_bits
+    step = 2.0**spare
+    centres = np.round(arrays["centres"] * 2.0 ** scales.columns[seen] / step)
+    if np.abs(centres).max(initial=0.0) >= 2.0 ** (scales.stored_bits + 1):
+        raise InputError("export: a centre lies too far outside the trained box for fixed point; use float32")
+    inverse = 1.0 / arrays["widths"]
+    bits = np.array([_common_bits(inverse[:, d], scales.stored_bits) for d in range(len(seen))])
+    shift = bits + scales.columns[seen] - 27
+    lines = [
+        "",
+        f"#define CENTRES {plan.centres}",
+        f"#define INPUTS {len(seen)} /* of the Gaussians */",
+        f"#define CENTRE_STEP INT64_C({int(step)})",
+        *array("INPUT_COLUMN", seen, "int", "[INPUTS]", "int"),
+        *array("CENTRE", centres, "int", "[CENTRES][INPUTS]", stored),
+        *array("INVERSE_WIDTH", np.round(inverse * 2.0**bits), "int", "[CENTRES][INPUTS]", stored),
+        *array("WIDTH_SHIFT", shift, "int", "[INPUTS]", "int"),
+        *array("WEIGHT", np.round(arrays["weights"] * 2.0**scales.weight_bits), "int", "[CENTRES]", stored),
+        f"#define WEIGHT_SPARE {spare}",
+        f"#define WEIGHT_SHIFT {scales.weight_bits + spare - scales.drift}",
+    ]
+    if plan.edge_columns:
+        steps = 2.0 ** scales.columns[list(plan.edge_columns)]
+        lines += [
+            "",
+            f"#define EDGES {len(plan.edge_columns)} /* columns that hold a rate, and their trained range */",
+            *array("EDGE_COLUMN", plan.edge_columns, "int", "[EDGES]", "int"),
+            *array("EDGE_LOW", np.round(plan.edge[0] * steps), "int", "[EDGES]", "int64_t"),
+            *array("EDGE_HIGH", np.round(plan.edge[1] * steps), "int", "[EDGES]", "int64_t"),
+        ]
+    return lines

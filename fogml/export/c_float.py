@@ -1,0 +1,234 @@
+"""What C source in float64 or float32 is filled with: constants, expressions, the exponential."""
+
+from __future__ import annotations
+
+from math import factorial, log
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fogml.export.layout import RANGE_BITS, Layout
+from fogml.export.plan import Plan
+from fogml.features.atoms import DEAD_BAND
+from fogml.features.signal import Signal
+
+EXP_TERMS = {"float64": 13, "float32": 7}
+EXP_MOST = {"float64": 700.0, "float32": 80.0}
+EXP_ERROR = {"float64": 4e-16, "float32": 2e-7}
+"""Greatest relative error of the generated exponential, held by the tests."""
+
+
+def literal(value: float, dtype: str) -> str:
+    """A number as a C literal that reads back as the same float64 or float32."""
+    if dtype == "float32":
+        text = repr(float(np.float32(value))) if np.float32(value) == 0 else str(np.float32(value))
+        return f"{text if _is_floating(text) else text + '.0'}f"
+    text = repr(float(value))
+    return text if _is_floating(text) else f"{text}.0"
+
+
+def _is_floating(text: str) -> bool:
+    return any(mark in text for mark in ".en")
+
+
+def array(name: str, values: ArrayLike, dtype: str, size: str, kind: str, note: str = "") -> list[str]:
+    """Lines of a constant array of one or two dimensions."""
+    rows = np.asarray(values)
+    comment = f" /* {note} */" if note else ""
+
+    def one(row: Any) -> str:
+        return ", ".join(literal(v, dtype) if dtype.startswith("float") else str(int(v)) for v in row)
+
+    head = f"static const {kind} {name}{size} = {{{comment}"
+    if rows.ndim == 1:
+        return [head, f"    {one(rows)}", "};"]
+    return [head, *(f"    {{ {one(row)} }}," for row in rows), "};"]
+
+
+def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
+    """The templates' values for float64 or float32."""
+    from fogml.export.c_source import units_of
+
+    real = "double" if dtype == "float64" else "float"
+    suffix = "" if dtype == "float64" else "f"
+
+    def number(value: float) -> str:
+        return literal(value, dtype)
+
+    temperature = "[degC], in the order of the places below"
+    gyro = f"[{plan.gyro_unit}]" if plan.form == "joint" else "output as rate [deg/h]"
+    return {
+        "fixed": None,
+        "real": real,
+        "suffix": suffix,
+        "time_type": real,
+        "time_name": "time_s",
+        "temperature_type": real,
+        "gyro_type": real,
+        "atom_type": real,
+        "signal_type": real,
+        "value_type": real,
+        "exp_type": real,
+        "phase_type": real,
+        "held_type": "int64_t" if real == "double" else "int32_t",
+        "units": units_of(plan, gyro, "time_s [s]", temperature),
+        "constants": _constants(plan, windows, dtype, real),
+        "exp_error": EXP_ERROR[dtype],
+        "exp_most": number(EXP_MOST[dtype]).removesuffix("f"),
+        "exp_constants": _exponential(dtype),
+        "signal_expressions": [_signal(signal, plan, number) for signal in windows.signals],
+        "gap": {i: number(operator.gap_s) for i, operator in enumerate(windows.operators)},
+        "evaluate": _evaluations(windows, number),
+        "exponential_arguments": {
+            i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
+            for i, operator in enumerate(windows.operators)
+        },
+        "atom_expressions": [_atom(i, plan, windows, "0.0" + suffix) for i in range(len(plan.atoms))],
+        "columns": column_expressions(plan),
+    }
+
+
+def column_expressions(plan: Plan) -> list[str]:
+    """Feature columns as products of earlier ones and of limited atoms."""
+    return [
+        " * ".join(
+            ([f"f[{step.column}]"] if step.column is not None else []) + [f"a[{i}]" for i in step.atoms]
+        )
+        for step in plan.steps
+    ]
+
+
+def _atom(i: int, plan: Plan, windows: Layout, zero: str) -> str:
+    operator = windows.of_atom[i]
+    if operator < 0:
+        return f"signal[{windows.signal_of_atom[i]}]"
+    value = f"direction(value[{operator}])" if plan.atoms[i].operator == "sign" else f"value[{operator}]"
+    return f"full ? {value} : {zero}"
+
+
+def _signal(signal: Signal, plan: Plan, number: Any) -> str:
+    """A combination of temperatures, worked out in the library's order."""
+    pieces = []
+    for index, (name, coefficient) in enumerate(signal.parts):
+        place = f"temperatures[FOGML_{name.upper()}]"
+        size = abs(coefficient)
+        scaled = place if size == 1.0 else f"{number(size)} * {place}"
+        sign = ("-" if coefficient < 0 else "") if index == 0 else (" - " if coefficient < 0 else " + ")
+        pieces.append(sign + scaled)
+    return "".join(pieces)
+
+
+def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
+    """For each operator the expression of its value once it is full."""
+    found: dict[int, str] = {}
+    for place, (i, operator) in enumerate(windows.of_method("block")):
+        unit = number(0.0 if operator.unit_s is None else operator.unit_s / windows.tick_s)
+        found[i] = f"block_value(state, &state->block[{place}], {operator.held}, {unit})"
+    for place, (i, operator) in enumerate(windows.of_method("slope")):
+        unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
+        step = operator.x_step * 2.0**-windows.temperature_bits
+        unit = number(unit_s * step / (windows.tick_s * operator.tick_step))
+        found[i] = f"slope_value(state, &state->slope[{place}], &SLOPE[{place}], {unit})"
+    for place, (i, operator) in enumerate(windows.of_method("exp")):
+        unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
+        found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"
+    for place, (i, operator) in enumerate(windows.of_method("first")):
+        difference = f"(signal[{operator.signal}] - state->first[{place}])"
+        rate = "" if operator.unit_s is None else f" * {number(operator.unit_s)} / interval"
+        found[i] = difference + rate
+    return found
+
+
+def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
+    def number(value: float) -> str:
+        return literal(value, dtype)
+
+    lines = []
+    if plan.atoms:
+        lines += [
+            f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
+            f"#define COLUMNS {len(plan.steps)} /* features */",
+            f"#define TEMPERATURE_LIMIT {number(2.0**RANGE_BITS)} /* [degC], either way: no sensor tells more */",
+        ]
+    if windows.operators:
+        lines += [
+            f"#define TIME_LIMIT {number(1e15)} /* [s] */",
+            f"#define LONGEST_GAP_S {number(windows.longest_gap_s)} /* a longer one restarts all windows */",
+            "#define TICKS_LIMIT (INT64_C(1) << 61)",
+            f"#define TICKS_PER_S {number(1.0 / windows.tick_s)}",
+        ]
+        if dtype == "float32":
+            lines += [
+                f"#define SAMPLE_S {number(plan.sample_s)}",
+                f"#define TICKS_PER_SAMPLE INT64_C({round(plan.sample_s / windows.tick_s)})",
+            ]
+    if windows.ring:
+        bits = windows.temperature_bits
+        lines.append(
+            f"#define TEMPERATURE_STEPS {number(2.0**bits)} /* held temperatures: steps of a degC */"
+        )
+        if windows.of_method("block"):
+            lines.append(f"#define TEMPERATURE_STEP {number(2.0**-bits)} /* [degC] */")
+    if any(atom.operator == "sign" for atom in plan.atoms):
+        band = number(DEAD_BAND * (1.0 + 1e-9))
+        lines.append(f"#define DEAD_BAND {band} /* rates up to this count as standing still [degC/min] */")
+    if plan.atoms:
+        limits = plan.limits
+        lines += ["", f"/* The trained box, by atom: {', '.join(atom.text for atom in plan.atoms)}. */"]
+        for name, values, note in (
+            ("LOW", limits.low, "values below are levelled off"),
+            ("HIGH", limits.high, "values above are levelled off"),
+            ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
+            ("INNER", limits.inner, "values below are flagged"),
+            ("OUTER", limits.outer, "values above are flagged"),
+        ):
+            lines += array(name, values, dtype, "[ATOMS]", real, note)
+    return [*lines, "", *_model_constants(plan, dtype, real)]
+
+
+def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:
+    arrays = plan.arrays
+    lines = [f"#define CONSTANT {literal(arrays['constant'][0], dtype)} /* [deg/h] */"]
+    if "linear" in arrays:
+        lines += array("LINEAR", arrays["linear"], dtype, "[COLUMNS]", real, "[deg/h per unit of the column]")
+    if "scale" in arrays:
+        note = "rate [deg/h] per unit of output, by powers of T"
+        lines += array("SCALE", arrays["scale"], dtype, "[3]", real, note)
+    if not plan.centres:
+        return lines
+    lines += [
+        "",
+        f"#define CENTRES {plan.centres}",
+        f"#define INPUTS {plan.dimensions} /* of the Gaussians */",
+        *array("INPUT_COLUMN", plan.columns, "int", "[INPUTS]", "int"),
+        *array("CENTRE", arrays["centres"], dtype, "[CENTRES][INPUTS]", real),
+        *array("INVERSE_WIDTH", 1.0 / arrays["widths"], dtype, "[CENTRES][INPUTS]", real),
+        *array("WEIGHT", arrays["weights"], dtype, "[CENTRES]", real, "[deg/h]"),
+    ]
+    if plan.edge_columns:
+        lines += [
+            "",
+            f"#define EDGES {len(plan.edge_columns)} /* columns that hold a rate, and their trained range */",
+            *array("EDGE_COLUMN", plan.edge_columns, "int", "[EDGES]", "int"),
+            *array("EDGE_LOW", plan.edge[0], dtype, "[EDGES]", real),
+            *array("EDGE_HIGH", plan.edge[1], dtype, "[EDGES]", real),
+        ]
+    return lines
+
+
+def _exponential(dtype: str) -> dict[str, Any]:
+    """ln 2 in two parts, its inverse, and the terms of exp(r), highest power first."""
+    # The high part has 32 (12) bits, so its product with k <= 2^10 (2^7) is exact.
+    bits = 32 if dtype == "float64" else 12
+    high = np.floor(log(2.0) * 2.0**bits) / 2.0**bits
+    low = 1.90821492927058770002e-10 if dtype == "float64" else log(2.0) - high
+    if dtype == "float64":
+        high = 6.93147180369123816490e-01
+    terms = [1.0 / factorial(n) for n in range(EXP_TERMS[dtype], -1, -1)]
+    return {
+        "per_octave": literal(1.0 / log(2.0), dtype),
+        "high": literal(high, dtype),
+        "low": literal(low, dtype),
+        "terms": [literal(term, dtype) for term in terms],
+    }

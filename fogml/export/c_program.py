@@ -1,0 +1,159 @@
+"""Generated C compiled and run: on this machine, or for another one under an emulator."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.export.c_source import DRIVER, SOURCE, CSource
+
+FloatArray = NDArray[np.float64]
+COMPILERS = ("cc", "gcc", "clang")
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion")
+CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
+_TIMEOUT_S = 300.0
+
+
+def host_compiler() -> str:
+    """The C compiler of this machine: ``$CC``, or the first found of cc, gcc and clang.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    for name in (os.environ.get("CC", ""), *COMPILERS):
+        if name and shutil.which(name):
+            return name
+    raise InputError(
+        "export: no C compiler (cc, gcc or clang) was found; C code is compiled and compared with the "
+        "model before it is written, so install one, or name it in the variable CC"
+    )
+
+
+class CProgram:
+    """A driver around generated C, compiled into a folder.
+
+    Parameters
+    ----------
+    source
+        Generated C.
+    folder
+        Where to compile.
+    compiler, flags, runner
+        Compiler, its options, and what to run the program under, e.g. an emulator.
+
+    Raises
+    ------
+    InputError
+        If the compiler refuses the source.
+    """
+
+    def __init__(
+        self,
+        source: CSource,
+        folder: Path,
+        compiler: str | None = None,
+        flags: Sequence[str] = FLAGS,
+        runner: Sequence[str] = (),
+    ) -> None:
+        self._source = source
+        for name, text in {**source.files, DRIVER: source.driver}.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        program = folder / "driver"
+        words = [compiler or host_compiler(), *flags, str(folder / DRIVER), "-o", str(program)]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=_TIMEOUT_S)
+        if done.returncode != 0:
+            raise InputError(f"export: {words[0]} refuses the generated C: {done.stderr.strip()[:500]}")
+        self._words = [*runner, str(program)]
+        types = {"double": "f8", "float": "f4", "int64_t": "i8", "int32_t": "i4", "int16_t": "i2"}
+        self._types = {
+            name: np.dtype("<" + types[source.numbers[f"{name}_type"]])
+            for name in ("time", "temperature", "gyro", "atom", "exp")
+        }
+        self.places = max(1, len(source.plan.sensors))
+
+    def _run(self, mode: str, data: bytes) -> bytes:
+        done = subprocess.run([*self._words, mode], input=data, capture_output=True, timeout=_TIMEOUT_S)
+        if done.returncode != 0:
+            raise InputError(f"export: the generated C failed: {done.stderr.decode(errors='replace')[:500]}")
+        return done.stdout
+
+    def self_test(self) -> int:
+        """What ``fogml_self_test`` returns."""
+        return subprocess.run([*self._words, "self-test"], timeout=_TIMEOUT_S).returncode
+
+    def steps(self, time: Any, temperatures: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
+        """Outputs and flags of `fogml_step`, all in the numbers that the code takes."""
+        fields = [
+            ("time", self._types["time"]),
+            ("temperatures", self._types["temperature"], (self.places,)),
+            ("gyro", self._types["gyro"]),
+        ]
+        records = np.zeros(len(time), dtype=fields)
+        records["time"], records["gyro"] = time, gyro
+        if np.size(temperatures):
+            records["temperatures"] = temperatures
+        return self._outputs(self._run("steps", records.tobytes()))
+
+    def atoms(self, atoms: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
+        """Outputs and flags from values of the atoms, windows full, in the numbers of the code."""
+        fields = [("atoms", self._types["atom"], (np.shape(atoms)[1],)), ("gyro", self._types["gyro"])]
+        records = np.zeros(len(atoms), dtype=fields)
+        records["atoms"], records["gyro"] = atoms, gyro
+        return self._outputs(self._run("atoms", records.tobytes()))
+
+    def exponential(self, values: Any) -> NDArray[Any]:
+        """The generated exponential exp(-u)."""
+        kind = self._types["exp"]
+        return np.frombuffer(self._run("exp", np.asarray(values, dtype=kind).tobytes()), dtype=kind)
+
+    def _outputs(self, data: bytes) -> tuple[NDArray[Any], NDArray[np.int32]]:
+        answers = np.frombuffer(data, dtype=[("out", self._types["gyro"]), ("flag", "<i4")])
+        return answers["out"], answers["flag"]
+
+
+def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
+    """Flash and RAM [bytes] on a Cortex-M4, or None where its compiler is not installed.
+
+    Flash is code and constants; RAM is one state. The self-test, which has a state of its own, is
+    counted apart.
+    """
+    compiler, size = shutil.which("arm-none-eabi-gcc"), shutil.which("arm-none-eabi-size")
+    if compiler is None or size is None:
+        return None
+    for name, text in source.files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    figures = {}
+    for label, more in (("lean", ["-DFOGML_NO_SELF_TEST"]), ("whole", [])):
+        target = folder / f"{label}.o"
+        words = [compiler, *CORTEX_M4, *FLAGS, "-Os", *more, "-c", str(folder / SOURCE), "-o", str(target)]
+        done = subprocess.run(words, capture_output=True, text=True, timeout=_TIMEOUT_S)
+        if done.returncode != 0:
+            raise InputError(f"export: {compiler} refuses the generated C: {done.stderr.strip()[:500]}")
+        told = subprocess.run([size, str(target)], capture_output=True, text=True, check=True).stdout
+        figures[label] = [int(word) for word in told.splitlines()[1].split()[:3]]
+    probe = folder / "state.c"
+    probe.write_text('#include "fogml_model.h"\nfogml_state state;\n', encoding="utf-8")
+    words = [compiler, *CORTEX_M4, "-std=c99", "-fno-common", "-c", str(probe), "-o", str(folder / "state.o")]
+    subprocess.run(words, check=True, capture_output=True, timeout=_TIMEOUT_S)
+    told = subprocess.run([size, str(folder / "state.o")], capture_output=True, text=True, check=True).stdout
+    ram = sum(int(word) for word in told.splitlines()[1].split()[1:3])
+    version = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True).stdout.strip()
+    lean, whole = figures["lean"], figures["whole"]
+    return {
+        "compiler": f"arm-none-eabi-gcc {version}",
+        "flags": " ".join([*CORTEX_M4, "-Os"]),
+        "flash_bytes": lean[0] + lean[1],
+        "ram_bytes": ram,
+        "self_test_flash_bytes": whole[0] + whole[1] - lean[0] - lean[1],
+        "self_test_ram_bytes": whole[2] - lean[2],
+    }

@@ -1,0 +1,161 @@
+"""C99 source of a plan: the header and the file that firmware engineers read."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from fogml import __version__
+from fogml.errors import InputError
+from fogml.export.c_fixed import fixed_context
+from fogml.export.c_float import float_context
+from fogml.export.layout import Layout, Number, layout
+from fogml.export.plan import Plan
+from fogml.export.self_test import SelfTest, make_self_test
+
+C_DTYPES = ("float64", "float32", "q31", "q15")
+"""Number formats that C code computes in."""
+HEADER, SOURCE, DRIVER = "fogml_model.h", "fogml_model.c", "driver.c"
+_MOST_INPUTS = 64
+
+
+@dataclass(frozen=True)
+class CSource:
+    """The generated files, by name, and what they were made with.
+
+    Attributes
+    ----------
+    files
+        Text of header and source.
+    driver
+        Text of a program that feeds the source from its standard input, for checks.
+    dtype
+        Number format.
+    plan, layout
+        What was written.
+    numbers
+        What the number format adds: units, scales.
+    self_test
+        The stored sequence.
+    """
+
+    files: dict[str, str]
+    driver: str
+    dtype: str
+    plan: Plan
+    layout: Layout
+    numbers: dict[str, Any]
+    self_test: SelfTest
+
+    def with_expected(self, outputs: Sequence[float], flags: Sequence[int]) -> CSource:
+        """The same with the self-test's expected outputs filled in."""
+        return c_source(
+            self.plan,
+            self.dtype,
+            self.numbers["card"],
+            replace(self.self_test, outputs=tuple(outputs), flags=tuple(flags)),
+        )
+
+
+def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None = None) -> CSource:
+    """C source of a plan.
+
+    Parameters
+    ----------
+    plan
+        What to compute.
+    dtype
+        One of `C_DTYPES`.
+    card
+        Lines on where the model comes from.
+    test
+        A self-test with its expected outputs; one without them is made if None.
+
+    Raises
+    ------
+    InputError
+        If C can't stream a feature of the plan, or a number does not fit the format.
+    """
+    if dtype not in C_DTYPES:
+        raise InputError(
+            f"export: C code computes in {', '.join(C_DTYPES)}, not in {dtype}; "
+            f"{dtype} weights are for --to onnx, json and mat"
+        )
+    if len(plan.sensors) > _MOST_INPUTS:
+        raise InputError(f"export: {len(plan.sensors)} temperatures, C code takes at most {_MOST_INPUTS}")
+    number: Number = "fixed" if dtype in ("q15", "q31") else dtype  # type: ignore[assignment]
+    windows = layout(plan, number)
+    numbers = (
+        fixed_context(plan, windows, dtype) if number == "fixed" else float_context(plan, windows, dtype)
+    )
+    numbers["card"] = list(card)
+    test = test or make_self_test(plan, windows, dtype, numbers)
+    context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
+    render = _templates().get_template
+    files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
+    driver = render("driver.c.j2").render(context)
+    return CSource(files, driver, dtype, plan, windows, numbers, test)
+
+
+@cache
+def _templates() -> Environment:
+    return Environment(
+        loader=PackageLoader("fogml.export"),
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
+    """What every number format's templates need."""
+    return {
+        "title": f"Temperature compensation of a fibre-optic gyro: model '{plan.kind}', fogml {__version__}",
+        "plan": plan,
+        "layout": windows,
+        "sensors": plan.sensors,
+        "atoms": plan.atoms,
+        "sample_s": repr(plan.sample_s),
+        "spare": _spare(plan, windows),
+        "gyro_unit": plan.gyro_unit if plan.form == "joint" else "deg/h",
+        "blocks": windows.of_method("block"),
+        "slopes": windows.of_method("slope"),
+        "exponentials": windows.of_method("exp"),
+        "firsts": windows.of_method("first"),
+        "directions": any(atom.operator == "sign" for atom in plan.atoms),
+        "label": {
+            i: f"{operator.method} of {windows.signals[operator.signal].text}"
+            + (f", {operator.window.length_s:g} s" if operator.window.length_s else "")
+            for i, operator in enumerate(windows.operators)
+        },
+    }
+
+
+def _spare(plan: Plan, windows: Layout) -> int:
+    """By how many per cent samples may come faster than nominal before a ring is too short."""
+    if not windows.ring:
+        return 100
+    longest = max(o.window.span_s for o in windows.operators if o.held >= 0)
+    return int(np.floor(100.0 * ((windows.ring - 1) * plan.sample_s / longest - 1.0)))
+
+
+def units_of(plan: Plan, gyro: str, time: str, temperature: str) -> list[str]:
+    """Lines that tell what goes in and comes out."""
+    lines = [
+        f"  time          {time}, going up; any origin",
+        f"  temperatures  {temperature}: {', '.join(plan.sensors) or 'none'}",
+        f"  gyro          {gyro}",
+        "  compensated   deg/h",
+    ]
+    if "T" in plan.sensors:
+        lines.append(
+            "T is the coil's temperature: T_in, or the mean of the inner sensors, if there is no other."
+        )
+    return lines

@@ -1,0 +1,261 @@
+"""How C code keeps the feature windows: clock ticks, rings of held samples, running integer sums.
+
+Times are kept in ticks and temperatures as whole multiples of a small step, so that running sums
+are exact however long the firmware runs, cost the same at every sample, and come out alike on
+every machine. The rules of gaps and fullness are those of `fogml.signals.windows`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from fogml.errors import InputError
+from fogml.export.plan import Plan
+from fogml.features.atoms import RATE_UNIT_S, Atom, Window
+from fogml.features.signal import Signal
+from fogml.signals.clock import (
+    EDGE_TOLERANCE,
+    EXPONENTIAL_SPAN,
+    GAP_INTERVALS,
+    check_window,
+    longest_gap_s,
+    needed_s,
+)
+
+Number = Literal["float64", "float32", "fixed"]
+
+TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
+"""Held temperatures are multiples of 2**-bits degC."""
+RANGE_BITS = 9
+"""Temperatures up to 2**9 degC either way are taken."""
+_TICK_BITS = 20
+_SPAN_BITS = 30
+_NOISE_TICKS = 2
+_LONGEST_RING = 1 << 20
+_LONGEST_FIXED_RING = 1 << 15
+_HEADROOM = 8
+
+
+@dataclass(frozen=True)
+class Operator:
+    """One running difference or rate.
+
+    Attributes
+    ----------
+    window
+        Its method and length.
+    signal
+        Place of its signal among the layout's signals.
+    held
+        Place of its signal among the rings; -1 where none is needed.
+    unit_s
+        Time unit of the rate [s]; None for a difference.
+    gap_s, gap_ticks
+        Longest interval that does not restart it.
+    window_ticks, both_ticks, needed_ticks
+        Age at which a sample leaves the newest window, both windows; time until full.
+    tick_step, x_step
+        Of a slope: ticks and temperature steps are divided by these, so that sums fit 63 bits.
+    """
+
+    window: Window
+    signal: int
+    held: int
+    unit_s: float | None
+    gap_s: float
+    gap_ticks: int
+    window_ticks: int
+    both_ticks: int
+    needed_ticks: int
+    tick_step: int = 1
+    x_step: int = 1
+
+    @property
+    def method(self) -> str:
+        """``block``, ``slope``, ``exp`` or ``first``."""
+        return self.window.method
+
+
+@dataclass(frozen=True)
+class Layout:
+    """The windows of a plan.
+
+    Attributes
+    ----------
+    tick_s
+        Length of a tick [s].
+    temperature_bits
+        Held temperatures are multiples of 2**-bits degC.
+    signals
+        Distinct combinations of temperatures.
+    operators
+        Distinct running operators.
+    of_atom
+        For each atom the place of its operator, or -1 where it is a signal's value.
+    signal_of_atom
+        For each atom the place of its signal.
+    held
+        Places of the signals that have a ring.
+    ring
+        Samples that each ring holds.
+    longest_gap_s, longest_gap_ticks
+        An interval longer than this restarts everything.
+    """
+
+    tick_s: float
+    temperature_bits: int
+    signals: tuple[Signal, ...]
+    operators: tuple[Operator, ...]
+    of_atom: tuple[int, ...]
+    signal_of_atom: tuple[int, ...]
+    held: tuple[int, ...]
+    ring: int
+    longest_gap_s: float
+    longest_gap_ticks: int
+
+    def of_method(self, method: str) -> list[tuple[int, Operator]]:
+        """Operators of a method with their places."""
+        return [(i, operator) for i, operator in enumerate(self.operators) if operator.method == method]
+
+
+def layout(plan: Plan, number: Number) -> Layout:
+    """The windows of a plan for C code.
+
+    Raises
+    ------
+    InputError
+        If a window is shorter than the sample interval, or too long for C.
+    """
+    signals = tuple(dict.fromkeys(atom.signal for atom in plan.atoms))
+    keys = tuple(dict.fromkeys(key for atom in plan.atoms if (key := _key(atom)) is not None))
+    for _, window, _ in keys:
+        _check(window, plan.sample_s)
+    held = tuple(dict.fromkeys(signals.index(s) for s, w, _ in keys if w.method in ("block", "slope")))
+    ring = max((_samples(window, plan.sample_s) for _, window, _ in keys), default=0)
+    if ring:
+        ring += ring // _HEADROOM + 4
+    most = _LONGEST_FIXED_RING if number == "fixed" else _LONGEST_RING
+    if ring > most:
+        longest = max((window for _, window, _ in keys), key=lambda window: window.span_s)
+        raise InputError(
+            f"export: a window of {longest.length_s:g} s at a sample every {plan.sample_s:g} s holds "
+            f"{ring} samples, C code in {number} at most {most}; train with shorter windows or "
+            "[exp, ...], or run the model at a longer --sample-s"
+        )
+    gaps = [_gap_s(window, plan.sample_s) for _, window, _ in keys]
+    tick_s = _tick_s(plan.sample_s, max([w.span_s for _, w, _ in keys] + gaps, default=0.0), number)
+    operators = []
+    for (signal, window, unit_s), gap_s in zip(keys, gaps):
+        place = signals.index(signal)
+        operators.append(_operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s, number))
+    of_atom = tuple(-1 if _key(atom) is None else keys.index(_key(atom)) for atom in plan.atoms)  # type: ignore[arg-type]
+    longest = max(gaps, default=0.0)
+    return Layout(
+        tick_s,
+        TEMPERATURE_BITS[number],
+        signals,
+        tuple(operators),
+        of_atom,
+        tuple(signals.index(atom.signal) for atom in plan.atoms),
+        held,
+        ring,
+        longest,
+        round(longest / tick_s),
+    )
+
+
+def _key(atom: Atom) -> tuple[Signal, Window, float | None] | None:
+    """What tells running operators apart: a rate and its direction share one."""
+    if atom.window is None:
+        return None
+    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S
+
+
+def _check(window: Window, sample_s: float) -> None:
+    if window.method == "block":
+        check_window(window.length_s, sample_s, 1, "a block window")
+    elif window.method == "slope":
+        check_window(window.length_s, sample_s, 2, "a slope's window")
+    elif window.method == "exp":
+        check_window(window.length_s, sample_s, 1, "a time constant")
+
+
+def _samples(window: Window, sample_s: float) -> int:
+    """Samples that a window holds at the nominal interval; 0 where none are kept."""
+    if window.method not in ("block", "slope"):
+        return 0
+    return math.ceil(window.span_s / sample_s - EDGE_TOLERANCE) + 1
+
+
+def _gap_s(window: Window, sample_s: float) -> float:
+    return GAP_INTERVALS * sample_s if window.method == "first" else longest_gap_s(window.length_s, sample_s)
+
+
+def _tick_s(sample_s: float, longest_s: float, number: Number) -> float:
+    """Length of a tick [s]: a binary part of the sample interval, or in fixed point of microseconds."""
+    if number == "fixed":
+        tick_s = 1e-6
+        while longest_s / tick_s >= 2.0**_SPAN_BITS:
+            tick_s *= 10.0
+        if sample_s < 8.0 * _NOISE_TICKS * tick_s:
+            raise InputError(
+                f"export: samples every {sample_s:g} s with windows of {longest_s:g} s need a finer clock "
+                "than fixed point has; use float32, or shorter windows"
+            )
+        return tick_s
+    bits = min(_TICK_BITS, math.floor(_SPAN_BITS - math.log2(max(longest_s / sample_s, 1.0))))
+    return float(sample_s / 2.0**bits)
+
+
+def _operator(
+    sample_s: float,
+    tick_s: float,
+    signal: int,
+    held: tuple[int, ...],
+    window: Window,
+    unit_s: float | None,
+    gap_s: float,
+    number: Number,
+) -> Operator:
+    span_s = {"block": 2.0, "slope": 1.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}[window.method]
+    needed = needed_s(span_s * window.length_s, sample_s)
+
+    def ticks(seconds: float) -> int:
+        return max(1, round(seconds / tick_s) - _NOISE_TICKS)
+
+    steps = _slope_steps(_samples(window, sample_s), round(sample_s / tick_s), number)
+    return Operator(
+        window,
+        signal,
+        held.index(signal) if signal in held and window.method in ("block", "slope") else -1,
+        unit_s,
+        gap_s,
+        round(gap_s / tick_s),
+        ticks(window.length_s),
+        ticks(2.0 * window.length_s),
+        max(0, ticks(needed)) if needed > 0 else 0,
+        *(steps if window.method == "slope" else (1, 1)),
+    )
+
+
+def _slope_steps(samples: int, sample_ticks: int, number: Number) -> tuple[int, int]:
+    """Divisors of ticks and of temperature steps with which a slope's sums stay below 2**62."""
+    count = math.log2(max(2, samples + samples // _HEADROOM + 4))
+    x_bits = TEMPERATURE_BITS[number] + RANGE_BITS + 1
+    tick_bits = math.ceil(math.log2(max(2, sample_ticks)))
+    # Sums of age times temperature: n^2/2 ages; in fixed point they are multiplied by n again.
+    room = 61.0 - (3.0 if number == "fixed" else 2.0) * count
+    square_room = math.floor((61.0 - 4.0 * count) / 2.0)
+    keep_ticks = min(tick_bits, 14, square_room)
+    x_keep = min(x_bits, math.floor(room - keep_ticks))
+    if x_keep < RANGE_BITS + 8:
+        x_keep = RANGE_BITS + 8
+        keep_ticks = min(keep_ticks, math.floor(room - x_keep))
+    if keep_ticks < 1:
+        raise InputError(
+            f"export: a slope over {samples} samples has sums too large for C; use [block, ...] or a "
+            "shorter window"
+        )
+    return 1 << (tick_bits - keep_ticks), 1 << (x_bits - x_keep)

@@ -1,0 +1,134 @@
+"""The sequence that generated C carries to test itself with on the target."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fogml.export.layout import Layout
+from fogml.export.plan import Plan
+
+_CHECKS = 8
+_PERIOD = 12
+_FLOAT_TOLERANCE = {"float64": 1e-9, "float32": 2e-5}
+
+
+@dataclass(frozen=True)
+class SelfTest:
+    """A sawtooth of temperatures, and outputs at some of its samples.
+
+    Attributes
+    ----------
+    first, rise, jump
+        Temperatures at its begin, their rise from step to step, and their jump at the end; in the
+        numbers that the code takes, shape (sensors,).
+    interval
+        Time between steps, in the numbers that the code takes.
+    gyro
+        The output, constant.
+    period
+        Steps from the lowest to the highest temperature.
+    checks
+        Steps whose output is compared.
+    outputs, flags
+        What is expected there.
+    """
+
+    first: tuple[float, ...]
+    rise: tuple[float, ...]
+    jump: tuple[float, ...]
+    interval: float
+    gyro: float
+    period: int
+    checks: tuple[int, ...]
+    outputs: tuple[float, ...] = ()
+    flags: tuple[int, ...] = ()
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return self.checks[-1] + 1
+
+    def literals(self, dtype: str) -> dict[str, Any]:
+        """The template's values."""
+        from fogml.export.c_float import literal
+
+        whole = dtype in ("q15", "q31")
+
+        def number(value: float) -> str:
+            return str(int(value)) if whole else literal(value, dtype)
+
+        outputs = self.outputs or (0.0,) * len(self.checks)
+        size = max(1.0, max(abs(value) for value in outputs))
+        return {
+            "steps": self.steps,
+            "checks": self.checks,
+            "flags": self.flags or (0,) * len(self.checks),
+            "outputs": [number(value) for value in outputs],
+            "first": [number(value) for value in self.first],
+            "rise": [number(value) for value in self.rise],
+            "jump": [number(value) for value in self.jump],
+            "jump_at": self.checks[-1],
+            "period": self.period,
+            "gyro": number(self.gyro),
+            "time": f"(int64_t)step * INT64_C({int(self.interval)})"
+            if whole
+            else f"({'double' if dtype == 'float64' else 'float'})step * {number(self.interval)}",
+            "tolerance": "0" if whole else number(_FLOAT_TOLERANCE[dtype] * size),
+        }
+
+
+def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, Any]) -> SelfTest:
+    """A self-test without its expected outputs, whose temperatures and rates stay in the trained box.
+
+    Steps are as long as the windows can span, so that it is short.
+    """
+    interval_s, full_at = _interval(plan, windows)
+    period = max(_PERIOD, full_at)
+    first, rise, jump = np.zeros((3, len(plan.sensors)))
+    for i, sensor in enumerate(plan.sensors):
+        low, high, fastest = _range(plan, sensor)
+        first[i] = low + 0.3 * (high - low)
+        rise[i] = min(0.4 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
+        jump[i] = 0.9 * (high - low) + 3.0
+    checks = (0, *np.unique(np.linspace(full_at, full_at + _PERIOD, _CHECKS - 2).astype(int)).tolist())
+    gyro = 1000.0 / abs(plan.arrays["scale"][0]) if plan.form == "joint" else 7.5
+    fixed = numbers["fixed"]
+    if fixed is None:
+        return SelfTest(
+            tuple(first), tuple(rise), tuple(jump), interval_s, gyro, period, (*checks, checks[-1] + 1)
+        )
+    unit = fixed["temperature_value"]
+    return SelfTest(
+        tuple(np.round(first / unit)),
+        tuple(np.maximum(np.round(rise / unit), 1.0)),
+        tuple(np.clip(np.round(jump / unit), 0, fixed["temperature_most"] / 2 - np.round(first / unit))),
+        round(interval_s * 1e6),
+        round(gyro / fixed["gyro_value"]),
+        period,
+        (*checks, checks[-1] + 1),
+    )
+
+
+def _interval(plan: Plan, windows: Layout) -> tuple[float, int]:
+    """Time between steps [s], and the step at which all windows are full."""
+    if not windows.operators:
+        return plan.sample_s, 1
+    shortest = min(operator.gap_s for operator in windows.operators)
+    count = max(1, int(np.floor(0.95 * shortest / plan.sample_s)))
+    needed_s = max(operator.needed_ticks for operator in windows.operators) * windows.tick_s
+    return count * plan.sample_s, int(np.ceil(needed_s / (count * plan.sample_s))) + 2
+
+
+def _range(plan: Plan, sensor: str) -> tuple[float, float, float]:
+    """Lowest and highest value of a sensor [degC] in the trained box, and its fastest rate [degC/min]."""
+    low, high, fastest = 10.0, 40.0, np.inf
+    for i, atom in enumerate(plan.atoms):
+        if atom.signal.is_sensor and atom.signal.sensors == (sensor,):
+            if atom.operator == "value":
+                low, high = plan.limits.box_low[i], plan.limits.box_high[i]
+            elif atom.operator == "d":
+                fastest = max(abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
+    return float(low), float(high), float(fastest)
