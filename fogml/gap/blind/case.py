@@ -14,7 +14,7 @@ from fogml.gap.blind.reality.form import Form
 from fogml.gap.blind.reality.noise import UNITS as NOISE_UNITS
 from fogml.gap.blind.reality.reckoning import AVERAGING_S, Reckoning, recorded_output
 from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, falsified
+from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, recorded
 from fogml.gap.blind.reality.unit import Unit, UnitRun, compatible, draw_unit
 from fogml.gap.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, write_truth
 from fogml.outputs import whole_folder
@@ -22,8 +22,8 @@ from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
 
-_SAME_EFFECT = 25
-"""Units that are tried for one effect, before a random one takes the place of those beside it."""
+_MOST_UNITS = 300
+"""Units that are tried for one case; the hardest effects are shown by one in five."""
 _DIGITS = 6
 
 
@@ -45,13 +45,17 @@ def make_case(folder: Path, truth_folder: Path, plan: Plan, seed: int, sample_s:
     scales = Scales(unit)
     reckoning = Reckoning(scales, effects)
     with whole_folder(folder / plan.name) as place:
-        for run in (*unit.fit, *unit.held_out):
+        for run in unit.runs:
             write_run(recorded_run(unit, run, effects, plan), place / run.name)
         if unit.static is not None:
             write_run(recorded_run(unit, unit.static, (), plan), place / unit.static.name)
         options = json.dumps({"without": list(plan.left_out)}, indent=1)
         (place / "options.json").write_text(options + "\n", encoding="utf-8")
-    write_truth(truth_folder, _truth(plan, seed, unit, reckoning), reckoning.contributions)
+    # Half the digits are more than any score needs.
+    compact = {
+        key: values.astype(np.float32).astype(np.float64) for key, values in reckoning.contributions.items()
+    }
+    write_truth(truth_folder, _truth(plan, seed, unit, reckoning), compact)
 
 
 def draw_case(plan: Plan, seed: int, sample_s: float) -> tuple[Unit, tuple[Acting, ...]]:
@@ -67,7 +71,7 @@ def draw_case(plan: Plan, seed: int, sample_s: float) -> tuple[Unit, tuple[Actin
             return unit, tuple(_set_strength(rng, scales, form) for form in forms)
         except TooWeak as error:
             attempt += 1
-            if attempt >= _SAME_EFFECT:
+            if attempt >= _MOST_UNITS:
                 raise RuntimeError(f"case {plan.name}: no unit shows {error} as wanted") from None
 
 
@@ -99,14 +103,14 @@ def recorded_run(unit: Unit, run: UnitRun, effects: tuple[Acting, ...], plan: Pl
     columns: dict[str, FloatArray] = {
         "time": world.time,
         "gyro": np.round(recorded_output(unit, run, effects), _DIGITS),
-        **run.sensed.recorded(falsified(unit, run, effects)),
+        **recorded(unit, run, effects),
     }
-    if world.table_rate.any() or _turns(unit):
+    if unit.turning:
         columns["rate"] = np.round(world.table_rate, 9)
     names = [name for name in unit.instruments.others if name in world.drives]
-    if any(steps for steps in (r.world.programme.power_steps for r in (*unit.fit, *unit.held_out))):
+    if any(steps for steps in (r.world.programme.power_steps for r in unit.runs)):
         names.append("power")
-    if any(r.world.programme.fan_stops for r in (*unit.fit, *unit.held_out)):
+    if any(r.world.programme.fan_stops for r in unit.runs):
         names.append("fan")
     for name in dict.fromkeys(names):
         columns[name] = np.round(world.drives[name], _DIGITS)
@@ -124,10 +128,6 @@ def recorded_run(unit: Unit, run: UnitRun, effects: tuple[Acting, ...], plan: Pl
     return Run(name=run.name, columns=columns, facts=facts)
 
 
-def _turns(unit: Unit) -> bool:
-    return any(run.world.table_rate.any() for run in (*unit.fit, *unit.held_out))
-
-
 def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:
     noise = {name: Amount(value=value, unit=NOISE_UNITS[name]) for name, value in asdict(unit.noise).items()}
     return Truth(
@@ -141,7 +141,7 @@ def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:
             noise=unit.static.name if unit.static else None,
         ),
         sample_s=unit.sample_s,
-        turning=_turns(unit),
+        turning=unit.turning,
         effects=tuple(_true_effect(effect) for effect in reckoning.effects),
         left_out=plan.left_out,
         d_prime=reckoning.d_prime,
@@ -149,7 +149,7 @@ def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:
         closed=tuple(TrueClosed(averaging_s=AVERAGING_S, **asdict(c)) for c in reckoning.closing()),
         noise=noise,
         nominal=unit.constants.as_dict(),
-        thermal="; ".join(f"{r.name}: {r.world.programme.text}" for r in (*unit.fit, *unit.held_out)),
+        thermal="; ".join(f"{r.name}: {r.world.programme.text}" for r in unit.runs),
     )
 
 

@@ -89,7 +89,8 @@ def plans(count: int, seed: int, kinds: Sequence[str] | None = None) -> list[Pla
     found: list[Plan] = []
     while len(found) < count:
         for kind in rng.permutation(np.array(block)).tolist():
-            first, more, withheld = None, 0, ()
+            first: str | None = None
+            more, withheld = 0, list[str]()
             if kind in ("one", "two", "three"):
                 first, more = known.next(), ("one", "two", "three").index(kind)
             elif kind == "unknown_left_out":
@@ -103,10 +104,10 @@ def plans(count: int, seed: int, kinds: Sequence[str] | None = None) -> list[Pla
             elif kind == "wrong_thermal":
                 first = "wrong_thermal_structure"
             if kind.startswith("unknown") and first in known_names():
-                withheld = (first,)
+                withheld = [first]
             runs = int(rng.choice(_RUNS, p=_RUN_SHARES))
             static = bool(rng.random() < 0.6)
-            found.append(Plan(len(found) + 1, kind, first, more, withheld, runs, static))
+            found.append(Plan(len(found) + 1, kind, first, more, tuple(withheld), runs, static))
     return found[:count]
 
 
@@ -114,7 +115,8 @@ class _Cycle:
     """Names in random order, each once before any comes again."""
 
     def __init__(self, rng: np.random.Generator, names: tuple[str, ...]) -> None:
-        self._rng, self._names, self._left = rng, names, []  # type: ignore[var-annotated]
+        self._rng, self._names = rng, names
+        self._left: list[str] = []
 
     def next(self) -> str:
         if not self._left:

@@ -28,7 +28,7 @@ class Form(ABC):
     form
         What this form is, in a word or two.
     unit
-        Of the amplitude in the catalogue's definition; "" where the form has no such amplitude.
+        Of the amplitude in the catalogue's definition; "" where this form has none that compares.
     demands
         What the programmes must hold for it to show.
     faces
@@ -103,8 +103,12 @@ class Sensing(Form):
     stage: ClassVar[str] = "sensor"
     greatest: ClassVar[float] = 100.0
 
-    @abstractmethod
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
         """What the coil sensor `name` feels where it would feel `temperature` [degC], shape (n,)."""
+        return temperature
+
+    def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
+        """What is recorded of a coil sensor that gives `values` [degC], noise included; shape (n,)."""
+        return values

@@ -10,6 +10,8 @@ from fogml.gap.blind.reality.recurrences import FloatArray
 
 PRIOR_SD = {"e0": 500.0, "k1": 50.0, "k2": 0.5, "b0": 5.0, "b1": 0.05, "b2": 5e-4, "g": 0.5, "m": 2.0}
 """Standard deviations of the priors about 0, units as `Constants`."""
+FAST_DEG_S = 40.0
+"""A fast turn [deg/s]."""
 
 
 @dataclass(frozen=True)
@@ -68,20 +70,31 @@ def output(constants: Constants, seen: Seen) -> FloatArray:
     return y
 
 
-def columns(seen: Seen) -> tuple[tuple[str, ...], FloatArray]:
-    """Names and responses to a unit of each constant that shows, shape (n, p).
+def temperature_slopes(constants: Constants, sample_s: float) -> tuple[float, float]:
+    """What a degree of independent noise on the sensors does to a replay's output, rms [deg/h/degC].
 
-    Without table rates the scale factor shows as Earth's rate times 1, u, u**2 alone, which is in
-    the bias.
+    At rest, and by the scale factor at `FAST_DEG_S`.
     """
-    u = seen.inner - 25.0
+    c = constants
+    held = max(64.0 / sample_s, 1.0)
+    rest = float(np.sqrt(c.b1**2 + 2.0 * c.g**2 + 2.0 * c.m**2 / held))
+    return rest, 3600e-6 * FAST_DEG_S * float(np.hypot(c.k1, 50.0 * c.k2))
+
+
+def names(turning: bool, two_faces: bool) -> tuple[str, ...]:
+    """Constants that show: without table rates those of the scale factor are one with the bias'."""
+    bias = ("b0", "b1", "b2", "m", *(("g",) if two_faces else ()))
+    return (*bias, "e0", "k1", "k2") if turning else bias
+
+
+def columns(seen: Seen, wanted: tuple[str, ...]) -> FloatArray:
+    """Response of the output to a unit of each wanted constant, shape (n, p)."""
+    u, rate = seen.inner - 25.0, 1e-6 * seen.rate_deg_h
     parts = {"b0": np.ones_like(u), "b1": u, "b2": u * u, "m": seen.delta}
+    parts |= {"e0": rate, "k1": rate * u, "k2": rate * u * u}
     if seen.outer is not None:
         parts["g"] = seen.inner - seen.outer
-    if np.ptp(seen.rate_deg_h) > 0.0:
-        rate = 1e-6 * seen.rate_deg_h
-        parts |= {"e0": rate, "k1": rate * u, "k2": rate * u * u}
-    return tuple(parts), np.stack(list(parts.values()), axis=1)
+    return np.stack([parts[name] for name in wanted], axis=1)
 
 
 def delta_of_record(time: FloatArray, inner: FloatArray, window_s: float = 64.0) -> FloatArray:

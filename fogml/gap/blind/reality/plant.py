@@ -51,7 +51,7 @@ class PlantConstants:
 
 def draw_plant(rng: np.random.Generator, quick: bool = False) -> PlantConstants:
     """A unit's plant from the catalogue's ranges; a light one, that a shock gets into, where `quick`."""
-    scale = 0.25 if quick else 1.0
+    scale = 0.12 if quick else 1.0
     power = rng.uniform(1.5, 4.0)
     return PlantConstants(
         case_s=scale * rng.uniform(360.0, 1500.0),

@@ -92,7 +92,7 @@ def draw_programme(rng: np.random.Generator, demands: Demands, sample_s: float) 
     if demands.slow_turns:
         turns += _slow_turns(rng, duration, sample_s, turns)
     steps = _power_steps(rng, duration) if demands.power_steps else ()
-    fans = ()
+    fans: tuple[tuple[float, float], ...] = ()
     if demands.fan_stops:
         starts = rng.uniform(0.1, 0.9, size=2) * duration
         fans = tuple((float(s), float(s + rng.uniform(900.0, 2400.0))) for s in np.sort(starts))

@@ -9,7 +9,7 @@ import numpy as np
 from fogml.gap.blind.reality import nominal
 from fogml.gap.blind.reality.form import Additive, Distorting
 from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.strength import Acting, Scales, falsified
+from fogml.gap.blind.reality.strength import Acting, Scales, recorded
 from fogml.gap.blind.reality.unit import Unit, UnitRun
 from fogml.gap.blind.reality.whitening import Projected, Whitening
 
@@ -46,7 +46,7 @@ class Reckoning:
         self._projected = scales.projected(effects)
         self.contributions = {
             (run.name, place): effect.contribution(unit, run)
-            for run in (*unit.fit, *unit.held_out)
+            for run in unit.runs
             for place, effect in enumerate(effects)
         }
         self._totals = [self.total(run.name, len(run.world.time)) for run in unit.fit]
@@ -84,11 +84,11 @@ class Reckoning:
     def closing(self) -> list[Closing]:
         """What the true signatures, fitted on the fit runs with the nominal constants, close."""
         unit, noisy = self.unit, {}
-        for run in (*unit.fit, *unit.held_out):
+        for run in unit.runs:
             noisy[run.name] = self._gap(run.name)
         fit = [noisy[r.name][0] for r in unit.fit]
         plain = [noisy[r.name][1] for r in unit.fit]
-        names = nominal.columns(unit.seen(unit.fit[0]))[0]
+        names = unit.constant_names
         sd = np.array([nominal.PRIOR_SD[name] for name in names])
         theta = Projected(self._scales.whitenings, plain).constants(fit, sd)
         wide = [np.concatenate([x, self._signatures(r.name)], 1) for x, r in zip(plain, unit.fit)]
@@ -116,14 +116,14 @@ class Reckoning:
 
     def _signatures(self, name: str) -> FloatArray:
         series = [self.contributions[name, place] for place in range(len(self.effects))]
-        count = len(next(r for r in (*self.unit.fit, *self.unit.held_out) if r.name == name).world.time)
+        count = len(next(r for r in self.unit.runs if r.name == name).world.time)
         return np.stack(series, axis=1) if series else np.empty((count, 0))
 
     def _gap(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Recorded output less the rate about the input axis, and the nominal columns of the record."""
         unit = self.unit
-        run = next(r for r in (*unit.fit, *unit.held_out) if r.name == name)
-        columns = nominal.columns(unit.seen(run, falsified(unit, run, self.effects)))[1]
+        run = next(r for r in unit.runs if r.name == name)
+        columns = unit.columns(run, recorded(unit, run, self.effects))
         return recorded_output(unit, run, self.effects) - run.world.rate_deg_h, columns
 
 

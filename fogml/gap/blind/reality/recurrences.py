@@ -66,11 +66,26 @@ def play(x: FloatArray, half_widths: FloatArray) -> FloatArray:
     return np.clip(np.broadcast_to(x[0], low.shape), low, high)
 
 
-def friction(x: FloatArray, length: float) -> FloatArray:
-    """Bouc-Wen's z with exponent 1 and beta = gamma, scaled to run from -1 to 1; shape (n,).
+def bouc_wen(x: FloatArray, length: float) -> FloatArray:
+    """Bouc-Wen's z with exponent 2 and beta = gamma, from 0 and within -1 to 1; shape (n,).
 
-    ``dz/dx = (1 - z sign(dx)) / length``: it relaxes along the path towards the sign of its motion.
+    ``dz/dx = 1 / length`` while z and the motion differ in sign, ``(1 - z**2) / length`` after: a line,
+    then a hyperbolic tangent of the path. Solved in closed form from turn to turn of x.
     """
     change = np.diff(x, prepend=x[:1])
-    decay = np.abs(change) / length
-    return recurrence(decay, -np.sign(change) * np.expm1(-decay), 0.0)
+    direction = np.sign(change)
+    # Samples at rest go on in the direction of the last motion.
+    last = np.maximum.accumulate(np.where(direction != 0.0, np.arange(len(x)), 0))
+    direction = direction[last]
+    turns = np.flatnonzero(np.diff(direction)) + 1
+    out = np.empty(len(x))
+    z = 0.0
+    for first, stop in zip([0, *turns.tolist()], [*turns.tolist(), len(x)]):
+        sign = float(direction[first])
+        start = z * sign
+        # The path, measured from where z changes sign.
+        at = start if start < 0.0 else float(np.arctanh(min(start, 1.0 - 1e-12)))
+        path = at + np.cumsum(np.abs(change[first:stop])) / length
+        out[first:stop] = sign * np.where(path < 0.0, path, np.tanh(path))
+        z = float(out[stop - 1])
+    return out

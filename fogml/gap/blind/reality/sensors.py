@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,10 @@ from fogml.gap.blind.reality.world import World
 
 Layout = str
 """``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4."""
+_REST, _TURN, _LAGGING = 0.15, 0.5, 0.05
+"""What the sensors' noise at rest, in turns, and their lag in turns may add, relative to white noise."""
+_SOAK_RATE = 0.1 / 60.0
+"""Rate of temperature in the soaks that turns lie in [degC/s]."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +53,29 @@ class Instruments:
         """Whether there is a sensor on the outer face."""
         return self.layout != "one"
 
+    def finer(self, slope: float, turning_slope: float, white: float) -> Instruments:
+        """Sensors so good that a replay's error is lost in the gyro's white noise.
+
+        A lab that measures a better gyro takes better sensors.
+
+        Parameters
+        ----------
+        slope, turning_slope
+            What a degree does to a replay's output, rms, at rest and in a fast turn [deg/h/degC].
+        white
+            The gyro's white noise in a sample, rms [deg/h].
+        """
+        noise = np.hypot(self.noise, self.resolution / np.sqrt(12.0))
+        share = min(1.0, _REST * white / (noise * slope), _TURN * white / (noise * turning_slope + 1e-30))
+        steps = [q for q in (1e-2, 1e-3, 1e-4) if q <= self.resolution * max(share, 1e-2)]
+        lag_share = min(1.0, _LAGGING * white / (self.lag_s * _SOAK_RATE * turning_slope + 1e-30))
+        return replace(
+            self,
+            noise=self.noise * share,
+            resolution=steps[0] if steps else 1e-5,
+            lag_s=self.lag_s * lag_share,
+        )
+
 
 def draw_instruments(rng: np.random.Generator, faces: bool, needed: tuple[str, ...]) -> Instruments:
     """A unit's instruments: what its effects need, and others by chance.
@@ -63,8 +90,9 @@ def draw_instruments(rng: np.random.Generator, faces: bool, needed: tuple[str, .
     return Instruments(
         layout=layout,
         others=others,
-        noise=float(rng.uniform(0.002, 0.008)),
-        resolution=float(rng.choice([0.001, 0.01])),
+        # What acts by the small difference of the faces takes sensors that tell it.
+        noise=float(rng.uniform(0.0005, 0.002) if faces else rng.uniform(0.002, 0.008)),
+        resolution=float(rng.choice([0.001, 0.001 if faces else 0.01])),
         lag_s=float(rng.uniform(0.3, 2.0)),
     )
 
@@ -81,7 +109,7 @@ class Sensed:
         """Recorded columns; of other `felt` temperatures with the same noise, if given."""
         felt = self.felt if felt is None else felt
         q = self.resolution
-        return {name: np.round(np.round((x + self.noise[name]) / q) * q, 6) for name, x in felt.items()}
+        return {name: np.round(np.round((x + self.noise[name]) / q) * q, 7) for name, x in felt.items()}
 
 
 def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> Sensed:

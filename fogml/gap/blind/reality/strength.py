@@ -38,19 +38,22 @@ class Acting:
         if isinstance(form, Distorting):
             output = unit.output(run)
             return form.distorted(output, world, self.amplitude, self.shape) - output
-        felt = falsified(unit, run, (self,))
-        trusted = nominal.output(unit.constants, unit.seen(run))
-        return trusted - nominal.output(unit.constants, unit.seen(run, felt))
+        trusted = nominal.output(unit.constants, unit.seen(run, recorded(unit, run, ())))
+        return trusted - nominal.output(unit.constants, unit.seen(run, recorded(unit, run, (self,))))
 
 
-def falsified(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> dict[str, FloatArray]:
-    """What the sensors feel with all `effects` that act on them [degC]."""
+def recorded(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> dict[str, FloatArray]:
+    """Recorded temperatures under all `effects` that act on sensors [degC]."""
+    acting = [(e, e.form) for e in effects if isinstance(e.form, Sensing) and e.amplitude > 0.0]
     felt = dict(run.sensed.felt)
-    for effect in effects:
-        if isinstance(effect.form, Sensing) and effect.amplitude > 0.0:
-            for name in unit.instruments.coil:
-                felt[name] = effect.form.felt(name, felt[name], run.world, effect.amplitude, effect.shape)
-    return felt
+    for effect, form in acting:
+        for name in unit.instruments.coil:
+            felt[name] = form.felt(name, felt[name], run.world, effect.amplitude, effect.shape)
+    values = run.sensed.recorded(felt)
+    for effect, form in acting:
+        for name in unit.instruments.coil:
+            values[name] = form.read(values[name], effect.amplitude, effect.shape)
+    return values
 
 
 class Scales:
@@ -62,8 +65,7 @@ class Scales:
 
     def projected(self, effects: tuple[Acting, ...] = ()) -> Projected:
         """Nominal columns as a replay has them, from what the sensors recorded under `effects`."""
-        unit = self.unit
-        columns = [nominal.columns(unit.seen(r, falsified(unit, r, effects)))[1] for r in unit.fit]
+        columns = [self.unit.columns(r, recorded(self.unit, r, effects)) for r in self.unit.fit]
         return Projected(self.whitenings, columns)
 
     def d_prime(self, effect: Acting, projected: Projected | None = None) -> float:

@@ -73,11 +73,30 @@ class Unit:
         seen = nominal.Seen(world.nodes["T_in"], outer, world.deltas["T_in"], world.rate_deg_h)
         return nominal.output(self.constants, seen)
 
-    def seen(self, run: UnitRun, felt: dict[str, FloatArray] | None = None) -> nominal.Seen:
-        """What a replay acts on: recorded temperatures, of other `felt` ones if given."""
-        inner, outer = faces(run.sensed.recorded(felt), self.instruments.layout)
+    def seen(self, run: UnitRun, recorded: dict[str, FloatArray]) -> nominal.Seen:
+        """What a replay of `recorded` temperatures [degC] acts on."""
+        inner, outer = faces(recorded, self.instruments.layout)
         delta = nominal.delta_of_record(run.world.time, inner)
         return nominal.Seen(inner, outer, delta, run.world.rate_deg_h)
+
+    @property
+    def runs(self) -> tuple[UnitRun, ...]:
+        """All thermal runs."""
+        return (*self.fit, *self.held_out)
+
+    @property
+    def turning(self) -> bool:
+        """Whether the table turns in any of them."""
+        return any(run.world.table_rate.any() for run in self.runs)
+
+    @property
+    def constant_names(self) -> tuple[str, ...]:
+        """Nominal constants that show in the runs."""
+        return nominal.names(self.turning, self.instruments.two_faces)
+
+    def columns(self, run: UnitRun, recorded: dict[str, FloatArray]) -> FloatArray:
+        """Responses of a replay of `recorded` temperatures to the nominal constants, shape (n, p)."""
+        return nominal.columns(self.seen(run, recorded), self.constant_names)
 
 
 def compatible(forms: Sequence[type[Form]]) -> bool:
@@ -108,6 +127,9 @@ def draw_unit(
     set_up = _draw_set_up(rng, forms)
     earth_stated = bool(rng.random() < 0.85)
     demands = _draw_demands(rng, forms)
+    slope, turning_slope = nominal.temperature_slopes(constants, sample_s)
+    turning_slope *= float(demands.turns and not demands.small_rates)
+    instruments = instruments.finer(slope, turning_slope, noise.N / np.sqrt(sample_s / 3600.0))
 
     def run(name: str, programme: Programme, of: NoiseConstants, place: int) -> UnitRun:
         world = happen(rng, plant, programme, set_up, sample_s, place)

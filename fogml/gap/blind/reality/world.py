@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from fogml.gap.blind.reality.plant import (
@@ -111,7 +112,7 @@ def happen(
     # Two windows of 64 s more, so that the first samples have their past.
     before = max(before, int(np.ceil(2.0 * _DELTA_S / fine / per)) * per)
     count = round(programme.duration_s / sample_s)
-    t = fine * np.arange(-before, count * per)
+    t: FloatArray = fine * np.arange(-before, count * per, dtype=np.float64)
     air, machines = _chamber(rng, t, programme, fine)
     power, supply = _electrical(rng, t, programme, plant)
     fan = np.ones(len(t))
@@ -119,7 +120,7 @@ def happen(
         fan[(t >= start) & (t < stop)] = 0.0
     first_power = 0.0 if t[0] < programme.powered_on - 1e-9 or programme.powered_on >= t[0] else power[0]
     states = plant.temperatures(fine, air, power, fan, plant.rest(float(air[0]), float(first_power)))
-    at = before + per * np.arange(count)
+    at = before + per * np.arange(count, dtype=np.int64)
     shells = states[:, FIRST_SHELL:]
     volumes = plant.capacities[FIRST_SHELL:] / plant.capacities[FIRST_SHELL:].sum()
     full = {
@@ -159,7 +160,7 @@ def happen(
     )
 
 
-def _delta(x: FloatArray, step_s: float, at: FloatArray) -> FloatArray:
+def _delta(x: FloatArray, step_s: float, at: NDArray[np.int64]) -> FloatArray:
     """Mean of the last 64 s less that of the 64 s before, from the integral of x, straight between."""
     integral = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * step_s)])
     t = step_s * np.arange(len(x))

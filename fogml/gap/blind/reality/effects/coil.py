@@ -55,7 +55,7 @@ class ShupeShells(Additive):
 class MohrCurved(Additive):
     """Strain of the winding whose sensitivity to the rate grows exponentially over temperature."""
 
-    name, form, unit = "shupe_mohr", "exponential over temperature", "deg/h/(degC/min)"
+    name, form = "shupe_mohr", "exponential over temperature"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Slope and curvature of the sensitivity's logarithm."""
@@ -115,7 +115,7 @@ class Leads(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Ratio of the lengths, share of the hub in what the first lead feels."""
-        return {"length_ratio": rng.uniform(0.3, 3.0), "hub_share": rng.uniform(0.0, 0.15)}
+        return {"length_ratio": rng.uniform(0.3, 3.0), "hub_share": rng.uniform(0.0, 0.06)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """n c_T (l_1 dT_1/dt - l_2 dT_case/dt) / D."""
@@ -143,7 +143,7 @@ class SideWind(Additive):
 class SlipEvents(Additive):
     """Single slips of random height while the winding's rate is above a threshold; they creep back."""
 
-    name, form, unit = "thermal_shock", "single slips of random height", "deg/h/degC"
+    name, form = "thermal_shock", "single slips of random height"
     demands, quick_plant = Demands(shock=True), True
 
     def draw(self, rng: np.random.Generator) -> Shape:

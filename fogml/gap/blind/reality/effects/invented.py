@@ -25,7 +25,8 @@ class ModeHops(Additive):
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """-1 or 1."""
         hops = rng.random(len(world.time)) < world.sample_s / shape["dwell"]
-        return 1.0 - 2.0 * ((np.cumsum(hops) + int(rng.random() < 0.5)) % 2)
+        other = (np.cumsum(hops) + int(rng.random() < 0.5)) % 2
+        return np.where(other == 1, -1.0, 1.0)
 
 
 class IntegratorResets(Additive):

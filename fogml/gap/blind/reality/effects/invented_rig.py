@@ -36,22 +36,20 @@ class StickySensor(Sensing):
 
 
 class CreepingSensor(Sensing):
-    """A sensor whose glue creeps when hot: its error grows with the time spent there."""
+    """Sensors whose glue creeps when hot: their error, one for all, grows with the time spent there."""
 
-    name, known, form, faces = "creeping_sensor", False, "error grows with time in heat", True
+    name, known, form = "creeping_sensor", False, "error grows with time in heat"
     greatest: ClassVar[float] = 20.0
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Where creep sets in [degC]."""
-        return {"onset": rng.uniform(30.0, 45.0)}
+        return {"onset": rng.uniform(25.0, 40.0)}
 
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
     ) -> FloatArray:
-        """The outer sensors gain `amplitude` degC per 1000 degC min above the onset."""
-        if name not in ("T_out", "T2", "T4"):
-            return temperature
-        excess = np.maximum(world.nodes["T_out"] - shape["onset"], 0.0)
+        """`amplitude` degC more per 1000 degC min above the onset."""
+        excess = np.maximum(world.nodes["T_coil"] - shape["onset"], 0.0)
         return np.asarray(temperature + amplitude * np.cumsum(excess) * world.sample_s / 60e3)
 
 

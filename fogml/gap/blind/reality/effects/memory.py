@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.gap.blind.reality.form import Additive, ScaleFactor, Shape
-from fogml.gap.blind.reality.recurrences import FloatArray, friction, lag, play
+from fogml.gap.blind.reality.recurrences import FloatArray, bouc_wen, lag, play
 from fogml.gap.blind.reality.world import World
 
 _GAS_CONSTANT = 8.314
@@ -21,7 +21,7 @@ def _prandtl_ishlinskii(temperature: FloatArray, half_width: float, spread: floa
 
 
 class HysteresisBoucWen(Additive):
-    """Bouc-Wen's hysteresis with a soft knee."""
+    """Bouc-Wen's hysteresis with exponent 2."""
 
     name, form, unit = "thermal_hysteresis", "Bouc-Wen", "deg/h"
 
@@ -30,8 +30,8 @@ class HysteresisBoucWen(Additive):
         return {"half_width": float(np.exp(rng.uniform(np.log(3.0), np.log(20.0))))}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """-z, where dz/dT = (1 - z sign(dT)) / length."""
-        return -friction(world.nodes["T_coil"], shape["half_width"])
+        """-z, where dz/dT = 1 / length in unloading and (1 - z**2) / length in loading."""
+        return -bouc_wen(world.nodes["T_coil"], shape["half_width"])
 
 
 class HysteresisPreisach(Additive):
@@ -92,7 +92,7 @@ class HiddenPlate(Additive):
     """The table's plate, of two layers, that no sensor shows."""
 
     name, stage, form = "hidden_thermal_node", "thermal", "plate of two layers"
-    unit, records = "deg/h/degC", ("T_chamber",)
+    records = ("T_chamber",)
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Share of the deep layer."""
@@ -126,7 +126,7 @@ class DeepPlate(Additive):
 class MoistureFick(Additive):
     """Fick's uptake of water by a slab: its first modes."""
 
-    name, form, unit, records = "moisture", "modes of Fick's law", "deg/h/(%/h)", ("humidity",)
+    name, form, records = "moisture", "modes of Fick's law", ("humidity",)
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Time constant of the slowest mode, static part."""

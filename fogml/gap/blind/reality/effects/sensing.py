@@ -40,12 +40,10 @@ class CoarseSteps(Sensing):
         """Where the steps lie."""
         return {"offset": rng.uniform(0.0, 1.0)}
 
-    def felt(
-        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
-    ) -> FloatArray:
+    def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
         """Whole steps, in the mean unbiased."""
-        steps = temperature / amplitude + shape["offset"]
-        return amplitude * (np.floor(steps) + 0.5 - shape["offset"])
+        steps = np.floor(values / amplitude + shape["offset"])
+        return np.round(amplitude * (steps + 0.5 - shape["offset"]), 7)
 
 
 class Elsewhere(Sensing):

@@ -48,7 +48,7 @@ class ModulatorLoop(ScaleFactor):
 class PowerLaw(ScaleFactor):
     """Scale factor that grows with a power of the rate."""
 
-    name, form, unit = "sf_nonlinearity", "power law", "ppm"
+    name, form = "sf_nonlinearity", "power law"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """The power, from linear to quadratic."""
