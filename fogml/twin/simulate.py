@@ -75,8 +75,8 @@ def simulate(
     columns
         What to record beside time and gyro, by the run format's names; `DEFAULT_COLUMNS` if None.
     facts
-        Set-up facts; latitude 39.9 deg and the input axis up if None. The unit is the twin's name
-        unless stated, power-on is the programme's.
+        Set-up facts; latitude 39.9 deg and the input axis up if None. The unit is the twin's name and
+        the notes say what was simulated, unless stated; power-on is the programme's.
     truth
         Whether to keep every node and every effect's contribution.
 
@@ -202,7 +202,8 @@ def _world(
         programme = load_programme(programme)
     unit = twin if isinstance(twin, Twin) else load_twin(twin)
     facts = DEFAULT_FACTS if facts is None else facts
-    stated = facts.model_copy(update={"unit": facts.unit or unit.name})
+    notes = f"synthetic: programme {programme.name}, twin {unit.name}, seed {seed}"
+    stated = facts.model_copy(update={"unit": facts.unit or unit.name, "notes": facts.notes or notes})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
         if name in ("time", "gyro") or (name not in KNOWN and coil_sensor_number(name) is None):

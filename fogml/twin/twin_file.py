@@ -11,6 +11,7 @@ from pydantic import ValidationError
 
 from fogml.errors import InputError
 from fogml.outputs import whole_file
+from fogml.runs.columns import KNOWN, is_temperature
 from fogml.runs.facts import read_yaml
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
@@ -174,6 +175,11 @@ def _sensors(source: str, stated: Any) -> Sensors:
     shared = SensorErrors(**common, reads={})
     single = {}
     for name, held in stated.single.items():
+        if not is_temperature(name):
+            known = ", ".join(key for key in KNOWN if is_temperature(key)) + " and T1, T2 ..."
+            raise InputError(
+                f"{source}: key 'sensors.single.{name}' is no temperature's name; known are {known}"
+            )
         own = _values(source, f"sensors.single.{name}", held, SENSOR_QUANTITIES)
         single[name] = replace(shared, **own, reads=held.reads)
     return Sensors(shared, single)

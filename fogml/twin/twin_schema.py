@@ -37,6 +37,12 @@ LINE = (
 )
 
 
+def _no_truth(value: Any) -> Any:
+    if isinstance(value, bool):
+        raise ValueError("a number is needed")
+    return value
+
+
 class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -44,7 +50,7 @@ class _Strict(BaseModel):
 class Stated(_Strict):
     """A constant: its value, its unit, and the spread of its prior where it has one."""
 
-    value: float = Field(allow_inf_nan=False)
+    value: Annotated[float, BeforeValidator(_no_truth)] = Field(allow_inf_nan=False)
     unit: str | None = None
 
 
@@ -58,13 +64,7 @@ class _WithFactor(Stated):
 
 def _plain(value: Any) -> Any:
     """A bare number is a value in the documented unit."""
-    return value if isinstance(value, dict | Stated) else {"value": _no_truth(value)}
-
-
-def _no_truth(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("a number is needed")
-    return value
+    return value if isinstance(value, dict | Stated) else {"value": value}
 
 
 def _section(

@@ -60,6 +60,7 @@ def test_a_file_holds_what_memory_does(tmp_path, monkeypatch, suffix):
     run, true = read_run(path), read_truth(beside)
     assert rows == len(run) == len(expected.run) and len(seen) >= 2
     assert run.facts == expected.run.facts and run.facts.unit == "tactical"
+    assert run.facts.notes is not None and run.facts.notes.startswith("synthetic: ")
     for name, values in expected.run.columns.items():
         np.testing.assert_array_equal(run.columns[name], values, err_msg=name)
     for cell, values in expected.truth.columns().items():

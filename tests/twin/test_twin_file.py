@@ -88,6 +88,8 @@ def test_bare_numbers_are_in_the_documented_unit():
 
 
 FAULTS = [
+    (("nominal", "b0"), {"value": True}, "'nominal.b0.value': a number is needed"),
+    (("sensors", "single"), {"T_tip": {"lag": 3.0}}, "'sensors.single.T_tip' is no temperature's name"),
     (("nominl",), {}, "unknown key 'nominl'; did you mean 'nominal'"),
     (("nominal", "e9"), 1, "unknown key 'nominal.e9'"),
     (("nominal", "e0"), {"value": 1, "unit": "ppb"}, "'nominal.e0' has unit 'ppb'; ppm is needed"),
