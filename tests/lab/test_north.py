@@ -1,0 +1,210 @@
+"""North seeking: closed form against simulation, known answers, quiet azimuths of any set-up."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.lab.north import PALINDROME, Drift, Scheme, drift_error, horizontal_rate
+from fogml.lab.north_positions import north_from_positions, simulated_positions
+from fogml.lab.north_schemes import CoarseFine, error_of, seek, standard_error, ways_of_equal_time, wrapped
+
+LINEAR = Drift(0.18)
+START_UP = Drift(0.05, ((0.2, 600.0), (-0.1, 90.0)))
+
+
+def by_hand(azimuth_deg: float, latitude_deg: float, drift: Drift, *, sense: float, dwell: float) -> float:
+    """Error of theta = atan2(G4 - G2, G1 - G3), drift averaged by a fine sum, sharing no code."""
+    means = []
+    for j in range(4):
+        fine = j * dwell + (np.arange(200_000) + 0.5) * dwell / 200_000
+        d = drift.linear_deg_h_h * fine / 3600.0
+        for amplitude, constant in drift.transients:
+            d = d + amplitude * np.exp(-fine / constant)
+        h = 15.041067 * np.cos(np.radians(latitude_deg))
+        means.append(h * np.cos(np.radians(azimuth_deg + sense * 90.0 * j)) + d.mean())
+    g1, g2, g3, g4 = means
+    found = np.degrees(np.arctan2(sense * (g4 - g2), g1 - g3))
+    return float((found - azimuth_deg + 180.0) % 360.0 - 180.0)
+
+
+@pytest.mark.parametrize(("latitude", "greatest"), [(30.0, 0.01866), (40.0, 0.0211), (50.0, 0.0251)])
+def test_known_greatest_errors(latitude: float, greatest: float) -> None:
+    assert drift_error(Scheme(), LINEAR, latitude).greatest == pytest.approx(greatest, rel=2e-3)
+
+
+def test_known_rms_transient_and_noise() -> None:
+    assert drift_error(Scheme(), LINEAR, 30.0).rms == pytest.approx(0.0132, abs=5e-6)
+    assert drift_error(Scheme(), Drift(0.0, ((0.2, 600.0),)), 30.0).greatest == pytest.approx(0.10, abs=3e-3)
+    azimuth = np.arange(0.0, 360.0, 15.0)
+    # With R = 2 H: 2 sigma^2/R^2 plain, (6 + 4 sin 2 theta) sigma^2/R^2 with the drift observed.
+    np.testing.assert_allclose(Scheme().variance_factor(azimuth), 2.0 / 4.0)
+    wanted = (6.0 + 4.0 * np.sin(2.0 * np.radians(azimuth))) / 4.0
+    np.testing.assert_allclose(Scheme(observes_drift=True).variance_factor(azimuth), wanted)
+    np.testing.assert_allclose(Scheme(PALINDROME).variance_factor(azimuth), 1.0 / 4.0)
+
+
+@pytest.mark.parametrize("sense", ["cw", "ccw"])
+@pytest.mark.parametrize("drift", [LINEAR, START_UP])
+def test_closed_form_is_what_a_simulation_gives(sense: str, drift: Drift) -> None:
+    scheme = Scheme(sense=sense)
+    for azimuth in (0.0, 37.0, 135.0, 290.0):
+        error = float(drift_error(scheme, drift, 30.0).at(azimuth))
+        sign = 1.0 if sense == "cw" else -1.0
+        assert error == pytest.approx(by_hand(azimuth, 30.0, drift, sense=sign, dwell=60.0), abs=1e-9)
+
+
+def test_the_patent_s_formula_holds_with_its_quiet_azimuths_moved() -> None:
+    error, azimuth = drift_error(Scheme(), LINEAR, 30.0), np.arange(0.0, 360.0, 1.0)
+    delta, r = 2.0 * 0.18 / 60.0, 2.0 * horizontal_rate(30.0)
+    theta = np.radians(azimuth)
+    a, b = r * np.sin(theta), r * np.cos(theta)
+    np.testing.assert_allclose(
+        np.tan(np.radians(error.at(azimuth))),
+        delta * (a + b) / (r**2 + delta * (a - b)),
+        rtol=1e-9,
+        atol=1e-15,
+    )
+    # The patent says 45 and 225 deg are least: with its positions taken clockwise they are the most.
+    assert error.quiet_deg == pytest.approx((135.0, 315.0))
+    assert error.worst_deg == pytest.approx((45.0, 225.0), abs=0.02)
+    ccw = drift_error(Scheme(sense="ccw"), LINEAR, 30.0)
+    assert ccw.quiet_deg == pytest.approx((45.0, 225.0))
+    root = np.sqrt(2.0) * delta
+    wanted = root * np.sin(theta - np.pi / 4) / (r - root * np.sin(theta + np.pi / 4))
+    np.testing.assert_allclose(np.tan(np.radians(ccw.at(azimuth))), wanted, rtol=1e-9, atol=1e-15)
+    reordered = drift_error(Scheme((0.0, 180.0, 270.0, 90.0)), LINEAR, 30.0)
+    assert reordered.quiet_deg == pytest.approx((45.0, 225.0))
+
+
+@pytest.mark.parametrize(("sense", "sign"), [("cw", -1.0), ("ccw", 1.0)])
+def test_quiet_azimuth_of_an_exponential(sense: str, sign: float) -> None:
+    scheme = Scheme(sense=sense, transfer_s=15.0)
+    quiet = drift_error(scheme, Drift(0.0, ((0.3, 200.0),)), 40.0).quiet_deg
+    s = np.exp(-75.0 / 200.0)
+    assert np.tan(np.radians(quiet)) == pytest.approx([sign * s] * 2)
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    order=st.permutations([0.0, 90.0, 180.0, 270.0]),
+    sense=st.sampled_from(["cw", "ccw"]),
+    linear=st.floats(-3.0, 3.0),
+    amplitude=st.floats(-1.0, 1.0),
+    constant=st.floats(20.0, 3000.0),
+    latitude=st.floats(-70.0, 70.0),
+)
+def test_quiet_and_worst_azimuths_are_so(order, sense, linear, amplitude, constant, latitude) -> None:
+    error = drift_error(
+        Scheme(tuple(order), sense, 40.0, 7.0), Drift(linear, ((amplitude, constant),)), latitude
+    )
+    circle = np.abs(error.at(np.arange(0.0, 360.0, 0.25)))
+    assert circle.max() <= error.greatest * (1 + 1e-9) + 1e-12
+    assert error.greatest <= circle.max() * (1 + 1e-4) + 1e-12
+    if error.size > 1e-6:
+        np.testing.assert_allclose(error.at(np.array(error.quiet_deg)), 0.0, atol=1e-9)
+        np.testing.assert_allclose(np.abs(error.at(np.array(error.worst_deg))), error.greatest, rtol=1e-9)
+
+
+@pytest.mark.parametrize("drift", [LINEAR, START_UP])
+def test_every_way_at_equal_time(drift: Drift) -> None:
+    plain = Scheme(transfer_s=10.0)
+    ways, left_out = ways_of_equal_time(plain)
+    assert not left_out and list(ways) == ["plain", "drift-observing", "palindrome", "coarse-fine"]
+    azimuth = np.arange(0.0, 360.0, 13.0)
+    for way in ways.values():
+        spans = (way.coarse, way.fine) if isinstance(way, CoarseFine) else (way,)
+        assert spans[-1].spans_s[1][-1] == pytest.approx(plain.duration_s)
+        found = seek(way, azimuth, horizontal_rate(35.0), drift.mean)
+        np.testing.assert_allclose(wrapped(found - azimuth), error_of(way, azimuth, drift, 35.0), atol=1e-9)
+    if drift is LINEAR:
+        for name in ("drift-observing", "palindrome"):
+            assert np.abs(error_of(ways[name], azimuth, drift, 35.0)).max() < 1e-12
+        assert np.abs(error_of(ways["coarse-fine"], azimuth, drift, 35.0)).max() < 1e-5
+
+
+def test_standard_errors_are_those_of_many_seeks() -> None:
+    scheme, walk = Scheme(dwell_s=30.0), 0.002
+    rng = np.random.default_rng(2)
+    azimuth = np.full(4000, 60.0)
+    noise = rng.normal(0.0, walk / np.sqrt(30.0 / 3600.0), (4000, 4))
+    for way in (scheme, Scheme(dwell_s=30.0, observes_drift=True)):
+        found = seek(way, azimuth, horizontal_rate(30.0), lambda begin, end: noise)
+        wanted = float(standard_error(way, 60.0, walk, horizontal_rate(30.0)))
+        assert np.std(wrapped(found - 60.0)) == pytest.approx(wanted, rel=0.04)
+
+
+def test_recorded_positions() -> None:
+    scheme, azimuth = Scheme(transfer_s=10.0), 77.0
+    quiet = simulated_positions(scheme, azimuth, 30.0, Drift(0.6), bias_deg_h=0.4)
+    fix = north_from_positions(quiet)
+    assert fix.method == "drift-observing" and fix.azimuth_deg == pytest.approx(azimuth, abs=1e-9)
+    assert fix.drift_deg_h_h == pytest.approx(0.6, abs=1e-8)
+    assert fix.error.quiet_deg == pytest.approx((135.0, 315.0))
+    off = wrapped(north_from_positions(quiet, method="plain").azimuth_deg - azimuth)
+    assert off == pytest.approx(float(drift_error(scheme, Drift(0.6), 30.0).at(azimuth)), abs=1e-9)
+    assert float(fix.error.at(azimuth)) == pytest.approx(float(off), rel=1e-6)
+
+
+@pytest.mark.parametrize("order", [(0.0, 90.0, 180.0, 270.0), (0.0, 180.0, 270.0, 90.0)])
+@pytest.mark.parametrize("sense", ["cw", "ccw"])
+def test_recorded_in_any_order_and_sense(order: tuple[float, ...], sense: str) -> None:
+    run = simulated_positions(Scheme(order, sense, 30.0, 5.0), 201.0, -45.0, Drift())
+    fix = north_from_positions(run, sense=sense, order_deg=order)
+    assert fix.azimuth_deg == pytest.approx(201.0, abs=1e-9) and fix.notes == ()
+
+
+def test_errors_of_recorded_positions_are_those_told() -> None:
+    scores = []
+    for seed in range(150):
+        run = simulated_positions(
+            Scheme(dwell_s=30.0), 20.0, 30.0, Drift(), random_walk_deg_sqrt_h=0.003, seed=seed
+        )
+        fix = north_from_positions(run, method="plain")
+        assert fix.se_deg is not None
+        scores.append(float(wrapped(fix.azimuth_deg - 20.0)) / fix.se_deg)
+    assert np.std(scores) == pytest.approx(1.0, abs=0.2) and abs(np.mean(scores)) < 0.3
+
+
+def test_an_axis_that_is_not_level_is_noted() -> None:
+    run = simulated_positions(Scheme(), 10.0, 30.0, Drift())
+    assert "Earth rate" in north_from_positions(run, latitude_deg=55.0).notes[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda p: np.where(p == 3, 0.0, p), "no samples in position 3"),
+        (lambda p: np.where(p == 3, 5.0, p), "5 is no position"),
+        (lambda p: p + 0.5, "is no position"),
+        (lambda p: np.full(len(p), np.nan), "no samples in position 1, 2, 3, 4"),
+    ],
+)
+def test_faulty_positions_are_named(change, message: str) -> None:
+    run = simulated_positions(Scheme(dwell_s=10.0), 10.0, 30.0, Drift())
+    with pytest.raises(InputError, match=message):
+        north_from_positions(run.with_columns(position=change(run.columns["position"])))
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Scheme(sense="up"), "sense 'up'"),
+        (lambda: Scheme(dwell_s=0.0), "dwell 0 s"),
+        (lambda: Scheme(dwell_s=float("nan")), "dwell nan s"),
+        (lambda: Scheme(transfer_s=-1.0), "transfer -1 s"),
+        (lambda: Scheme((0.0, 90.0)), "at least three different angles"),
+        (lambda: Scheme((0.0, 120.0, 240.0), observes_drift=True), "linear drift"),
+        (lambda: Drift(float("nan")), "finite"),
+        (lambda: Drift(0.0, ((0.1, 0.0),)), "time constant"),
+        (lambda: horizontal_rate(91.0), "latitude 91"),
+        (lambda: horizontal_rate(90.0), "pole"),
+        (lambda: horizontal_rate(float("nan")), "latitude nan"),
+    ],
+)
+def test_bad_settings_are_refused(make, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        make()
