@@ -151,17 +151,16 @@ of {SAMPLE_S:.0f} s; every other unit has a ripple over temperature that no cubi
 trained on one cycle at 1 °C/min, or on three at 0.5, 1 and 2 °C/min, and used at 0.4, 0.7, 1.5 and
 3 °C/min. The rule of the choice was set with the first units in view and judged on the fresh ones
 ({described}). Ratios of
-`auto` to another model, unit by unit and rate by rate; below 1 `auto` is better, means are geometric. *Error* is against the
-noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages in it, as a recording would;
-*worse in* counts the cases with a ratio of errors above 1.
+`auto` to another model, unit by unit and rate by rate; below 1 `auto` is better. Means are geometric.
+*Error* is against the noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages
+in it, as a recording would; *worse in* counts the cases with a ratio of errors above 1.
 The process sees {PROCESS_ROWS} averages. fogml {__version__}; `python -m experiments.default_rates`.
 
 {table(rows)}
 
 At one rate `auto` keeps the cubic's terms in the rate and adds to them only what gains two standard
 errors on the left-out parts of the run; so in most cases it is the cubic itself, or better. Where it is
-worse, the larger form passed by luck: the run's noise does not tell the two apart, and the residual
-shows by how little they differ.
+worse, a larger form passed by luck, and the residual shows by how little the two differ.
 """
 
 
