@@ -8,6 +8,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.reading import read_run
+from fogml.signals.allan import allan_deviation
 from fogml.twin import simulate as simulating
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NominalConstants
@@ -139,6 +140,16 @@ def test_each_random_effect_has_its_own_part_of_the_noise():
     assert np.std(true.contributions["angle_random_walk"]) == pytest.approx(0.03 * 60.0, rel=0.05)
     plain = simulate(QUICK, twin, seed=3).run
     np.testing.assert_array_equal(plain.gyro, simulate(QUICK, twin, seed=3, truth=True).run.gyro)
+
+
+def test_allan_deviation_is_that_of_own_noise_and_random_effects_together():
+    twin = Twin(noise=NoiseConstants(Q=2.0, N=0.02, B=0.3)).with_effect("angle_random_walk", 0.03)
+    twin = twin.with_effect("bias_instability", 0.4).with_effect("quantisation", 3.0)
+    found = simulate(["soak at 25 degC for 40 h"], twin, sample_s=2.0, seed=1, columns=(), truth=True)
+    taus = np.array([2.0, 16.0, 128.0, 1024.0])
+    total = twin.noise.with_effects({id: setting.amplitude for id, setting in twin.settings.items()})
+    wanted = np.sqrt(total.allan_variance(taus))
+    np.testing.assert_allclose(allan_deviation(found.truth.noise, 2.0, taus).adev, wanted, rtol=0.12)
 
 
 def test_photon_noise_rises_with_the_light_that_is_lost():

@@ -68,6 +68,7 @@ class SensorQuantisation(SensorEffect):
         within = np.clip(np.abs(rate) * np.where(known, time - changed, 0.0) - 0.5, -0.5, 0.5)
         # Not to be told from steps that are rarer than the window of the rate, or as dense as samples.
         told = np.clip(np.abs(rate) * inputs.rate_window_s - 0.5, 0.0, 1.0)
-        told *= np.clip(2.0 - 2.0 * np.abs(rate) * interval, 0.0, 1.0)
+        # A hair below, so that rounding tells nothing of one step a sample.
+        told *= np.clip(2.0 - 2.0 * np.abs(rate) * interval - 1e-9, 0.0, 1.0)
         usual = temperature / _USUAL_STEP_DEGC
         return np.where(step < _FINEST_STEP_DEGC, usual - np.rint(usual), np.sign(rate) * within * told)

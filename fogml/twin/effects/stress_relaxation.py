@@ -55,4 +55,5 @@ class StressRelaxation(BiasEffect):
         # q = T - lag of T solves the element's equation, for any tau(t).
         quick = inputs.memory.lag(f"{self.id} quick", inputs.time, temperature, tau)
         slow = inputs.memory.lag(f"{self.id} slow", inputs.time, temperature, _SLOWER * tau)
-        return temperature - (1.0 - share) * quick - share * slow
+        # Differences first: at rest there is exactly nothing left.
+        return (1.0 - share) * (temperature - quick) + share * (temperature - slow)
