@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, CaseFiles
 
-Method = Callable[[CaseFiles, Path], None]
+Method = Callable[[CaseFiles, Path], Any]
 """Reads a case's runs and writes ``gap.json`` into a folder."""
 
 _PACKAGE = "fogml.gap.blind"
@@ -48,12 +50,9 @@ def load_method(text: str) -> Method:
     return method
 
 
-def diagnosis(case: CaseFiles, out: Path) -> None:
-    """The diagnosis itself, as ``fogml diagnose`` runs it; the page is written where asked for."""
-    import json
-
+def diagnosis(case: CaseFiles, out: Path) -> Any:
+    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page."""
     from fogml.gap.diagnosis import as_model, diagnose
-    from fogml.outputs import whole_folder
     from fogml.runs.reading import read_run
     from fogml.twin.twin_file import load_twin
 
@@ -65,7 +64,7 @@ def diagnosis(case: CaseFiles, out: Path) -> None:
         noise=read_run(case.noise) if case.noise else None,
         without=case.without,
     )
-    with whole_folder(out) as folder:
-        text = json.dumps(found.as_dict(), indent=1, allow_nan=False)
-        (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
-        found.write_model(model, folder / "twin.yaml")
+    text = json.dumps(found.as_dict(), allow_nan=False, ensure_ascii=False)
+    (out / "gap.json").write_text(text + "\n", encoding="utf-8")
+    found.write_model(model, out / "twin.yaml")
+    return found

@@ -46,6 +46,10 @@ class RunPlan:
         ``(i, n)``: every n-th case from the i-th on, i from 1; for n machines on one folder.
     retry
         Whether cases that failed before are tried again.
+    only
+        Numbers of the cases, where not all are wanted.
+    into
+        Folder of the answers, where it is not the method's.
     """
 
     folder: BlindFolder
@@ -57,6 +61,8 @@ class RunPlan:
     limit_s: float = LIMIT_S
     shard: tuple[int, int] = (1, 1)
     retry: bool = False
+    only: tuple[str, ...] | None = None
+    into: Path | None = None
 
     def __post_init__(self) -> None:
         i, n = self.shard
@@ -68,12 +74,13 @@ class RunPlan:
     @property
     def answers(self) -> Path:
         """Where the answers go."""
-        return self.folder.answers(self.name or self.method)
+        return self.into or self.folder.answers(self.name or self.method)
 
     def left(self) -> tuple[str, ...]:
         """Numbers of the cases of the shard that have no answer yet."""
         i, n = self.shard
-        return tuple(name for name in self.folder.names()[i - 1 :: n] if not self._answered(name))
+        names = self.folder.names() if self.only is None else self.only
+        return tuple(name for name in names[i - 1 :: n] if not self._answered(name))
 
     def _answered(self, name: str) -> bool:
         outcome = self.answers / name / OUTCOME

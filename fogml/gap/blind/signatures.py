@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from fogml.gap.model import Candidate
+from fogml.gap.noise import MOST_ROWS
 from fogml.gap.observation import Observation, observe
 from fogml.gap.twin_model import TwinModel
-from fogml.runs.noise_of_run import noise_report
 from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
+from fogml.signals.noise_fit import fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
 from fogml.twin.quantities import Quantity
@@ -25,6 +26,7 @@ LARGEST_ROWS = 4096
 """Runs are averaged down to about this many rows."""
 _NODES = {1: 7, 2: 4, 3: 3}
 _FINEST_LINE = 60
+_TIME_ORDERS, _TEMPERATURE_ORDERS = 6, (3, 4, 5)
 
 
 @dataclass(frozen=True)
@@ -114,12 +116,29 @@ class Stack:
         )
 
 
-def noise_of(static: Path | None, fallback: Path) -> NoiseModel:
-    """Noise coefficients from a static run, or from another one with what moves in it."""
-    terms = noise_report(read_run(static or fallback))["terms"]
-    value = {name: float(terms[name]["value"] or 0.0) for name in ("N", "B", "K")}
-    tiny = 1e-9
-    return NoiseModel(max(value["N"], tiny), value["B"], value["K"])
+def noise_of(static: Path | None, fit: Stack) -> NoiseModel:
+    """Noise coefficients from a static run, or from the fit runs beside what smooth curves take up."""
+    if static is not None:
+        run = read_run(static)
+        return fit_noise([run.time], [run.gyro_deg_h], averaging_s=run.sample_s, most=MOST_ROWS).model
+    columns = np.column_stack([fit.nominal, smooth_curves(fit)])
+    sizes = np.linalg.norm(columns, axis=0)
+    parts = fit.split(columns[:, sizes > 0.0] / sizes[sizes > 0.0])
+    row_s = fit.parts[0].row_s
+    return fit_noise(fit.time, fit.split(fit.gap), parts, averaging_s=row_s, most=MOST_ROWS).model
+
+
+def smooth_curves(stack: Stack) -> FloatArray:
+    """Legendre polynomials in each run's time, and higher powers of temperature, shape (n, k)."""
+    columns = []
+    for index, part in enumerate(stack.parts):
+        x = 2.0 * (part.time - part.time[0]) / max(part.time[-1] - part.time[0], 1e-300) - 1.0
+        powers = np.polynomial.legendre.legvander(x, _TIME_ORDERS)[:, 1:]
+        rows = np.zeros((len(part), len(stack.parts) * _TIME_ORDERS))
+        rows[:, index * _TIME_ORDERS : (index + 1) * _TIME_ORDERS] = powers
+        u = (part.temperature - 25.0) / 50.0
+        columns.append(np.column_stack([rows, *(u**order for order in _TEMPERATURE_ORDERS)]))
+    return np.concatenate(columns)
 
 
 def atoms(candidates: Mapping[str, Candidate], without: Sequence[str], grid: bool = True) -> list[Atom]:

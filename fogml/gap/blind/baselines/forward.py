@@ -11,7 +11,7 @@ from scipy.special import expit
 from fogml.gap.blind.baselines.answer import Finding, write_answer
 from fogml.gap.blind.baselines.regression import Regression
 from fogml.gap.blind.folders import CaseFiles
-from fogml.gap.blind.signatures import Atom, Stack
+from fogml.gap.blind.signatures import Atom, smooth_curves
 from fogml.runs.run import FloatArray
 
 MOST = 4
@@ -19,7 +19,6 @@ MOST = 4
 _CLASS = 6.0
 """Members of a class are within this much of the best in the criterion: 3 nats."""
 _LEFT = 1e-9
-_TIME_ORDERS, _TEMPERATURE_ORDERS = 6, (3, 4, 5)
 
 
 def bic(case: CaseFiles, out: Path) -> None:
@@ -96,16 +95,3 @@ def _unknown(problem: Regression, left: FloatArray, chosen: Sequence[FloatArray]
     explained = float(np.sum((basis.T @ left) ** 2))
     gain = n * np.log(rest / max(rest - explained, 1e-300)) - basis.shape[1] * np.log(n)
     return float(expit(0.5 * gain))
-
-
-def smooth_curves(stack: Stack) -> FloatArray:
-    """Legendre polynomials in each run's time, and higher powers of temperature, shape (n, k)."""
-    columns = []
-    for index, part in enumerate(stack.parts):
-        x = 2.0 * (part.time - part.time[0]) / max(part.time[-1] - part.time[0], 1e-300) - 1.0
-        powers = np.polynomial.legendre.legvander(x, _TIME_ORDERS)[:, 1:]
-        rows = np.zeros((len(part), len(stack.parts) * _TIME_ORDERS))
-        rows[:, index * _TIME_ORDERS : (index + 1) * _TIME_ORDERS] = powers
-        u = (part.temperature - 25.0) / 50.0
-        columns.append(np.column_stack([rows, *(u**order for order in _TEMPERATURE_ORDERS)]))
-    return np.concatenate(columns)

@@ -27,25 +27,25 @@ def oracle(folder: BlindFolder, truth: Truth, out: Path) -> None:
     value = {name: amount.value for name, amount in truth.noise.items()}
     noise = NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
     fit, held_out = Stack(files.fit), Stack(files.held_out)
-    true = [
+    contributions = [
         np.column_stack(
             [stack.averaged([given[run, i] for run in stack.names]) for i in range(len(truth.effects))]
             or [np.zeros((len(stack), 0))]
         )
         for stack in (fit, held_out)
     ]
-    seen, target = _beside_constants(fit, noise, np.column_stack([true[0], fit.gap]))
+    seen, target = _beside_constants(fit, noise, np.column_stack([contributions[0], fit.gap]))
     left = target - seen.sum(axis=1)
     odds = [float((left + s) @ s - 0.5 * s @ s) for s in seen.T]
-    found = [
-        Finding(
-            effect.id, (effect.id,), float(expit(ratio)),
-            effect.amplitude.value if effect.amplitude else 1.0,
-            abs(effect.amplitude.value) / effect.d_prime if effect.amplitude else None, dict(effect.shape),
-        )
-        for effect, ratio in zip(truth.effects, odds)
-        if effect.id is not None and effect in truth.known
-    ]  # fmt: skip
+    found = []
+    for effect, ratio, s in zip(truth.effects, odds, seen.T):
+        if effect.id is None or effect not in truth.known:
+            continue
+        true = effect.amplitude.value if effect.amplitude else 1.0
+        # What the noise makes of the amplitude, were its form known.
+        fitted = true * (1.0 + float(left @ s) / float(s @ s))
+        se = abs(true) / float(np.linalg.norm(s))
+        found.append(Finding(effect.id, (effect.id,), float(expit(ratio)), fitted, se, dict(effect.shape)))
     hidden = [i for i, effect in enumerate(truth.effects) if effect in truth.unknown]
     unknown = 0.0
     if hidden:
@@ -54,10 +54,10 @@ def oracle(folder: BlindFolder, truth: Truth, out: Path) -> None:
     # The unknown stays: the oracle may see it, but has no name to add it by.
     named = [i for i, effect in enumerate(truth.effects) if effect in truth.known and odds[i] > 0.0]
     nothing = _constants(fit, noise, fit.gap)
-    rest = _constants(fit, noise, fit.gap - true[0][:, named].sum(axis=1))
+    rest = _constants(fit, noise, fit.gap - contributions[0][:, named].sum(axis=1))
     predictions = [
         Prediction(stack, stack.nominal @ nothing, stack.nominal @ rest + s[:, named].sum(axis=1))
-        for stack, s in zip((fit, held_out), true)
+        for stack, s in zip((fit, held_out), contributions)
     ]
     write_answer(out, found, unknown, predictions[0], predictions[1], noise)
 

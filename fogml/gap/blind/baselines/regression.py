@@ -47,9 +47,9 @@ class Regression:
 
     def __init__(self, case: CaseFiles, *, whiten: bool = True, free: bool = True, grid: bool = True) -> None:
         self.case, self.free = case, free
-        self.noise: NoiseModel = noise_of(case.noise, case.fit[0])
         self._whiten = whiten
         rough = Stack(case.fit)
+        self.noise: NoiseModel = noise_of(case.noise, rough)
         self._scale = float(np.std(np.diff(rough.gap))) / np.sqrt(2.0) or 1.0
         self.stack = rough
         if free:
