@@ -20,8 +20,8 @@ class Metrics:
 
     ``scale_factor_error`` (over all turns, with its sign), ``scale_factor_error_largest`` (of
     single turns, without), ``scale_factor_nonlinearity`` and ``scale_factor_asymmetry`` in ppm,
-    ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in deg/h, ``turn_on_time`` in s; None
-    where the run does not tell.
+    ``temperature_sensitivity`` in deg/h/degC, ``hysteresis`` in deg/h, ``turn_on_time`` in s (infinite
+    where the bias does not settle within the run); None where the run does not tell.
     """
 
     bias: float

@@ -44,8 +44,9 @@ def turn_on_time(
     Returns
     -------
     float or None
-        None where the averages don't tell: fewer than 8 after power-on, none of them outside the
-        band though the first is not right after power-on, or one outside in the last quarter.
+        Infinite where the last quarter itself leaves the band, so the run does not settle. None
+        where the averages don't tell: fewer than 8 after power-on, or none of them outside the
+        band though the first is not right after power-on.
     """
     on = time_s >= powered_on_s
     time, values = time_s[on], averages[on]
@@ -60,7 +61,7 @@ def turn_on_time(
         return at_once if at_once <= averaging_s else None
     last = int(outside[-1])
     if last >= first_settled - 1:
-        return None
+        return math.inf
     edge = math.copysign(band_deg_h, away[last])
     share = (away[last] - edge) / (away[last] - away[last + 1])
     return float(time[last] + share * (time[last + 1] - time[last]) - powered_on_s)

@@ -8,8 +8,11 @@ import pytest
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
+from fogml.validation.judge import judge
 from fogml.validation.metrics import RunMetrics
+from fogml.validation.report_json import judgement_json
 from fogml.validation.turn_on import turn_on_time
+from tests.validation.known_drift import KnownDrift
 
 AVERAGING_S = 20.0
 
@@ -17,7 +20,7 @@ AVERAGING_S = 20.0
 def warming(tau_s: float = 600.0, start: float = 0.5, powered_on: float | None = 0.0) -> Run:
     time = np.arange(7200.0)
     drift = 3.0 + start * np.exp(-(time - (powered_on or 0.0)) / tau_s)
-    return Run.from_columns("cold.csv", Facts(powered_on=powered_on), time=time, gyro=drift)
+    return Run.from_columns("cold.csv", Facts(powered_on=powered_on), time=time, gyro=drift, T=time)
 
 
 def told(run: Run, band: float | None) -> float | None:
@@ -43,11 +46,19 @@ def test_a_late_excursion_counts():
     assert told(run.with_columns(gyro=run.gyro + bump), 0.05) == pytest.approx(3100.0, abs=AVERAGING_S)
 
 
+def test_a_run_that_does_not_settle_misses_any_limit():
+    run = warming(tau_s=1e5, start=20.0)
+    assert told(run, 0.01) == np.inf
+    model = KnownDrift().fit(run)
+    limits = {"turn_on_time": 1e6}
+    judgement = judge(model, run, [run, warming()], averaging_s=20.0, limits=limits, turn_on_band=0.01)
+    assert not judgement.met
+    assert judgement_json(judgement)["test"][0]["after"]["turn_on_time"] is None
+
+
 def test_what_a_run_does_not_tell_is_not_told():
     assert told(warming(), None) is None
     assert told(warming(powered_on=None), 0.05) is None
-    # Still moving at the end: nothing settled that a band could lie about.
-    assert told(warming(tau_s=1e5, start=20.0), 0.01) is None
     # Settled long before the recording began: the time is not in it.
     late = warming(start=0.0, powered_on=-86400.0)
     assert told(late, 0.05) is None
