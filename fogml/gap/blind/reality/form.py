@@ -35,6 +35,8 @@ class Form(ABC):
         Whether it needs a sensor on both faces.
     records
         Columns that are recorded, for it to be told.
+    fine_sensors
+        Whether it acts by rates or small differences of temperature that take good sensors.
     several_runs
         Whether one run can't show it.
     horizontal
@@ -51,6 +53,7 @@ class Form(ABC):
     demands: ClassVar[Demands] = Demands()
     faces: ClassVar[bool] = False
     records: ClassVar[tuple[str, ...]] = ()
+    fine_sensors: ClassVar[bool] = False
     several_runs: ClassVar[bool] = False
     horizontal: ClassVar[bool] = False
     quick_plant: ClassVar[bool] = False

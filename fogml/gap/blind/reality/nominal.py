@@ -10,6 +10,8 @@ from fogml.gap.blind.reality.recurrences import FloatArray
 
 PRIOR_SD = {"e0": 500.0, "k1": 50.0, "k2": 0.5, "b0": 5.0, "b1": 0.05, "b2": 5e-4, "g": 0.5, "m": 2.0}
 """Standard deviations of the priors about 0, units as `Constants`."""
+WINDOW_S = 64.0
+"""Each of the two windows of DeltaT [s]."""
 FAST_DEG_S = 40.0
 """A fast turn [deg/s]."""
 
@@ -76,7 +78,7 @@ def temperature_slopes(constants: Constants, sample_s: float) -> tuple[float, fl
     At rest, and by the scale factor at `FAST_DEG_S`.
     """
     c = constants
-    held = max(64.0 / sample_s, 1.0)
+    held = max(WINDOW_S / sample_s, 1.0)
     rest = float(np.sqrt(c.b1**2 + 2.0 * c.g**2 + 2.0 * c.m**2 / held))
     return rest, 3600e-6 * FAST_DEG_S * float(np.hypot(c.k1, 50.0 * c.k2))
 
@@ -97,7 +99,7 @@ def columns(seen: Seen, wanted: tuple[str, ...]) -> FloatArray:
     return np.stack([parts[name] for name in wanted], axis=1)
 
 
-def delta_of_record(time: FloatArray, inner: FloatArray, window_s: float = 64.0) -> FloatArray:
+def delta_of_record(time: FloatArray, inner: FloatArray, window_s: float = WINDOW_S) -> FloatArray:
     """Mean of a recorded temperature over the last 64 s less that over the 64 s before, shape (n,).
 
     Samples stand for the interval that ends at them; windows cut by the start take what there is.

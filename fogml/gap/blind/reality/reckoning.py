@@ -11,7 +11,7 @@ from fogml.gap.blind.reality.form import Additive, Distorting
 from fogml.gap.blind.reality.recurrences import FloatArray
 from fogml.gap.blind.reality.strength import Acting, Scales, recorded
 from fogml.gap.blind.reality.unit import Unit, UnitRun
-from fogml.gap.blind.reality.whitening import Projected, Whitening
+from fogml.gap.blind.reality.whitening import Projected
 
 AVERAGING_S = 100.0
 _SHORTEST_S = 600.0
@@ -49,13 +49,8 @@ class Reckoning:
             for run in unit.runs
             for place, effect in enumerate(effects)
         }
-        self._totals = [self.total(run.name, len(run.world.time)) for run in unit.fit]
+        self._totals = [self._signatures(run).sum(axis=1) for run in unit.fit]
         self.d_prime = self._projected.length(self._totals) if effects else 0.0
-
-    def total(self, run: str, count: int) -> FloatArray:
-        """Contribution of all effects to a run [deg/h], shape (count,)."""
-        parts = [s for (name, _), s in self.contributions.items() if name == run]
-        return np.asarray(sum(parts, np.zeros(count)))
 
     def segments(self) -> list[tuple[str, float, float]]:
         """(run, from s, to s) where 100 s averages of the true structural gap exceed the floor.
@@ -75,7 +70,7 @@ class Reckoning:
             square = whitening.mean_square_of_means(self._width) - float(np.mean(np.sum(taken**2, axis=1)))
             floor = np.sqrt(max(square, whitening.white / self._width))
             block = self._width * self.unit.sample_s
-            start = float(run.world.time[0])
+            start = float(run.world.time[self.unit.skipped])
             for first, stop in runs_of(np.abs(gap) > floor):
                 if (stop - first) * block >= _SHORTEST_S:
                     found.append((run.name, start + first * block, start + stop * block))
@@ -83,48 +78,45 @@ class Reckoning:
 
     def closing(self) -> list[Closing]:
         """What the true signatures, fitted on the fit runs with the nominal constants, close."""
-        unit, noisy = self.unit, {}
+        unit = self.unit
+        gaps, plain, wide = {}, {}, {}
         for run in unit.runs:
-            noisy[run.name] = self._gap(run.name)
-        fit = [noisy[r.name][0] for r in unit.fit]
-        plain = [noisy[r.name][1] for r in unit.fit]
-        names = unit.constant_names
-        sd = np.array([nominal.PRIOR_SD[name] for name in names])
-        theta = Projected(self._scales.whitenings, plain).constants(fit, sd)
-        wide = [np.concatenate([x, self._signatures(r.name)], 1) for x, r in zip(plain, unit.fit)]
+            columns = unit.columns(run, recorded(unit, run, self.effects))
+            gaps[run.name] = (recorded_output(unit, run, self.effects) - run.world.rate_deg_h)[unit.skipped :]
+            plain[run.name] = columns
+            wide[run.name] = np.concatenate([columns, self._signatures(run)], axis=1)
+        sd = np.array([nominal.PRIOR_SD[name] for name in unit.constant_names])
         loose = np.concatenate([sd, np.full(len(self.effects), np.inf)])
-        both = Projected(self._scales.whitenings, wide).constants(fit, loose)
-        return [self._closed(r.name, noisy[r.name], theta, both) for r in unit.held_out]
+        fit = [gaps[r.name] for r in unit.fit]
 
-    def _closed(
-        self, name: str, noisy: tuple[FloatArray, FloatArray], theta: FloatArray, both: FloatArray
-    ) -> Closing:
-        gap, columns = noisy
-        whitening = Whitening(self.unit.noise, len(gap), self.unit.sample_s)
-        recalibrated = mean_square(gap - columns @ theta, self._width)
-        after = mean_square(gap - np.concatenate([columns, self._signatures(name)], 1) @ both, self._width)
+        def residuals(columns: dict[str, FloatArray], sd: FloatArray) -> dict[str, FloatArray]:
+            projected = Projected(self._scales.whitenings, [columns[r.name] for r in unit.fit])
+            theta = projected.constants(fit, sd)
+            return {r.name: gaps[r.name] - columns[r.name] @ theta for r in unit.held_out}
+
+        before, after = residuals(plain, sd), residuals(wide, loose)
+        return [self._closed(r, before[r.name], after[r.name]) for r in unit.held_out]
+
+    def _closed(self, run: UnitRun, before: FloatArray, behind: FloatArray) -> Closing:
+        whitening = self.unit.whitening(run)
+        recalibrated = mean_square(before, self._width)
+        after = mean_square(behind, self._width)
         floor = whitening.mean_square_of_means(self._width)
         white = whitening.white / self._width
-        blocks = len(gap) // self._width
+        blocks = len(before) // self._width
         # The slow part of the noise has about two degrees of freedom in a run.
         spread = np.sqrt(2.0 * white**2 / blocks + (floor - white) ** 2)
         gained = recalibrated - floor
         closed = (recalibrated - after) / gained if self.effects and gained > 1.645 * spread else None
         return Closing(
-            name, float(np.sqrt(recalibrated)), float(np.sqrt(after)), float(np.sqrt(floor)), closed
+            run.name, float(np.sqrt(recalibrated)), float(np.sqrt(after)), float(np.sqrt(floor)), closed
         )
 
-    def _signatures(self, name: str) -> FloatArray:
-        series = [self.contributions[name, place] for place in range(len(self.effects))]
-        count = len(next(r for r in self.unit.runs if r.name == name).world.time)
-        return np.stack(series, axis=1) if series else np.empty((count, 0))
-
-    def _gap(self, name: str) -> tuple[FloatArray, FloatArray]:
-        """Recorded output less the rate about the input axis, and the nominal columns of the record."""
-        unit = self.unit
-        run = next(r for r in unit.runs if r.name == name)
-        columns = unit.columns(run, recorded(unit, run, self.effects))
-        return recorded_output(unit, run, self.effects) - run.world.rate_deg_h, columns
+    def _signatures(self, run: UnitRun) -> FloatArray:
+        """Contributions of the effects side by side, on the rows that count."""
+        series = [self.contributions[run.name, place] for place in range(len(self.effects))]
+        whole = np.stack(series, axis=1) if series else np.empty((len(run.world.time), 0))
+        return whole[self.unit.skipped :]
 
 
 def recorded_output(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> FloatArray:

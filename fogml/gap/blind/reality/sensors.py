@@ -11,7 +11,7 @@ from fogml.gap.blind.reality.world import World
 
 Layout = str
 """``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4."""
-_REST, _TURN, _LAGGING = 0.15, 0.5, 0.05
+_REST, _TURN, _LAGGING = 0.04, 0.3, 0.05
 """What the sensors' noise at rest, in turns, and their lag in turns may add, relative to white noise."""
 _SOAK_RATE = 0.1 / 60.0
 """Rate of temperature in the soaks that turns lie in [degC/s]."""
@@ -67,7 +67,8 @@ class Instruments:
         """
         noise = np.hypot(self.noise, self.resolution / np.sqrt(12.0))
         share = min(1.0, _REST * white / (noise * slope), _TURN * white / (noise * turning_slope + 1e-30))
-        steps = [q for q in (1e-2, 1e-3, 1e-4) if q <= self.resolution * max(share, 1e-2)]
+        wanted = self.resolution * max(share, 1e-3)
+        steps = [q for q in (1e-2, 1e-3, 1e-4) if q <= wanted]
         lag_share = min(1.0, _LAGGING * white / (self.lag_s * _SOAK_RATE * turning_slope + 1e-30))
         return replace(
             self,
@@ -77,10 +78,12 @@ class Instruments:
         )
 
 
-def draw_instruments(rng: np.random.Generator, faces: bool, needed: tuple[str, ...]) -> Instruments:
+def draw_instruments(
+    rng: np.random.Generator, faces: bool, fine: bool, needed: tuple[str, ...]
+) -> Instruments:
     """A unit's instruments: what its effects need, and others by chance.
 
-    `faces` asks for both faces of the coil, `needed` for further columns.
+    `faces` asks for both faces of the coil, `fine` for good sensors, `needed` for further columns.
     """
     layout = str(rng.choice(["two", "four"] if faces else ["one", "two", "two", "four"]))
     chance = {"T_case": 0.5, "T_chamber": 0.5, "T_electronics": 0.35, "supply": 0.2, "humidity": 0.2}
@@ -90,9 +93,8 @@ def draw_instruments(rng: np.random.Generator, faces: bool, needed: tuple[str, .
     return Instruments(
         layout=layout,
         others=others,
-        # What acts by the small difference of the faces takes sensors that tell it.
-        noise=float(rng.uniform(0.0005, 0.002) if faces else rng.uniform(0.002, 0.008)),
-        resolution=float(rng.choice([0.001, 0.001 if faces else 0.01])),
+        noise=float(rng.uniform(0.0005, 0.002) if fine else rng.uniform(0.002, 0.008)),
+        resolution=float(rng.choice([0.001, 0.001 if fine else 0.01])),
         lag_s=float(rng.uniform(0.3, 2.0)),
     )
 

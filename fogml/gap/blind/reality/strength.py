@@ -10,7 +10,7 @@ from fogml.gap.blind.reality import nominal
 from fogml.gap.blind.reality.form import Additive, Distorting, Form, Sensing, Shape
 from fogml.gap.blind.reality.recurrences import FloatArray
 from fogml.gap.blind.reality.unit import Unit, UnitRun
-from fogml.gap.blind.reality.whitening import Projected, Whitening
+from fogml.gap.blind.reality.whitening import Projected
 
 _LEAST_OUTSIDE = 0.02
 """Share of an effect's whitened length that must lie outside the nominal constants' span."""
@@ -61,7 +61,7 @@ class Scales:
 
     def __init__(self, unit: Unit) -> None:
         self.unit = unit
-        self.whitenings = [Whitening(unit.noise, len(r.world.time), unit.sample_s) for r in unit.fit]
+        self.whitenings = [unit.whitening(r) for r in unit.fit]
 
     def projected(self, effects: tuple[Acting, ...] = ()) -> Projected:
         """Nominal columns as a replay has them, from what the sensors recorded under `effects`."""
@@ -71,7 +71,7 @@ class Scales:
     def d_prime(self, effect: Acting, projected: Projected | None = None) -> float:
         """||W (I - P) s|| over the fit runs."""
         projected = projected or self.projected((effect,) if isinstance(effect.form, Sensing) else ())
-        return projected.length([effect.contribution(self.unit, r) for r in self.unit.fit])
+        return projected.length(self._series(effect))
 
     def with_strength(self, form: Form, shape: Shape, sign: float, wanted: float) -> Acting:
         """The effect at the amplitude that gives d' = `wanted`, by bisection where it is not linear.
@@ -84,7 +84,7 @@ class Scales:
         if isinstance(form, Additive):
             one = Acting(form, shape, 1.0)
             projected = self.projected()
-            series = [one.contribution(self.unit, r) for r in self.unit.fit]
+            series = self._series(one)
             length = projected.length(series)
             whole = sum(float(s @ w.solve(s[:, None])[:, 0]) for s, w in zip(series, self.whitenings))
             if not length > _LEAST_OUTSIDE * np.sqrt(whole):
@@ -114,3 +114,7 @@ class Scales:
             # A form with steps jumps over the wanted strength.
             raise TooWeak(form.name)
         return Acting(form, shape, float(np.exp(middle)), reached)
+
+    def _series(self, effect: Acting) -> list[FloatArray]:
+        """Its contributions to the fit runs, on the rows that count."""
+        return [effect.contribution(self.unit, r)[self.unit.skipped :] for r in self.unit.fit]

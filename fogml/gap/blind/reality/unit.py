@@ -14,6 +14,7 @@ from fogml.gap.blind.reality.plant import Plant, draw_plant
 from fogml.gap.blind.reality.programme import Demands, Programme, draw_programme, static_programme
 from fogml.gap.blind.reality.recurrences import FloatArray
 from fogml.gap.blind.reality.sensors import Instruments, Sensed, draw_instruments, faces, sense
+from fogml.gap.blind.reality.whitening import Whitening
 from fogml.gap.blind.reality.world import SetUp, World, happen
 
 _STATIC_FACTOR = 1.3
@@ -94,9 +95,22 @@ class Unit:
         """Nominal constants that show in the runs."""
         return nominal.names(self.turning, self.instruments.two_faces)
 
+    @property
+    def skipped(self) -> int:
+        """Rows at a run's start that count for nothing: the windows of DeltaT are not full there."""
+        return int(np.ceil(2.0 * nominal.WINDOW_S / self.sample_s))
+
     def columns(self, run: UnitRun, recorded: dict[str, FloatArray]) -> FloatArray:
-        """Responses of a replay of `recorded` temperatures to the nominal constants, shape (n, p)."""
-        return nominal.columns(self.seen(run, recorded), self.constant_names)
+        """Responses of a replay of `recorded` temperatures to the nominal constants, on the rows that count.
+
+        Shape (n - skipped, p).
+        """
+        return nominal.columns(self.seen(run, recorded), self.constant_names)[self.skipped :]
+
+    def whitening(self, run: UnitRun) -> Whitening:
+        """The true whitening of a run's rows that count."""
+        count = len(run.world.time) - self.skipped
+        return Whitening(self.noise, count, self.sample_s, before=self.skipped)
 
 
 def compatible(forms: Sequence[type[Form]]) -> bool:
@@ -120,7 +134,8 @@ def draw_unit(
     """A unit whose programmes and instruments show the given forms; `runs` to fit on, one held out."""
     quick = any(f.quick_plant for f in forms)
     needed = tuple(dict.fromkeys(column for f in forms for column in f.records))
-    instruments = draw_instruments(rng, any(f.faces for f in forms), needed)
+    fine = any(f.fine_sensors for f in forms)
+    instruments = draw_instruments(rng, any(f.faces for f in forms), fine, needed)
     plant = Plant(draw_plant(rng, quick))
     constants = nominal.draw_constants(rng, instruments.two_faces)
     noise = draw_noise(rng)

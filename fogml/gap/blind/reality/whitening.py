@@ -46,10 +46,13 @@ def flicker_ladder(length: int) -> Ladder:
 
 
 class Whitening:
-    """The noise of one run of `count` samples at `sample_s`, as its inverse covariance."""
+    """The noise of one run of `count` samples at `sample_s`, as its inverse covariance.
 
-    def __init__(self, constants: NoiseConstants, count: int, sample_s: float) -> None:
-        self.count = count
+    The random walk began `before` samples before the first of them.
+    """
+
+    def __init__(self, constants: NoiseConstants, count: int, sample_s: float, before: int = 0) -> None:
+        self.count, self._before = count, before
         self._hours = hours = sample_s / 3600.0
         self.constants = constants
         ladder = flicker_ladder(record_length(count))
@@ -57,7 +60,7 @@ class Whitening:
         self._variance = constants.B**2 * ladder.variance
         self._step = np.concatenate([self._variance * (1.0 - ladder.decay**2), [constants.K**2 * hours]])
         self._step = np.maximum(self._step, 1e-18)
-        self._first = np.concatenate([self._variance, [constants.K**2 * hours]])
+        self._first = np.concatenate([self._variance, [constants.K**2 * hours * (before + 1)]])
         self._first = np.maximum(self._first, 1e-18)
         self.white = constants.N**2 / hours + constants.B**2 * ladder.white
 
@@ -95,7 +98,7 @@ class Whitening:
         means = (np.sin(width * half) / (width * np.sin(half))) ** 2
         flicker = self.constants.B**2 / np.pi * float(np.sum(means / np.arange(1, length // 2 + 1)))
         step = self.constants.K**2 * self._hours
-        first = width * np.arange(blocks)
+        first = self._before + width * np.arange(blocks)
         pair = np.minimum.outer(np.arange(1, width + 1), np.arange(1, width + 1)).mean()
         white = self.constants.N**2 / self._hours / width
         return float(white + flicker + step * np.mean(first + pair))

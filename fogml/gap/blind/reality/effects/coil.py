@@ -39,6 +39,7 @@ class ShupeShells(Additive):
     """Shupe's integral over all shells of the winding."""
 
     name, form, unit, faces = "shupe_pure", "integral over shells", "deg/h/(degC/min)", True
+    fine_sensors = True
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Cubic part of the weights over the thickness."""
@@ -110,7 +111,7 @@ class Leads(Additive):
     """Leads along the way from the electronics to the hub and to the case."""
 
     name, form, unit = "pigtail_shupe", "leads past hub and case", "m"
-    records = ("T_electronics", "T_case")
+    records, fine_sensors = ("T_electronics", "T_case"), True
     demands = Demands(power_steps=True)
 
     def draw(self, rng: np.random.Generator) -> Shape:
@@ -128,6 +129,7 @@ class SideWind(Additive):
     """A gradient across the coil's diameter, from air that blows from one side."""
 
     name, form, unit, faces = "azimuthal_gradient", "integral over shells", "deg/h/(degC/min)", True
+    fine_sensors = True
     demands = Demands(slow_turns=True)
     records = ("angle",)
 

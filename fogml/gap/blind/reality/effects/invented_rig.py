@@ -16,6 +16,7 @@ class StickySensor(Sensing):
     """One of several sensor elements repeats its last value for minutes, again and again."""
 
     name, known, form, faces = "sticky_sensor", False, "values held for minutes", True
+    fine_sensors = True
     greatest: ClassVar[float] = 1.0
 
     def draw(self, rng: np.random.Generator) -> Shape:

@@ -14,7 +14,7 @@ from fogml.gap.blind.reality.world import World
 class LagOfTwoStages(Sensing):
     """A sensor behind glue and housing: two stages of lag."""
 
-    name, form, unit = "sensor_lag", "two stages", "s"
+    name, form, unit, fine_sensors = "sensor_lag", "two stages", "s", True
     greatest: ClassVar[float] = 900.0
 
     def draw(self, rng: np.random.Generator) -> Shape:
@@ -49,7 +49,7 @@ class CoarseSteps(Sensing):
 class Elsewhere(Sensing):
     """Sensors that feel the case as well, the outer ones more."""
 
-    name, form, unit = "sensor_placement", "outer sensors more", "1"
+    name, form, unit, fine_sensors = "sensor_placement", "outer sensors more", "1", True
     records = ("T_case",)
     greatest: ClassVar[float] = 1.0
 
