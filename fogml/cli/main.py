@@ -23,6 +23,7 @@ COMMANDS = {
     "train": ("fogml.cli.train", "Fit a drift model on some runs and judge it on others."),
     "compare": ("fogml.cli.compare", "Judge every model and baseline on the same split, in one table."),
     "compensate": ("fogml.cli.compensate", "Apply a model to a run of any length, in bounded memory."),
+    "export": ("fogml.cli.export", "Compact weights or C code, checked against the model."),
     "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
     "sweep": ("fogml.cli.sweep", "Search features, models and sizes on held-out parts of the training runs."),
     "lab": ("fogml.cli.lab", "Procedures of a laboratory: misalignment, north seeking."),

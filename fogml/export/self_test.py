@@ -89,7 +89,7 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
     period = max(_PERIOD, full_at)
     first, rise, jump = np.zeros((3, len(plan.sensors)))
     for i, sensor in enumerate(plan.sensors):
-        low, high, fastest = _range(plan, sensor)
+        low, high, fastest = sensor_range(plan, sensor)
         first[i] = low + 0.3 * (high - low)
         rise[i] = min(0.4 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
         jump[i] = 0.9 * (high - low) + 3.0
@@ -122,7 +122,7 @@ def _interval(plan: Plan, windows: Layout) -> tuple[float, int]:
     return count * plan.sample_s, int(np.ceil(needed_s / (count * plan.sample_s))) + 2
 
 
-def _range(plan: Plan, sensor: str) -> tuple[float, float, float]:
+def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
     """Lowest and highest value of a sensor [degC] in the trained box, and its fastest rate [degC/min]."""
     low, high, fastest = 10.0, 40.0, np.inf
     for i, atom in enumerate(plan.atoms):

@@ -1,0 +1,176 @@
+"""How far an export is from the model: measured before anything is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.export.c_program import CProgram
+from fogml.export.c_source import CSource
+from fogml.export.plan import Plan
+from fogml.export.points import POINTS, box_points, history
+from fogml.models.base import DriftModel
+
+FloatArray = NDArray[np.float64]
+_BEYOND = 0.2
+_TURN_DEG_H = 36_000.0
+
+
+@dataclass(frozen=True)
+class Difference:
+    """Largest differences of an export from the model [deg/h].
+
+    Attributes
+    ----------
+    inside
+        In the trained box, windows full or not.
+    outside
+        Up to a fifth of the span outside of it, where it is flagged.
+    points, samples
+        Points in the box and samples of a history that were compared.
+    flags
+        Samples of the history whose flag differs.
+    scale_ppm
+        Of a joint model, the difference at 10 deg/s as a share of that.
+    """
+
+    inside: float
+    outside: float
+    points: int
+    samples: int = 0
+    flags: int = 0
+    scale_ppm: float | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """JSON-ready values."""
+        values: dict[str, Any] = {
+            "largest_difference": self.inside,
+            "largest_difference_outside": self.outside,
+            "compared": {"points": self.points, "samples": self.samples, "flags_differ": self.flags},
+        }
+        if self.scale_ppm is not None:
+            values["scale_difference_ppm"] = self.scale_ppm
+        return values
+
+
+def plan_error(plan: Plan, model: DriftModel, seed: int) -> float:
+    """Largest difference between a plan and the model it was made of [deg/h], over a history."""
+    past = history(plan, seed)
+    run = past.run(plan)
+    atoms, full = past.atoms(plan)
+    value, _ = plan.compensated(atoms, full, past.gyro)
+    model = getattr(model, "chosen_", model)
+    evaluation = model.evaluate_atoms(run, atoms, full)
+    gyro = run.gyro if plan.form == "joint" else run.gyro_deg_h
+    if plan.gyro_unit == "count":
+        # The run's facts hold no scale factor; the rate is what the model makes of the counts.
+        rate = model.regressor_.predict_unchecked(
+            model._columns(np.column_stack((gyro, plan.limited(atoms, full)[0])))
+        )  # type: ignore[attr-defined]
+        return float(np.max(np.abs(value - rate)))
+    return float(np.max(np.abs(value - (gyro - evaluation.drift))))
+
+
+def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> Difference:
+    """Difference of generated C from a plan, at points and over a history with gaps."""
+    fixed = source.numbers["fixed"]
+    gyro_step = fixed["gyro_value"] if fixed else None
+    past = history(plan, seed)
+    gyro = past.gyro if gyro_step is None else np.round(past.gyro / gyro_step) * gyro_step
+    atoms, full = past.atoms(plan)
+    expected, flags = plan.compensated(atoms, full, gyro)
+    if fixed:
+        time = np.round(past.time * 1e6).astype(np.int64)
+        temperatures = np.round(past.temperatures / fixed["temperature_value"])
+        most = fixed["temperature_most"]
+        out, told = program.steps(time, np.clip(temperatures, -most, most), np.round(gyro / gyro_step))
+        out = out * fixed["compensated_value"]
+    else:
+        out, told = program.steps(past.time, past.temperatures, gyro)
+    off = np.abs(out.astype(np.float64) - expected)
+    inside, outside = _largest(off[flags != 1]), _largest(off[flags == 1])
+    count = len(off)
+    differ = int(np.count_nonzero(told != flags))
+    if not plan.atoms:
+        return Difference(inside, outside, 0, count, differ)
+    near = _atoms_off(plan, source, program, box_points(plan, seed), gyro[0])
+    far = _atoms_off(plan, source, program, box_points(plan, seed, _BEYOND), gyro[0])
+    ppm = None
+    if plan.form == "joint":
+        turn = float(
+            np.round(_TURN_DEG_H / plan.arrays["scale"][0] / (gyro_step or 1e-9)) * (gyro_step or 1e-9)
+        )
+        ppm = 1e6 * _largest(_atoms_off(plan, source, program, box_points(plan, seed), turn)) / _TURN_DEG_H
+    return Difference(max(inside, _largest(near)), max(outside, _largest(far)), POINTS, count, differ, ppm)
+
+
+def _atoms_off(plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, gyro: float) -> FloatArray:
+    fixed = source.numbers["fixed"]
+    output = np.full(len(atoms), gyro)
+    expected, _ = plan.compensated(atoms, np.ones(len(atoms), dtype=np.bool_), output)
+    if fixed is None:
+        out, _ = program.atoms(atoms, output)
+        return np.abs(out.astype(np.float64) - expected)
+    whole = np.round(atoms * 2.0 ** np.array(fixed["atom_bits"]))
+    out, _ = program.atoms(np.clip(whole, 1 - 2**31, 2**31 - 1), np.round(output / fixed["gyro_value"]))
+    return np.abs(out * fixed["compensated_value"] - expected)
+
+
+def value_difference(
+    plan: Plan, value: Callable[[FloatArray, FloatArray], FloatArray], seed: int
+) -> Difference:
+    """Difference of a function of (feature columns, output) from a plan's drift."""
+    sizes = []
+    for beyond in (0.0, _BEYOND):
+        atoms = box_points(plan, seed, beyond)
+        columns = plan.compose(plan.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
+        gyro = np.full(len(atoms), 10.0 / (plan.arrays["scale"][0] if plan.form == "joint" else 1.0))
+        sizes.append(_largest(np.abs(value(columns, gyro) - plan.value(columns, gyro))))
+    return Difference(sizes[0], sizes[1], POINTS)
+
+
+def pipeline_difference(
+    plan: Plan, value: Callable[[FloatArray, FloatArray], FloatArray], length: int, seed: int
+) -> Difference:
+    """Difference of a function of (windows (n, m, s), output (n,)) from a plan's drift, over a history."""
+    past = history(plan, seed)
+    # A window knows nothing of gaps: the history on its grid is what it is made for.
+    count = 1 + round((past.time[-1] - past.time[0]) / plan.sample_s)
+    time = past.time[0] + plan.sample_s * np.arange(count)
+    temperatures = np.column_stack([np.interp(time, past.time, path) for path in past.temperatures.T])
+    whole = type(past)(time, temperatures, np.full(count, past.gyro[0]))
+    atoms, full = whole.atoms(plan)
+    expected, flags = plan.compensated(atoms, full, whole.gyro)
+    ends = np.linspace(length, count - 1, min(512, max(1, count - length))).astype(int)
+    windows = np.stack([temperatures[end - length + 1 : end + 1] for end in ends])
+    off = np.abs(whole.gyro[ends] - value(windows, whole.gyro[ends]) - expected[ends])
+    inside = flags[ends] == 0
+    return Difference(_largest(off[inside]), _largest(off[~inside]), 0, len(ends))
+
+
+def _largest(off: NDArray[Any]) -> float:
+    if not np.all(np.isfinite(off)):
+        return float("inf")
+    return float(np.max(off, initial=0.0))
+
+
+def expected_outputs(source: CSource, program_folder: Path) -> tuple[list[float], list[int]]:
+    """What the compiled source gives at the checks of its self-test, in the numbers of the code."""
+    test = source.self_test
+    program = CProgram(source, program_folder)
+    kind = {"float64": np.float64, "float32": np.float32}.get(source.dtype, np.int64)
+    step = np.arange(test.steps)
+    fold = step % (2 * test.period)
+    phase = np.where(fold < test.period, fold, 2 * test.period - fold).astype(kind)
+    first, rise, jump = (np.asarray(values).astype(kind) for values in (test.first, test.rise, test.jump))
+    temperatures = first + rise * phase[:, None]
+    temperatures[test.checks[-1] :] += jump
+    time = step.astype(kind) * np.asarray(test.interval).astype(kind)
+    out, flags = program.steps(time, temperatures, np.full(len(step), np.asarray(test.gyro).astype(kind)))
+    checks = list(test.checks)
+    return [float(value) for value in out[checks]], [int(flag) for flag in flags[checks]]

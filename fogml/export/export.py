@@ -1,0 +1,349 @@
+"""Exporting a fitted model: made small, written in one form, compared with the model, refused if too far off."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml import __version__
+from fogml.errors import InputError
+from fogml.export.c_program import CProgram, cortex_m4_size
+from fogml.export.c_source import C_DTYPES, c_source
+from fogml.export.check import (
+    Difference,
+    c_difference,
+    expected_outputs,
+    pipeline_difference,
+    plan_error,
+    value_difference,
+)
+from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
+from fogml.export.operations import operations_per_sample
+from fogml.export.plan import Plan
+from fogml.export.points import box_points
+from fogml.export.prune import pruned
+from fogml.export.storage import FILE_DTYPES, stored_plan, weight_bytes
+from fogml.models.base import DriftModel
+from fogml.runs.run import Run
+
+FloatArray = NDArray[np.float64]
+SCHEMA = "fogml.export/1"
+Target = Literal["c", "onnx", "json", "mat"]
+TARGETS: tuple[str, ...] = get_args(Target)
+DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
+ONNX_FILE = "fogml_model.onnx"
+
+TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
+"""Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
+LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
+"""The same, at least [deg/h]."""
+_MOST_SCALE_PPM = 1.0
+_PLAN_NOISE = 1e-9
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """What is wanted.
+
+    Attributes
+    ----------
+    to
+        ``c``, ``onnx``, ``json`` or ``mat``.
+    dtype
+        Number format; None: ``float32`` for C, else ``float64``.
+    budget
+        Most bytes that the numbers may take; None for all of them.
+    tolerance
+        Largest difference from the model allowed [deg/h]; None: a share of the model's interval.
+    pipeline
+        Of ONNX: from the temperatures' window instead of features.
+    sample_s
+        Sample interval to run at [s]; None: that of training.
+    seed
+        Seed of the points that are compared.
+    """
+
+    to: str = "c"
+    dtype: str | None = None
+    budget: int | None = None
+    tolerance: float | None = None
+    pipeline: bool = False
+    sample_s: float | None = None
+    seed: int = 0
+
+
+def export_model(
+    model: DriftModel, folder: Path, settings: ExportSettings, train: Sequence[Run] = ()
+) -> dict[str, Any]:
+    """Write a fitted model's compact form into a folder, once it has been compared with the model.
+
+    Parameters
+    ----------
+    model
+        The model.
+    folder
+        An existing folder.
+    settings
+        What is wanted.
+    train
+        The model's training runs, for pruning and for the loss of accuracy on them; may be left out.
+
+    Returns
+    -------
+    dict
+        The content of ``export.json``.
+
+    Raises
+    ------
+    InputError
+        If the form can't hold the model, or differs from it by more than the tolerance.
+    """
+    dtype = settings.dtype or ("float32" if settings.to == "c" else "float64")
+    _check(settings, dtype)
+    whole = Plan.of(model, settings.sample_s)
+    _agreeing(whole, model, settings.seed)
+    rows = training_rows(model, whole, train) if train else None
+    plan, pruning = _pruned(whole, settings, dtype, rows)
+    card = _card(model, plan, pruning)
+    if settings.to == "c":
+        report, exported = _write_c(plan, folder, dtype, card, settings.seed)
+    else:
+        report, exported = _write_numbers(plan, folder, dtype, settings, card, rows)
+    difference: Difference = report.pop("difference")
+    tolerance = settings.tolerance
+    if tolerance is None:
+        half_width = float(model.intervals_.half_width(0.9))
+        tolerance = max(LEAST_TOLERANCE[dtype], TOLERANCE_SHARE[dtype] * half_width)
+    total = difference.inside + (
+        pruning["largest_difference"] if pruning and settings.tolerance is not None else 0.0
+    )
+    _within(total, difference, tolerance, settings, dtype)
+    return {
+        "schema": SCHEMA,
+        "to": settings.to,
+        "dtype": dtype,
+        "bytes_weights": weight_bytes(plan, dtype, settings.to == "c"),
+        **difference.as_dict(),
+        "tolerance": tolerance,
+        "unit": "deg/h",
+        "operations_per_sample": operations_per_sample(plan),
+        "model": {"kind": plan.kind, "features": list(plan.names), "centres": plan.centres},
+        "sensors": list(plan.sensors),
+        "sample_s": plan.sample_s,
+        **({"pruning": pruning} if pruning else {}),
+        "accuracy": accuracy_loss(whole, exported, rows, model.intervals_.averaging_s, settings.seed),
+        **report,
+        "files": sorted(path.name for path in folder.iterdir()),
+        "fogml_version": __version__,
+    }
+
+
+def _check(settings: ExportSettings, dtype: str) -> None:
+    if settings.to not in TARGETS:
+        raise InputError(f"--to '{settings.to}' is not known; known are {', '.join(TARGETS)}")
+    if dtype not in DTYPES:
+        raise InputError(f"--dtype '{dtype}' is not known; known are {', '.join(DTYPES)}")
+    allowed = C_DTYPES if settings.to == "c" else FILE_DTYPES
+    if dtype not in allowed:
+        other = "for --to onnx, json and mat" if settings.to == "c" else "for --to c"
+        raise InputError(f"--dtype {dtype} is {other}; --to {settings.to} takes {', '.join(allowed)}")
+    if settings.pipeline and settings.to != "onnx":
+        raise InputError("--with-pipeline is for --to onnx; C code always takes raw temperatures")
+    if settings.budget is not None and settings.budget < 1:
+        raise InputError(f"--bytes {settings.budget}: a positive number was expected")
+    if settings.tolerance is not None and not settings.tolerance >= 0.0:
+        raise InputError(f"--tolerance {settings.tolerance}: a number of deg/h from 0 was expected")
+
+
+def _agreeing(plan: Plan, model: DriftModel, seed: int) -> None:
+    """Hold that the plan is the model: otherwise every check against the plan would be void."""
+    error = plan_error(plan, model, seed)
+    size = 1.0 + sum(float(np.abs(values).sum()) for name, values in plan.arrays.items() if name == "weights")
+    if not error <= _PLAN_NOISE * size:
+        raise InputError(
+            f"export: the model's plain form differs from the model by {error:.3g} deg/h; it is too badly "
+            "conditioned to be written down: train it again with fewer terms"
+        )
+
+
+def _pruned(
+    whole: Plan, settings: ExportSettings, dtype: str, rows: TrainingRows | None
+) -> tuple[Plan, dict[str, Any] | None]:
+    if settings.budget is None:
+        return whole, None
+    points = box_points(whole, settings.seed) if rows is None else rows.atoms
+    full = np.ones(len(points), dtype=np.bool_)
+    columns = whole.compose(whole.limited(points, full)[0])
+    target = whole.value(columns) if rows is None or whole.form == "joint" else rows.target
+    plan = pruned(whole, settings.budget, dtype, settings.to == "c", columns, target)
+    if plan is whole:
+        return whole, None
+    atoms = points[:, [whole.atoms.index(atom) for atom in plan.atoms]]
+    off = plan.value(plan.compose(plan.limited(atoms, full)[0])) - whole.value(columns)
+    return plan, {
+        "bytes_asked": settings.budget,
+        "bytes_whole": weight_bytes(whole, dtype, settings.to == "c"),
+        "chosen_on": "training runs" if rows is not None else "points in the trained box",
+        "centres": [whole.centres, plan.centres],
+        "terms": [len(whole.names), len(plan.names)],
+        "rms_difference": float(np.sqrt(np.mean(off**2))),
+        "largest_difference": float(np.max(np.abs(off))),
+    }
+
+
+def _within(
+    total: float, difference: Difference, tolerance: float, settings: ExportSettings, dtype: str
+) -> None:
+    if not total <= tolerance:
+        raise InputError(
+            f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, more "
+            f"than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or state "
+            "--tolerance if that is good enough. Nothing was written"
+        )
+    if (
+        difference.scale_ppm is not None
+        and settings.tolerance is None
+        and difference.scale_ppm > _MOST_SCALE_PPM
+    ):
+        raise InputError(
+            f"export: in {dtype} the scale factor differs by up to {difference.scale_ppm:.3g} ppm, more than "
+            f"{_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
+        )
+
+
+def _card(model: DriftModel, plan: Plan, pruning: dict[str, Any] | None) -> dict[str, Any]:
+    card = model.card_
+    return {
+        "kind": plan.kind,
+        "features": list(plan.names),
+        "unit": card.unit,
+        "axis": card.axis,
+        "training_runs": [{"name": run.name, "sha256": run.sha256} for run in card.runs],
+        "fogml_version": card.fogml_version,
+        "box": {
+            atom.text: [float(plan.limits.box_low[i]), float(plan.limits.box_high[i])]
+            for i, atom in enumerate(plan.atoms)
+        },
+        "half_width_90_deg_h": float(model.intervals_.half_width(0.9)),
+        "averaging_s": model.intervals_.averaging_s,
+        "earth_known": card.earth_known,
+        **({"pruned_to_bytes": pruning["bytes_asked"]} if pruning else {}),
+    }
+
+
+def _card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
+    """The card as lines of a C comment."""
+
+    def safe(text: object) -> str:
+        return str(text).replace("*/", "* /").replace("\n", " ").encode("ascii", "replace").decode()
+
+    runs = card["training_runs"]
+    lines = [
+        f"gyro          {safe(card['unit'] or 'not stated')}, axis {safe(card['axis'] or 'not stated')}",
+        *(f"trained on    {safe(run['name'])}, SHA-256 {run['sha256'][:16]}..." for run in runs),
+        f"features      {', '.join(plan.names) or 'none'}",
+        *(
+            f"trained box   {safe(name)}: {low:.6g} to {high:.6g}"
+            for name, (low, high) in card["box"].items()
+        ),
+        f"accuracy      90 % of {card['averaging_s']:g} s averages within {card['half_width_90_deg_h']:.3g} deg/h, by parts of the training runs",
+        "              that were left out; outside the trained box it is not known",
+        f"numbers       {dtype}"
+        + (f", pruned to {card['pruned_to_bytes']} bytes of weights" if "pruned_to_bytes" in card else ""),
+    ]
+    if not card["earth_known"]:
+        lines.append("earth rate    not known in training: its part along the axis is taken for drift")
+    return lines
+
+
+def _write_c(
+    plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
+) -> tuple[dict[str, Any], Plan]:
+    source = c_source(plan, dtype, _card_lines(card, plan, dtype))
+    with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
+        source = source.with_expected(*expected_outputs(source, Path(scratch)))
+        program = CProgram(source, Path(scratch))
+        if program.self_test() != 0:
+            raise InputError("export: the generated C fails its own self-test on this machine")
+        difference = c_difference(plan, source, program, seed)
+        size = cortex_m4_size(source, Path(scratch))
+    for name, text in source.files.items():
+        (folder / name).write_text(text, encoding="ascii")
+    fixed = source.numbers["fixed"]
+    report: dict[str, Any] = {"difference": difference, "cortex_m4": size}
+    if plan.centres:
+        report["exp_error"] = source.numbers["exp_error"]
+    if fixed:
+        report["fixed_point"] = {
+            "temperature_unit_degc": fixed["temperature_value"],
+            "gyro_unit": fixed["gyro_value"],
+            "compensated_unit_deg_h": fixed["compensated_value"],
+        }
+    return report, plan
+
+
+def _write_numbers(
+    plan: Plan,
+    folder: Path,
+    dtype: str,
+    settings: ExportSettings,
+    card: dict[str, Any],
+    rows: TrainingRows | None,
+) -> tuple[dict[str, Any], Plan]:
+    from fogml.export import number_files
+
+    inputs = _own_atoms(plan, settings.seed, rows)
+    columns = plan.compose(plan.limited(inputs, np.ones(len(inputs), dtype=np.bool_))[0])
+    stored, exported = stored_plan(plan, dtype, columns)
+    seed = settings.seed
+    if settings.to == "onnx":
+        return {"difference": _write_onnx(plan, folder, dtype, settings, stored, card)}, exported
+    if settings.to == "json":
+        number_files.write_json(folder, plan, stored, dtype, card)
+        read = number_files.read_json(folder, plan)
+    else:
+        number_files.write_mat(folder, plan, stored, dtype, card)
+        read = (number_files.read_mat(folder, plan),)
+    differences = [value_difference(plan, lambda c, g, p=p: p.value(c, g), seed) for p in read]  # type: ignore[misc]
+    return {"difference": max(differences, key=lambda difference: difference.inside)}, exported
+
+
+def _own_atoms(plan: Plan, seed: int, rows: TrainingRows | None) -> FloatArray:
+    if rows is None:
+        return box_points(plan, seed)
+    return rows.atoms_of(plan)
+
+
+def _write_onnx(
+    plan: Plan, folder: Path, dtype: str, settings: ExportSettings, stored: Any, card: dict[str, Any]
+) -> Difference:
+    from fogml.export.onnx_graph import onnx_model, window_weights
+
+    try:
+        from onnxruntime import InferenceSession
+    except ImportError:
+        raise InputError("export: onnxruntime is not installed; pip install 'fogml[export]'") from None
+    model = onnx_model(plan, stored, dtype, settings.pipeline, "\n".join(_card_lines(card, plan, dtype)))
+    data = model.SerializeToString()
+    session = InferenceSession(data, providers=["CPUExecutionProvider"])
+    real = np.float64 if dtype == "float64" else np.float32
+
+    def run(inputs: FloatArray, gyro: FloatArray) -> FloatArray:
+        feed = {"temperatures" if settings.pipeline else "features": inputs.astype(real)}
+        if plan.form == "joint":
+            feed["gyro"] = gyro.astype(real)
+        drift = np.asarray(session.run(["drift"], feed)[0], dtype=np.float64)
+        return gyro - drift if plan.form == "joint" and not settings.pipeline else drift
+
+    if settings.pipeline:
+        difference = pipeline_difference(plan, run, len(window_weights(plan)), settings.seed)
+    else:
+        difference = value_difference(plan, run, settings.seed)
+    (folder / ONNX_FILE).write_bytes(data)
+    return difference

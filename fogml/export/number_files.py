@@ -1,0 +1,164 @@
+"""A plan as JSON beside safetensors, or as a MATLAB file, and back."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.export.plan import Plan
+from fogml.export.storage import Stored, arrays_to_write
+
+SCHEMA = "fogml.weights/1"
+JSON_FILE, TENSORS_FILE, MAT_FILE = "fogml_model.json", "fogml_model.safetensors", "fogml_model.mat"
+FORMULAS = {
+    "constant": "drift = constant",
+    "linear": "drift = constant + sum_k linear[k] f[k]",
+    "network": "drift = constant + sum_k linear[k] f[k] + sum_j weights[j] exp(-sum_d ((x[d] - "
+    "centres[j][d]) / widths[j][d])^2), x = f[network_columns]; beyond 'edge' along the slope there",
+    "joint": "compensated = (scale[0] + scale[1] T + scale[2] T^2) gyro + constant + sum_k linear[k] f[k]",
+}
+LIMITING = (
+    "an atom e beyond low or high becomes margin e/(margin + e) beyond it; below flag_below or above "
+    "flag_above a sample is flagged 1, outside training"
+)
+
+
+def write_json(
+    folder: Path, plan: Plan, stored: Mapping[str, Stored], dtype: str, card: Mapping[str, Any]
+) -> None:
+    """Write `JSON_FILE`, which holds everything in words and numbers, and `TENSORS_FILE`, the packed numbers."""
+    from safetensors.numpy import save_file
+
+    arrays = arrays_to_write(stored, plan, dtype)
+    document = {**_document(plan), "dtype": dtype, "card": dict(card)}
+    document["arrays"] = {
+        name: {"shape": list(array.values.shape), "values": array.decoded.tolist()}
+        for name, array in stored.items()
+    }
+    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
+    save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()}, folder / TENSORS_FILE)
+
+
+def read_json(folder: Path, plan: Plan) -> tuple[Plan, Plan]:
+    """The plan with the numbers of the JSON file, and with those of the safetensors file."""
+    from safetensors.numpy import load_file
+
+    document = json.loads((folder / JSON_FILE).read_text(encoding="utf-8"))
+    plain = {
+        name: np.array(entry["values"]).reshape(entry["shape"]) for name, entry in document["arrays"].items()
+    }
+    return plan.with_arrays(plain), plan.with_arrays(_decoded(load_file(folder / TENSORS_FILE), plan))
+
+
+def write_mat(
+    folder: Path, plan: Plan, stored: Mapping[str, Stored], dtype: str, card: Mapping[str, Any]
+) -> None:
+    """Write `MAT_FILE`: a struct ``fogml`` with numbers, columns (from 1), box and formula.
+
+    MATLAB has no half precision in its files: ``float16`` stands there as its bits, uint16.
+    """
+    from scipy.io import savemat
+
+    document = _document(plan)
+    arrays = {
+        name: array.view(np.uint16) if array.dtype == np.float16 else array
+        for name, array in arrays_to_write(stored, plan, dtype).items()
+    }
+    limits = plan.limits
+    fields: dict[str, Any] = {
+        **{
+            name: document[name]
+            for name in ("schema", "kind", "form", "formula", "limiting", "unit", "gyro_unit")
+        },
+        "dtype": dtype,
+        "sample_s": plan.sample_s,
+        "sensors": _cells(plan.sensors),
+        "atoms": _cells([atom.text for atom in plan.atoms]),
+        "features": _cells(plan.names),
+        "network_columns": np.array(plan.columns, dtype=np.float64) + 1.0,
+        "edge_columns": np.array(plan.edge_columns, dtype=np.float64) + 1.0,
+        "low": limits.low,
+        "high": limits.high,
+        "margin": limits.margin,
+        "flag_below": limits.inner,
+        "flag_above": limits.outer,
+        "card": json.dumps(dict(card), ensure_ascii=False),
+        "arrays": arrays,
+    }
+    savemat(folder / MAT_FILE, {"fogml": fields}, oned_as="row")
+
+
+def read_mat(folder: Path, plan: Plan) -> Plan:
+    """The plan with the numbers of the MATLAB file."""
+    from scipy.io import loadmat
+
+    fields = loadmat(folder / MAT_FILE, simplify_cells=True)["fogml"]["arrays"]
+    arrays = {name: np.asarray(array) for name, array in fields.items()}
+    arrays = {name: a.view(np.float16) if a.dtype == np.uint16 else a for name, a in arrays.items()}
+    return plan.with_arrays(_decoded(arrays, plan))
+
+
+def _decoded(arrays: Mapping[str, NDArray[Any]], plan: Plan) -> dict[str, NDArray[np.float64]]:
+    """Numbers from packed arrays, in the plan's shapes."""
+    found = {}
+    for name, like in plan.arrays.items():
+        if name not in arrays:
+            raise InputError(f"export: array '{name}' is missing from the file")
+        exponent = arrays.get(f"{name}_exponent")
+        values = np.asarray(arrays[name]).reshape(like.shape)
+        held = None if exponent is None else np.asarray(exponent).reshape(-1)
+        found[name] = Stored(values, held).decoded
+    return found
+
+
+def _document(plan: Plan) -> dict[str, Any]:
+    limits = plan.limits
+    atoms = [
+        {
+            "text": atom.text,
+            "operator": atom.operator,
+            "signal": dict(atom.signal.parts),
+            "window": None
+            if atom.window is None
+            else {"method": atom.window.method, "length_s": atom.window.length_s},
+            "unit": atom.unit,
+            "low": limits.low[i],
+            "high": limits.high[i],
+            "margin": limits.margin[i],
+            "flag_below": limits.inner[i],
+            "flag_above": limits.outer[i],
+        }
+        for i, atom in enumerate(plan.atoms)
+    ]
+    columns = [
+        {"name": name, "column": step.column, "times_atoms": list(step.atoms)}
+        for name, step in zip(plan.names, plan.steps)
+    ]
+    return {
+        "schema": SCHEMA,
+        "kind": plan.kind,
+        "form": plan.form,
+        "formula": FORMULAS[plan.form],
+        "limiting": LIMITING,
+        "unit": "deg/h",
+        "gyro_unit": plan.gyro_unit,
+        "sample_s": plan.sample_s,
+        "sensors": list(plan.sensors),
+        "atoms": atoms,
+        "features": columns,
+        "network_columns": list(plan.columns),
+        "edge_columns": list(plan.edge_columns),
+        "edge": plan.edge.tolist(),
+    }
+
+
+def _cells(words: Any) -> NDArray[np.object_]:
+    """Words as a MATLAB cell array."""
+    return np.array([*words], dtype=object)

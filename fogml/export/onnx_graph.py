@@ -1,0 +1,236 @@
+"""A plan as an ONNX graph: from features, or from the temperatures' window, to drift."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml import __version__
+from fogml.errors import InputError
+from fogml.export.plan import Plan
+from fogml.export.storage import Stored
+from fogml.features.atoms import DEAD_BAND, Atom, evaluate
+from fogml.runs.run import Run
+
+if TYPE_CHECKING:
+    import onnx
+
+FloatArray = NDArray[np.float64]
+OPSET, IR_VERSION = 17, 8
+_MOST_WINDOW = 200_000
+
+
+def onnx_model(
+    plan: Plan, stored: Mapping[str, Stored], dtype: str, pipeline: bool, card: str
+) -> onnx.ModelProto:
+    """The graph of a plan.
+
+    Inputs are ``features`` (n, k), limited as `Features.limit` does, or with `pipeline`
+    ``temperatures`` (n, m, s): n windows of the last m samples of s temperatures, newest last; a
+    joint model takes ``gyro`` (n) [deg/h] besides. The output is ``drift`` (n) [deg/h].
+
+    Raises
+    ------
+    InputError
+        If onnx is not installed, or the model does not fit the interface.
+    """
+    try:
+        from onnx import TensorProto, checker, helper
+    except ImportError:
+        raise InputError("export: onnx is not installed; pip install 'fogml[export]'") from None
+    if plan.form == "joint" and plan.gyro_unit != "deg/h":
+        raise InputError(
+            f"export: this joint model takes the output in {plan.gyro_unit} and gives a rate, which ONNX's "
+            "output 'drift' can't hold; export it --to c"
+        )
+    kind = TensorProto.DOUBLE if dtype == "float64" else TensorProto.FLOAT
+    graph = _Graph(kind)
+    inputs = []
+    if pipeline:
+        weights = window_weights(plan)
+        inputs.append(helper.make_tensor_value_info("temperatures", kind, ["n", *weights.shape[:2]]))
+        columns = _columns_of_window(graph, plan, weights)
+    else:
+        inputs.append(helper.make_tensor_value_info("features", kind, ["n", len(plan.names)]))
+        columns = "features"
+    drift = _value(graph, plan, stored, columns)
+    if plan.form == "joint":
+        inputs.append(helper.make_tensor_value_info("gyro", kind, ["n"]))
+    graph.add("Identity", [drift], "drift")
+    output = helper.make_tensor_value_info("drift", kind, ["n"])
+    whole = helper.make_graph(graph.nodes, "fogml", inputs, [output], graph.constants, doc_string=card)
+    opset = [helper.make_opsetid("", OPSET)]
+    model = helper.make_model(
+        whole, opset_imports=opset, ir_version=IR_VERSION, producer_name="fogml", producer_version=__version__
+    )
+    facts = {
+        "inputs": ", ".join(plan.sensors if pipeline else plan.names),
+        "sample_s": repr(plan.sample_s),
+        "unit": "deg/h",
+        "model": plan.kind,
+    }
+    helper.set_model_props(model, facts)
+    checker.check_model(model, full_check=True)
+    return model
+
+
+def window_weights(plan: Plan) -> FloatArray:
+    """Weights of the last m samples of each temperature in each atom, shape (m, s, a), newest last.
+
+    Every window is linear in the temperatures; directions get the weights of their rates. The
+    weights are what the library's own windows give for an impulse.
+
+    Raises
+    ------
+    InputError
+        If the windows look back too far.
+    """
+    rates = tuple(
+        Atom("d", atom.signal, atom.window) if atom.operator == "sign" else atom for atom in plan.atoms
+    )
+    memory = max((atom.window.memory_s for atom in rates if atom.window), default=0.0)
+    length = int(np.ceil(memory / plan.sample_s - 1e-6)) + 2
+    if length * max(1, len(plan.sensors)) > _MOST_WINDOW:
+        raise InputError(
+            f"export: the windows look back over {length} samples, too many for a graph; leave out --with-pipeline"
+        )
+    weights = np.zeros((length, len(plan.sensors), len(rates)))
+    time = plan.sample_s * np.arange(2 * length - 1)
+    for place, sensor in enumerate(plan.sensors):
+        columns = {name: np.zeros(len(time)) for name in ("time", "gyro", *plan.sensors)}
+        columns["time"] = time
+        columns[sensor][length - 1] = 1.0
+        answer, _ = evaluate(rates, Run("impulse", columns), plan.sample_s)
+        weights[:, place] = answer[length - 1 :][::-1]
+    return weights
+
+
+class _Graph:
+    """Nodes and constants under way."""
+
+    def __init__(self, kind: int) -> None:
+        self.kind = kind
+        self.real = np.dtype(np.float64 if kind == 11 else np.float32)
+        self.nodes: list[Any] = []
+        self.constants: list[Any] = []
+
+    def add(self, operator: str, inputs: list[str], name: str = "", **attributes: Any) -> str:
+        """A node; its output's name."""
+        from onnx import helper
+
+        name = name or f"v{len(self.nodes)}"
+        self.nodes.append(helper.make_node(operator, inputs, [name], **attributes))
+        return name
+
+    def constant(self, values: Any, dtype: Any = None) -> str:
+        """A constant in the graph's own precision, or another type; its name."""
+        from onnx import numpy_helper
+
+        name = f"c{len(self.constants)}"
+        array = np.ascontiguousarray(np.asarray(values, dtype=dtype or self.real))
+        self.constants.append(numpy_helper.from_array(array, name))
+        return name
+
+    def whole(self, values: Any) -> str:
+        """A constant of integers."""
+        return self.constant(values, np.int64)
+
+    def stored(self, array: Stored) -> str:
+        """A constant in the small format, and what brings it to the graph's precision."""
+        if array.values.dtype == self.real and array.exponent is None:
+            return self.constant(array.values)
+        name = self.add("Cast", [self.constant(array.values, array.values.dtype)], to=self.kind)
+        if array.exponent is None:
+            return name
+        return self.add("Mul", [name, self.constant(np.ldexp(1.0, array.exponent.astype(np.int32)))])
+
+    def sum(self, value: str, axis: int) -> str:
+        return self.add("ReduceSum", [value, self.whole([axis])], keepdims=0)
+
+    def gather(self, value: str, places: Any) -> str:
+        return self.add("Gather", [value, self.whole(list(places))], axis=1)
+
+
+def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> str:
+    flat = graph.add("Reshape", ["temperatures", graph.whole([-1, weights.shape[0] * weights.shape[1]])])
+    atoms = graph.add("MatMul", [flat, graph.constant(weights.reshape(-1, weights.shape[2]))])
+    signs = np.array([atom.operator == "sign" for atom in plan.atoms])
+    if signs.any():
+        band = graph.constant(DEAD_BAND * (1.0 + 1e-9))
+        below = graph.constant(-DEAD_BAND * (1.0 + 1e-9))
+        up = graph.add("Cast", [graph.add("Greater", [atoms, band])], to=graph.kind)
+        down = graph.add("Cast", [graph.add("Less", [atoms, below])], to=graph.kind)
+        direction = graph.add("Sub", [up, down])
+        atoms = graph.add("Where", [graph.constant(signs, np.bool_), direction, atoms])
+    limits = plan.limits
+    low, high, margin, zero = (graph.constant(v) for v in (limits.low, limits.high, limits.margin, 0.0))
+    over = graph.add("Max", [graph.add("Sub", [atoms, high]), zero])
+    under = graph.add("Max", [graph.add("Sub", [low, atoms]), zero])
+    inside = graph.add("Min", [graph.add("Max", [atoms, low]), high])
+    for sign, beyond in (("Add", over), ("Sub", under)):
+        soft = graph.add("Div", [graph.add("Mul", [margin, beyond]), graph.add("Add", [margin, beyond])])
+        inside = graph.add(sign, [inside, soft])
+    columns: list[str] = []
+    for step in plan.steps:
+        factors = [graph.gather(inside, [i]) for i in step.atoms]
+        value = columns[step.column] if step.column is not None else factors.pop(0)
+        for factor in factors:
+            value = graph.add("Mul", [value, factor])
+        columns.append(value)
+    return graph.add("Concat", columns, axis=1)
+
+
+def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:
+    """Drift (n) of feature columns (n, k)."""
+    constant = graph.stored(stored["constant"])
+    if plan.form == "constant":
+        raise InputError(
+            f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
+        )
+    linear = graph.sum(graph.add("Mul", [columns, graph.stored(stored["linear"])]), 1)
+    value = graph.add("Add", [linear, constant])
+    if plan.form == "joint":
+        temperature = graph.sum(graph.gather(columns, [0]), 1)
+        scale = graph.stored(stored["scale"])
+        s0, s1, s2 = (graph.add("Gather", [scale, graph.whole([i])], axis=0) for i in range(3))
+        inner = graph.add("Add", [s1, graph.add("Mul", [temperature, s2])])
+        factor = graph.add("Add", [s0, graph.add("Mul", [temperature, inner])])
+        rate = graph.add("Add", [graph.add("Mul", [factor, "gyro"]), value])
+        return graph.add("Sub", ["gyro", rate])
+    if not plan.centres:
+        return value
+    drawn = _drawn_in(graph, plan, columns)
+    inverse = graph.add("Reciprocal", [graph.stored(stored["widths"])])
+    axis = graph.whole([1])
+    seen = graph.add("Unsqueeze", [graph.gather(drawn, plan.columns), axis])
+    away = graph.add("Sub", [seen, graph.stored(stored["centres"])])
+    z = graph.add("Mul", [away, inverse])
+    basis = graph.add("Exp", [graph.add("Neg", [graph.sum(graph.add("Mul", [z, z]), 2)])])
+    weighted = graph.add("Mul", [basis, graph.stored(stored["weights"])])
+    if plan.edge_columns:
+        step = graph.gather(graph.add("Sub", [columns, drawn]), plan.columns)
+        steps = graph.add("Mul", [graph.add("Unsqueeze", [step, axis]), inverse])
+        along = graph.sum(graph.add("Mul", [z, steps]), 2)
+        slope = graph.add("Sub", [graph.constant(1.0), graph.add("Add", [along, along])])
+        weighted = graph.add("Mul", [weighted, slope])
+    return graph.add("Add", [value, graph.sum(weighted, 1)])
+
+
+def _drawn_in(graph: _Graph, plan: Plan, columns: str) -> str:
+    """Columns with all rates scaled down together into their trained range."""
+    if not plan.edge_columns:
+        return columns
+    rates = graph.gather(columns, plan.edge_columns)
+    low, high = graph.constant(plan.edge[0]), graph.constant(plan.edge[1])
+    one, zero = graph.constant(1.0), graph.constant(0.0)
+    beyond = graph.add("Or", [graph.add("Greater", [rates, high]), graph.add("Less", [rates, low])])
+    bound = graph.add("Where", [graph.add("Greater", [rates, zero]), high, low])
+    share = graph.add("Div", [bound, graph.add("Where", [beyond, rates, one])])
+    share = graph.add("Where", [beyond, share, one])
+    least = graph.add("ReduceMin", [share], axes=[1], keepdims=1)
+    held = np.isin(np.arange(len(plan.names)), plan.edge_columns)
+    factor = graph.add("Where", [graph.constant(held, np.bool_), least, one])
+    return graph.add("Mul", [columns, factor])

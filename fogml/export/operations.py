@@ -1,0 +1,26 @@
+"""Arithmetic that a plan takes at each sample."""
+
+from __future__ import annotations
+
+from fogml.export.plan import Plan
+
+WINDOW_OPERATIONS = {"block": 24, "slope": 32, "exp": 6, "first": 4}
+"""Additions, multiplications and divisions of a full window's step, one sample leaving it."""
+EXPONENTIAL_OPERATIONS = 20
+
+
+def operations_per_sample(plan: Plan) -> int:
+    """Additions, multiplications and divisions at a sample inside the trained box, windows full."""
+    windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in plan.atoms if atom.window}
+    count = sum(WINDOW_OPERATIONS[window.method] for _, window, _ in windows if window is not None)
+    count += sum(2 * len(atom.signal.parts) - 1 for atom in plan.atoms)
+    count += 4 * len(plan.atoms)
+    count += sum(len(step.atoms) - (step.column is None) for step in plan.steps)
+    count += 2 * len(plan.names) + 1
+    if plan.form == "joint":
+        count += 6
+    if plan.centres:
+        along = 4 * plan.dimensions + 2 if plan.edge_columns else 0
+        count += plan.centres * (4 * plan.dimensions + along + EXPONENTIAL_OPERATIONS + 2)
+        count += 2 * len(plan.edge_columns) + plan.dimensions
+    return count

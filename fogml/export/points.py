@@ -1,0 +1,119 @@
+"""Where exports are compared with the model: points and temperature histories in the trained box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.export.plan import Plan
+from fogml.export.self_test import sensor_range
+from fogml.features.features import Features
+from fogml.runs.run import Run
+
+FloatArray = NDArray[np.float64]
+POINTS = 4096
+_BEYOND = 0.2
+_LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
+_GYRO_DEG_H = 20.0
+"""Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
+
+
+def box_points(plan: Plan, seed: int, beyond: float = 0.0, count: int = POINTS) -> FloatArray:
+    """Atom values spread evenly over the trained box (n, a), or up to `beyond` spans outside it."""
+    rng = np.random.default_rng([seed, 1])
+    low, high = plan.limits.box_low, plan.limits.box_high
+    margin = beyond * (high - low)
+    atoms = rng.uniform(low - margin, high + margin, (count, len(low)))
+    for i, atom in enumerate(plan.atoms):
+        if atom.operator == "sign":
+            atoms[:, i] = np.clip(np.round(atoms[:, i]), -1.0, 1.0)
+    return np.asarray(atoms)
+
+
+@dataclass(frozen=True)
+class History:
+    """Temperatures and output over time, with gaps, and the atoms that they make.
+
+    Attributes
+    ----------
+    time
+        Time [s], shape (n,).
+    temperatures
+        Temperatures [degC] by sensor, shape (n, s).
+    gyro
+        Output in the model's unit, shape (n,).
+    """
+
+    time: FloatArray
+    temperatures: FloatArray
+    gyro: FloatArray
+
+    def run(self, plan: Plan) -> Run:
+        """As a run."""
+        columns: dict[str, Any] = {"time": self.time, "gyro": self.gyro}
+        columns |= {name: self.temperatures[:, i] for i, name in enumerate(plan.sensors)}
+        return Run("history", columns, gyro_unit="count" if plan.gyro_unit == "count" else "deg/h")
+
+    def atoms(self, plan: Plan) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Atom values (n, a) and where all windows are full, as the library works them out."""
+        if not plan.atoms:
+            return np.empty((len(self.time), 0)), np.ones(len(self.time), dtype=np.bool_)
+        return Features(", ".join(plan.names)).atom_values(self.run(plan), plan.sample_s)
+
+
+def history(plan: Plan, seed: int) -> History:
+    """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths."""
+    rng = np.random.default_rng([seed, 2])
+    longest = max((atom.window.span_s for atom in plan.atoms if atom.window), default=0.0)
+    count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
+    step = plan.sample_s
+    time = step * np.arange(count)
+    ranges = [sensor_range(plan, sensor) for sensor in plan.sensors]
+    paths = np.empty((count, len(ranges)))
+    for i, (low, high, fastest) in enumerate(ranges):
+        span = high - low
+        speed = min(fastest, 240.0 * span / (count * step) * 4.0) / 60.0
+        path = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed)
+        offset = _offset(plan, plan.sensors[i]) if i else None
+        if offset is not None:
+            # A sensor that is known by its difference to the first keeps within that.
+            middle, width = offset
+            path = paths[:, 0] - middle - width * np.sin(2.0 * np.pi * (1.5 + i) * time / time[-1])
+        paths[:, i] = path
+    size = _GYRO_DEG_H / (abs(plan.arrays["scale"][0]) if plan.form == "joint" else 1.0)
+    gyro = size * rng.uniform(-1.0, 1.0, count)
+    keep = np.ones(count, dtype=np.bool_)
+    for length_s in (2 * step, 3 * step, 0.2 * longest, 0.3 * longest, 2.0 * longest):
+        start, length = int(rng.integers(count // 2, count - 2)), round(length_s / step)
+        keep[start : start + min(length, count // 20)] = False
+    keep[-1] = True
+    return History(time[keep], paths[keep], gyro[keep])
+
+
+def _walk(
+    rng: np.random.Generator, count: int, step_s: float, low: float, high: float, speed: float
+) -> FloatArray:
+    """A path of ramps at speeds up to `speed` [degC/s] and of soaks, within bounds."""
+    rates = np.empty(0)
+    while len(rates) < count:
+        length = int(rng.integers(count // 40 + 2, count // 10 + 3))
+        rate = 0.0 if rng.random() < 0.2 else float(rng.uniform(0.2, 1.1) * speed * rng.choice([-1.0, 1.0]))
+        rates = np.append(rates, np.full(length, rate))
+    path = np.cumsum(rates[:count]) * step_s + rng.uniform(low, high)
+    folded = np.mod(path - low, 2.0 * (high - low))
+    return np.asarray(low + np.minimum(folded, 2.0 * (high - low) - folded))
+
+
+def _offset(plan: Plan, sensor: str) -> tuple[float, float] | None:
+    """Middle and half-width of the first sensor less this one in the trained box, where that is told."""
+    first = plan.sensors[0]
+    for i, atom in enumerate(plan.atoms):
+        if atom.operator == "value" and set(atom.signal.sensors) == {first, sensor}:
+            weights = dict(atom.signal.parts)
+            if abs(weights[first] + weights[sensor]) < 1e-9:
+                ends = np.array([plan.limits.box_low[i], plan.limits.box_high[i]]) / weights[first]
+                return float(ends.mean()), float(0.45 * abs(ends[1] - ends[0]))
+    return None
