@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,7 @@ from fogml.report.tables import (
     runs_table,
 )
 from fogml.report.verdict import improves, model_card, stated_limits, subject, unseen, verdict, worst_run
-from fogml.report.words import averages, number, percent, plural, stated, unit_of
+from fogml.report.words import averages, listed, number, percent, plural, stated, unit_of
 from fogml.validation.results import Judgement, RunJudgement
 
 
@@ -136,12 +136,15 @@ def _left_out(judged: RunJudgement) -> str:
 
 
 def _notes(judgement: Judgement) -> list[str]:
-    """Every note once: the judgement's, the model's, then the runs'."""
-    runs: Sequence[RunJudgement] = (*judgement.train, *judgement.test)
-    told = [*judgement.notes, *judgement.model.get("notes", ())]
+    """Every note once: the judgement's, the model's, then the runs', with the names of those it holds for."""
     by_note: dict[str, list[str]] = {}
-    for run in runs:
+    of_runs = set()
+    for run in (*judgement.train, *judgement.test):
         for note in run.notes:
-            by_note.setdefault(note, []).append(run.run)
-    told += [f"{', '.join(dict.fromkeys(names))}: {note}" for note, names in by_note.items()]
+            # Some notes begin with the run's name already.
+            bare = note.removeprefix(f"{run.run}: ")
+            of_runs.add(f"{run.run}: {bare}")
+            by_note.setdefault(bare, []).append(run.run)
+    told = [*judgement.notes, *(note for note in judgement.model.get("notes", ()) if note not in of_runs)]
+    told += [f"{listed(list(dict.fromkeys(names)))}: {note}" for note, names in by_note.items()]
     return list(dict.fromkeys(str(note) for note in told))

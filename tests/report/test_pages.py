@@ -123,6 +123,16 @@ def test_findings_notes_and_left_out_samples_are_told() -> None:
     assert "128 samples (0.4 %) left out" in text
 
 
+def test_a_note_that_holds_for_many_runs_is_told_once() -> None:
+    cut = "48 rows about changes of the table's rate left out"
+    runs = tuple(judged_run(f"{name}.csv", notes=(f"{name}.csv: {cut}",)) for name in "bcd")
+    judged = judgement()
+    model = {**judged.model, "notes": [f"b.csv: {cut}"]}
+    text = Page(train_page(replace(judged, train=runs[:1], test=runs[1:], model=model))).text
+    assert text.count(cut) == 1
+    assert f"b.csv, c.csv and d.csv: {cut}" in text
+
+
 def test_coefficients_and_candidates_are_shown_where_told() -> None:
     judged = linear_judgement()
     text = Page(train_page(judged)).text
