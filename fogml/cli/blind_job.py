@@ -18,6 +18,7 @@ from fogml.outputs import whole_folder
 LEDGER = "experiments/gap_blind/final_uses.json"
 _WANTED = "wanted"
 _BASELINES = "baselines"
+_REPORTS = "reports"
 
 
 class SuiteSettings(Settings):
@@ -172,6 +173,8 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
         values = score(folder, methods, ledger, lambda what: work.advance(doing=what))
     judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
     values["gates"] = gate(values, settings.gates, judged)
+    if judged == DIAGNOSIS:
+        _draw_reports(folder, values["methods"][judged]["worst"], terminal)
     out = Path(settings.out) if settings.out else folder.path
     with whole_folder(out) as staging:
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
@@ -181,6 +184,20 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     terminal.result(values)
     terminal.say(f"Written to {out}: open {out / 'score.html'}")
     return all(one["met"] for one in values["gates"])
+
+
+def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], terminal: Terminal) -> None:
+    """Diagnose the worst cases once more, to draw their pages, and link to those."""
+    from fogml.gap.blind.run import RunPlan, run_cases
+
+    names = tuple(case["case"] for case in worst if case["verdict"] != "failed")
+    method = "fogml.report.blind_answer:diagnosis_with_page"
+    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=folder.path / _REPORTS)
+    with terminal.work("drawing the worst cases", total=len(plan.left())) as work:
+        run_cases(plan, lambda case: work.advance(doing=f"drawing {case}"))
+    for case in worst:
+        if (plan.answers / case["case"] / "gap.html").is_file():
+            case["report"] = f"{_REPORTS}/{case['case']}/gap.html"
 
 
 def _link(suite: Path, out: Path) -> str:

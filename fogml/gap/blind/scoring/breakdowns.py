@@ -91,7 +91,7 @@ def worst(marks: Sequence[Mark], method: str, count: int = WORST) -> list[dict[s
             "unknown": None if m.failure else m.unknown,
             "verdict": m.verdict,
             "wrong": _wrong(m),
-            "report": f"{folder}/{m.truth.case}/gap.html",
+            "report": f"{folder}/{m.truth.case}/{'outcome' if m.failure else 'gap'}.json",
         }
         for badness, m in scored[:count]
         if badness > 0.0
