@@ -1,0 +1,1 @@
+"""What a drift costs a navigator at rest: closed form, integration, before and after a model."""
