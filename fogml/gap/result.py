@@ -1,10 +1,10 @@
-"""The result of a diagnosis, and ``gap.json``, schema ``fogml.gap/1``."""
+"""The result of a diagnosis."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.model import EffectValue, GyroModel, NoisePrior
+from fogml.gap.result_json import gap_values
+from fogml.gap.where_result import Where
 from fogml.runs.run import FloatArray
 
-SCHEMA = "fogml.gap/1"
 NAMED = 0.5
 """An effect is named from this probability on."""
 Verdict = Literal["no_gap", "explained", "ambiguous", "partly_explained", "unknown"]
@@ -81,63 +82,6 @@ class Unknown:
 
     probability: float
     looks_like: str
-
-
-@dataclass(frozen=True)
-class Share:
-    """A part of the structural gap's energy above the floor, with a 90 % interval."""
-
-    name: str
-    share: float
-    share_ci90: tuple[float, float] | None = None
-    excess_rms: float | None = None
-    excess_rms_ci90: tuple[float, float] | None = None
-    significant: bool = False
-    unit: str = "deg/h"
-
-
-@dataclass(frozen=True)
-class TemperatureExcess:
-    """The structural gap over the floor in a span of temperature [degC], with up and down apart."""
-
-    from_degc: float
-    to_degc: float
-    excess_rms: float
-    significant: bool
-    mean_up: float | None
-    mean_down: float | None
-
-
-@dataclass(frozen=True)
-class TimescaleExcess:
-    """Ratio of the structural gap to the floor at an averaging time [s], with a 90 % interval."""
-
-    tau_s: float
-    excess: float
-    ci90: tuple[float, float]
-    significant: bool
-
-
-@dataclass(frozen=True)
-class GapSegment:
-    """A stretch in which the structural gap exceeds the floor."""
-
-    run: str
-    from_s: float
-    to_s: float
-    excess_rms: float
-    unit: str = "deg/h"
-
-
-@dataclass(frozen=True)
-class Where:
-    """Where the structural gap lies."""
-
-    stage: tuple[Share, ...] = ()
-    regime: tuple[Share, ...] = ()
-    temperature: tuple[TemperatureExcess, ...] = ()
-    timescale: tuple[TimescaleExcess, ...] = ()
-    segments: tuple[GapSegment, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -319,73 +263,4 @@ class Diagnosis:
 
     def as_dict(self) -> dict[str, Any]:
         """The content of ``gap.json``."""
-        return {
-            "schema": SCHEMA,
-            "runs": {
-                "fit": list(self.fit),
-                "held_out": list(self.held_out),
-                "noise": self.noise_run,
-                "held_out_is_part_of_last_run": self.held_out_is_part,
-                "unusable": [{"run": run, "reason": reason} for run, reason in self.unusable],
-            },
-            "model": self.model,
-            "verdict": self.verdict,
-            "which": [_found(found) for found in self.found],
-            "unknown": asdict(self.unknown),
-            "where": _where(self.where),
-            "how_far": [_plain(asdict(item)) for item in self.how_far],
-            "undetectable": list(self.undetectable),
-            "separating_run": None if self.separating_run is None else _plain(asdict(self.separating_run)),
-            "constants": {
-                c.name: {"value": c.value, "se": c.se, "unit": c.unit, "prior": [c.prior_mean, c.prior_sd]}
-                for c in self.constants
-            },
-            "noise": _plain(asdict(self.noise)),
-            "evidence": [_plain(asdict(item)) for item in self.evidence],
-            "assumed": list(self.assumed),
-        }
-
-
-def _found(found: Found) -> dict[str, Any]:
-    return {
-        "effect": found.effect,
-        "class": list(found.members),
-        "probability": found.probability,
-        "amplitude": asdict(found.amplitude),
-        "parameters": {name: asdict(value) for name, value in found.parameters.items()},
-        "stage": found.stage,
-        "by_run": [asdict(item) for item in found.by_run],
-        "consistent": found.consistent,
-    }
-
-
-def _where(where: Where) -> dict[str, Any]:
-    return {
-        "stage": [_plain(asdict(item)) for item in where.stage],
-        "regime": [_plain(asdict(item)) for item in where.regime],
-        "temperature": [
-            {
-                "from": t.from_degc,
-                "to": t.to_degc,
-                "excess_rms": t.excess_rms,
-                "unit": "deg/h",
-                "significant": t.significant,
-                "mean_up": t.mean_up,
-                "mean_down": t.mean_down,
-            }
-            for t in where.temperature
-        ],
-        "timescale": [_plain(asdict(item)) for item in where.timescale],
-        "segments": [asdict(item) for item in where.segments],
-    }
-
-
-def _plain(values: Any) -> Any:
-    """Tuples as lists, numpy numbers as Python's."""
-    if isinstance(values, dict):
-        return {key: _plain(value) for key, value in values.items()}
-    if isinstance(values, list | tuple):
-        return [_plain(value) for value in values]
-    if isinstance(values, np.generic):
-        return values.item()
-    return values
+        return gap_values(self)

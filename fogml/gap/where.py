@@ -15,7 +15,7 @@ import numpy as np
 from fogml.gap.how_far import Averages, averages
 from fogml.gap.noise import Noise
 from fogml.gap.observation import Observation
-from fogml.gap.result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
+from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.runs.regimes import Regimes
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square
