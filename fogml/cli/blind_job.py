@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -176,10 +175,11 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     if judged == DIAGNOSIS:
         _draw_reports(folder, values["methods"][judged]["worst"], terminal)
     out = Path(settings.out) if settings.out else folder.path
+    beside = out.resolve() == folder.path.resolve()
     with whole_folder(out) as staging:
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
         (staging / "score.json").write_text(text + "\n", encoding="utf-8")
-        (staging / "score.html").write_text(blind_page(values, _link(folder.path, out)), encoding="utf-8")
+        (staging / "score.html").write_text(blind_page(values, linked=beside), encoding="utf-8")
     _print(values, judged, terminal)
     terminal.result(values)
     terminal.say(f"Written to {out}: open {out / 'score.html'}")
@@ -198,11 +198,6 @@ def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], terminal: Te
     for case in worst:
         if (plan.answers / case["case"] / "gap.html").is_file():
             case["report"] = f"{_REPORTS}/{case['case']}/gap.html"
-
-
-def _link(suite: Path, out: Path) -> str:
-    """The way from the page to the suite, for links to reports."""
-    return "" if suite.resolve() == out.resolve() else os.path.relpath(suite, out) + "/"
 
 
 def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
