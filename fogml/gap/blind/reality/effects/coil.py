@@ -7,7 +7,7 @@ from scipy.special import erf
 
 from fogml.gap.blind.reality.form import Additive, Shape
 from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray, recurrence
+from fogml.gap.blind.reality.recurrences import FloatArray, lag, recurrence
 from fogml.gap.blind.reality.world import World
 
 _LEAD_DEG_H_PER_M = 0.525
@@ -115,13 +115,15 @@ class Leads(Additive):
     demands = Demands(power_steps=True)
 
     def draw(self, rng: np.random.Generator) -> Shape:
-        """Ratio of the lengths, share of the hub in what the first lead feels."""
-        return {"length_ratio": rng.uniform(0.3, 3.0), "hub_share": rng.uniform(0.0, 0.06)}
+        """Ratio of the lengths, share of the hub in what the first lead feels, lag of its jacket [s]."""
+        ratio, share = rng.uniform(0.3, 3.0), rng.uniform(0.0, 0.06)
+        return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(30.0, 90.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """n c_T (l_1 dT_1/dt - l_2 dT_case/dt) / D."""
         h = shape["hub_share"]
-        first = (1.0 - h) * world.rates["T_electronics"] + h * world.rates["T_hub"]
+        around = (1.0 - h) * world.rates["T_electronics"] + h * world.rates["T_hub"]
+        first = lag(world.sample_s, around, shape["jacket"])
         return _LEAD_DEG_H_PER_M * (first - shape["length_ratio"] * world.rates["T_case"])
 
 
