@@ -62,7 +62,7 @@ def noisy(settings: dict[str, Any]) -> list[dict[str, Any]]:
         (
             "δ = 5°, tilts off too",
             unit(settings, 5.0),
-            {**plain, "tilt_noise_deg": settings["tilt_noise"]},
+            tilted,
             False,
         ),
         ("δ = 5°, tilted across, no constant", across, plain, False),

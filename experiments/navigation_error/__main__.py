@@ -126,11 +126,10 @@ Data: **synthetic**: the error equations, and `fogml.twin` (navigation grade). U
 at the start, one gyro drifting, height held, spherical Earth. Config: `config.yaml`; fogml {__version__};
 `python -m experiments.navigation_error`.
 
-**Verdict: reproduced.** The closed form (a matrix exponential) and integration are at most {apart:.1e} m apart over
-24 h; the tests hold it against the full, not linearised equations too. A constant drift of
+**Verdict: reproduced.** Closed form (a matrix exponential) and integration are at most {apart:.1e} m apart
+over 24 h; the tests hold it against the full, not linearised equations too. A constant drift of
 {settings["drift"]} deg/h costs about a kilometre and a half in the first hour or two, whatever horizontal
-gyro it is of,
-with Schuler's 84 min on top; over a day the north and the down gyro's errors go on growing in longitude,
+gyro it is of, with Schuler's 84 min on top; over a day the north and the down gyro's errors go on growing in longitude,
 the east
 gyro's is bounded by the 24 h oscillation. The condition: it is one of the ends of a budget. Alignment
 by gyrocompass with an east gyro of {settings["drift"]} deg/h alone puts the heading off by

@@ -1,0 +1,173 @@
+"""``fogml lab``: what its commands print and write, what is run again, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from fogml.lab.misalignment_simulation import TableUnit, measurements
+from fogml.lab.north import Drift, Scheme
+from fogml.lab.north_positions import simulated_positions
+
+MISALIGNMENT_KEYS = ("K", "delta_x_deg", "delta_y_deg", "delta_deg", "fixture_error_deg", "se")
+NORTH_KEYS = (
+    "azimuth_deg",
+    "drift_deg_h_per_h",
+    "quiet_azimuth_deg",
+    "worst_azimuth_deg",
+    "error_deg",
+    "se",
+)
+
+
+@pytest.fixture
+def turns(tmp_path: Path) -> Path:
+    """The documented file: one row per average, four states, four tilts."""
+    made = measurements(TableUnit(1.2345, 5.0, 3.0, 0.5), (0.0, 30.0, 60.0, 90.0), (10.0, -10.0), noise=1e-5)
+    rows = ["state,tilt [deg],rate [deg/s],segment,output [V]"]
+    for state, tilt, rate, value in np.column_stack(
+        [made.state, made.tilt_deg, made.rate_deg_s, made.output]
+    ).tolist():
+        rows += [
+            f"{state:g},{tilt:g},{rate:g},{mark},{level!r}"
+            for mark, level in (("before", 0.2), ("turn", 0.2 + value), ("after", 0.2))
+        ]
+    path = tmp_path / "turns.csv"
+    path.write_text("\n".join(rows) + "\n")
+    return path
+
+
+@pytest.fixture
+def positions(tmp_path: Path) -> Path:
+    """A recorded seek at 77 deg with a drift."""
+    run = simulated_positions(Scheme(dwell_s=30.0, transfer_s=10.0), 77.0, 30.0, Drift(2.0), bias_deg_h=0.4)
+    columns = np.column_stack([run.columns[name] for name in ("time", "gyro", "position")])
+    path = tmp_path / "positions.csv"
+    header = "time [s],gyro [deg/h],position"
+    np.savetxt(path, columns, delimiter=",", header=header, comments="", fmt="%.12g")
+    path.with_suffix(".yaml").write_text("latitude: 30.0\n")
+    return path
+
+
+def test_misalignment(turns: Path, tmp_path: Path, invoke, invoke_json) -> None:
+    told = invoke_json("lab", "misalignment", turns)
+    assert told["schema"] == "fogml.misalignment/1" and set(MISALIGNMENT_KEYS) <= set(told)
+    assert told["K"] == pytest.approx(1.2345, rel=1e-5) and told["unit"] == "V per deg/s"
+    assert told["fixture_error_deg"] == pytest.approx([0.5, 0.5], abs=1e-3)
+    assert 0.0 < told["se"]["delta_x_deg"] < 1e-3
+    out = tmp_path / "out"
+    printed = invoke("lab", "misalignment", turns, "--out", out).stdout
+    assert "four states" in printed and "misalignment.html" in printed
+    assert sorted(p.name for p in out.iterdir()) == ["config.yaml", "misalignment.html", "misalignment.json"]
+    assert json.loads((out / "misalignment.json").read_text()) == told
+    assert invoke_json("lab", "misalignment", "--config", out / "config.yaml") == told
+
+
+def test_misalignment_without_constant(turns: Path, invoke_json) -> None:
+    assert invoke_json("lab", "misalignment", turns, "--cross-tilt")["cross_tilt"] is True
+    assert invoke_json("lab", "misalignment", turns, "--no-cross-tilt")["cross_tilt"] is False
+
+
+def test_north_of_a_recording(positions: Path, tmp_path: Path, invoke, invoke_json) -> None:
+    told = invoke_json("lab", "north", "--positions", positions)
+    assert told["schema"] == "fogml.north/1" and set(NORTH_KEYS) <= set(told)
+    assert told["azimuth_deg"] == pytest.approx(77.0, abs=1e-6)
+    assert told["drift_deg_h_per_h"] == pytest.approx(2.0, abs=1e-5)
+    assert told["quiet_azimuth_deg"] == pytest.approx([135.0, 315.0])
+    out = tmp_path / "north"
+    assert "azimuth 77.0" in invoke("lab", "north", "--positions", positions, "-o", out).stdout
+    assert sorted(p.name for p in out.iterdir()) == ["config.yaml", "north.html", "north.json"]
+
+
+def test_north_simulated(tmp_path: Path, invoke, invoke_json) -> None:
+    asked = ("--azimuth", 45, "--latitude", 30, "--dwell", 60, "--transfer", 0, "--drift", 0.18)
+    told = invoke_json("lab", "north", *asked)
+    assert set(NORTH_KEYS) <= set(told)
+    assert told["error_deg"] == pytest.approx(0.01866, abs=5e-6)
+    assert told["error_deg"] == pytest.approx(told["simulated_error_deg"], abs=1e-9)
+    assert told["greatest_error_deg"] == pytest.approx(0.01866, abs=5e-6)
+    assert told["drift_deg_h_per_h"] == pytest.approx(0.18)
+    assert told["quiet_azimuth_deg"] == pytest.approx([135.0, 315.0])
+    ccw = invoke_json("lab", "north", *asked, "--sense", "ccw")
+    assert ccw["quiet_azimuth_deg"] == pytest.approx([45.0, 225.0]) and abs(ccw["error_deg"]) < 1e-9
+    order = invoke_json("lab", "north", *asked, "--order", "0,180,270,90")
+    assert order["quiet_azimuth_deg"] == pytest.approx([45.0, 225.0])
+    out = tmp_path / "north"
+    more = ("--transient", "0.2,600", "--transient", "0.1,120", "--noise", 0.002, "--way", "coarse-fine")
+    first = invoke_json("lab", "north", *asked, *more, "-o", out)
+    assert first["se"] > 0.0 and first["way"] == "coarse-fine"
+    assert yaml.safe_load((out / "config.yaml").read_text())["transients"] == [[0.2, 600.0], [0.1, 120.0]]
+    assert invoke_json("lab", "north", "--config", out / "config.yaml") == first
+
+
+def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
+    told = invoke_json("lab", "north", "--azimuth", 10, "--latitude", 30, "--order", "0,120,240")
+    assert told["drift_deg_h_per_h"] is None
+    assert any("drift-observing is left out" in note for note in told["notes"])
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("misalignment",), "no file is given"),
+        (("misalignment", "nowhere.csv"), "no such file"),
+        (("north",), "--positions, or --azimuth and --latitude"),
+        (("north", "--azimuth", 10), "--azimuth and --latitude"),
+        (("north", "--azimuth", 10, "--latitude", 95), "latitude 95"),
+        (("north", "--azimuth", 10, "--latitude", "nan"), "latitude nan"),
+        (("north", "--azimuth", "nan", "--latitude", 10), "azimuth nan"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--sense", "left"), "sense 'left'"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--order", "0,x"), "no list of numbers"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--order", "0,90"), "three different angles"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--transient", "0.2"), "write 0.2,600"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--dwell", -1), "dwell -1"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--way", "fast"), "way 'fast'"),
+        (("north", "--azimuth", 10, "--latitude", 10, "--noise", -1), "noise -1"),
+        (("north", "--positions", "p.csv", "--azimuth", 1), "give one of them"),
+    ],
+)
+def test_bad_usage_is_one_message(invoke, tmp_path: Path, monkeypatch, arguments, message: str) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = invoke("lab", *arguments, "--out", "out", status=2)
+    assert message in result.stderr and result.stderr.count("fogml: ") == 1
+    assert result.stdout == "" and not list(tmp_path.iterdir())
+
+
+def test_faulty_files_write_nothing(turns: Path, positions: Path, tmp_path: Path, invoke) -> None:
+    out = tmp_path / "out"
+    text = turns.read_text()
+    upright = [row for row in text.splitlines() if row.startswith("state") or row[1:4] == ",0,"]
+    for change, message in (
+        (text.replace("\n4,", "\n3,"), "no turns in state 4"),
+        (
+            "\n".join([text.splitlines()[0], *[r for r in text.splitlines() if r[1:3] == ",0"]]) + "\n",
+            "tilt 0",
+        ),
+        (text.replace("state,", "x,", 1), "no column 'state'"),
+        (text.replace("0.2\n", "nan\n", 1), "missing or not finite"),
+    ):
+        turns.write_text(change)
+        assert message in invoke("lab", "misalignment", turns, "-o", out, status=2).stderr
+    text = positions.read_text()
+    positions.write_text("\n".join(row for row in text.splitlines() if not row.endswith(",2")) + "\n")
+    assert "position 2" in invoke("lab", "north", "--positions", positions, "-o", out, status=2).stderr
+    assert not out.exists()
+
+
+def test_train_shows_the_cost_in_navigation(run_files, tmp_path: Path, invoke, invoke_json) -> None:
+    out = tmp_path / "out"
+    asked = ("train", run_files[0], "--test", run_files[1], "--model", "polynomial", "--features", "T, dT")
+    told = invoke_json(*asked, "-o", out, "--navigation", 39.9)
+    assert told["navigation"]["latitude_deg"] == 39.9
+    costs = told["navigation"]["test"][0]
+    assert costs["run"] == "b.csv" and len(costs["constant"]["after"]["north"]["position_km"]) == 6
+    assert costs["constant"]["after"]["drift_deg_h"] == pytest.approx(told["test"][0]["after"]["rms"])
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert "What the drift costs in navigation" in page
+    assert "navigation" in json.loads((out / "report.json").read_text())
+    message = invoke(*asked, "-o", tmp_path / "other", "--navigation", 90, status=2).stderr
+    assert "latitude 90" in message and not (tmp_path / "other").exists()

@@ -1,0 +1,73 @@
+"""Pages of the lab's procedures: self-contained, with their figures in words and units on every axis."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from fogml.lab.misalignment_json import misalignment_json
+from fogml.lab.misalignment_simulation import TableUnit, measurements
+from fogml.lab.navigation_cost import navigation_costs
+from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
+from fogml.lab.north_json import recorded_north_json, simulated_north_json
+from fogml.lab.north_positions import simulated_positions
+from fogml.report import misalignment_page, north_page, train_page
+from fogml.validation.report_json import finite_json
+from tests.report.judgements import judgement
+from tests.report.pages import Page
+
+UNIT = TableUnit(1.2345, 5.0, 3.0, 0.5)
+
+
+def misalignment(tilts: tuple[float, ...] = (0.0, 30.0, 60.0, 90.0), rates=(-10.0, 10.0)) -> str:
+    return misalignment_page(finite_json(misalignment_json(measurements(UNIT, tilts, rates, noise=1e-4))))
+
+
+def recorded() -> str:
+    run = simulated_positions(Scheme(dwell_s=20.0), 70.0, 30.0, Drift(3.0), random_walk_deg_sqrt_h=1e-4)
+    return north_page(finite_json(recorded_north_json(run, order_deg=DEFAULT_ORDER)))
+
+
+def simulated() -> str:
+    drift = Drift(0.18, ((0.2, 600.0),))
+    values = simulated_north_json(Scheme(transfer_s=10.0), 45.0, 30.0, drift, random_walk_deg_sqrt_h=0.002)
+    return north_page(finite_json(values))
+
+
+def trained() -> str:
+    judged = judgement()
+    return train_page(judged, finite_json(navigation_costs(judged, 39.9)))
+
+
+@pytest.mark.parametrize("make", [misalignment, recorded, simulated, trained], ids=lambda make: make.__name__)
+def test_a_page_is_whole(make) -> None:
+    html = make()
+    read = Page(html)
+    assert len(read.of("h1")) == 1 and not read.of("link")
+    for _, attributes in read.elements:
+        assert "src" not in attributes
+    plots = [a for a in read.of("div") if "plot" in (a.get("class") or "").split()]
+    assert plots and len(plots) == len(read.figures)
+    assert all(a["role"] == "img" and len(a["aria-label"] or "") > 40 for a in plots)
+    for figure in read.figures:
+        axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)]
+        titles = [axis["title"]["text"] for axis in axes if axis.get("title", {}).get("text")]
+        assert titles and all("[" in title for title in titles)
+
+
+def test_figures_in_the_text() -> None:
+    text = misalignment()
+    assert re.search(r"−44\d\d ppm", text) and "5.83" in text
+    text = simulated()
+    assert "135.0, 315.0" in text and "synthetic" in text
+    assert "is taken out" in recorded()
+    assert "What the drift costs in navigation" in trained()
+
+
+def test_without_standard_errors_the_page_says_so() -> None:
+    assert "No confidence region" in misalignment((0.0, 90.0), (50.0,))
+
+
+def test_train_page_without_navigation_has_no_such_part() -> None:
+    assert "costs in navigation" not in train_page(judgement())
