@@ -67,7 +67,13 @@ def main() -> None:
         )
     if "score" in stages:
         ledger = str(HERE / "final_uses.json")
-        settings = ScoreSettings(directory=given.directory, final=given.final, ledger=ledger, out=str(HERE))
+        settings = ScoreSettings(
+            directory=given.directory,
+            final=given.final,
+            ledger=ledger,
+            workers=given.workers,
+            out=str(HERE),
+        )
         score_and_write(settings, terminal)
 
 

@@ -122,6 +122,7 @@ def score(
         str | None,
         typer.Option("--ledger", metavar="FILE", help="(experiments/gap_blind/final_uses.json)"),
     ] = None,
+    workers: Workers = None,
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for score.json and score.html (DIR).")
     ] = None,
@@ -141,6 +142,7 @@ def score(
         "gates": gates,
         "final": final,
         "ledger": ledger,
+        "workers": workers,
         "out": str(out) if out else None,
     }
     if not score_and_write(ScoreSettings.gather(config, flags), Terminal(as_json, quiet)):

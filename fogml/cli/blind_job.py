@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -77,6 +78,7 @@ class ScoreSettings(SuiteSettings):
     gates: dict[str, float] = {}
     final: bool = False
     ledger: str = LEDGER
+    workers: int = 2
     out: str | None = None
 
     @field_validator("gates", mode="before")
@@ -168,8 +170,10 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     methods = settings.methods or list(folder.methods())
     cases = len(folder.names())
     ledger = Path(settings.ledger) if settings.final else None
-    with terminal.work("scoring", total=cases * len(methods)) as work:
-        values = score(folder, methods, ledger, lambda what: work.advance(doing=what))
+    with terminal.work("scoring", total=cases) as work:
+        values = score(
+            folder, methods, ledger, lambda case: work.advance(doing=f"scored {case}"), settings.workers
+        )
     judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
     values["gates"] = gate(values, settings.gates, judged)
     if judged == DIAGNOSIS:
@@ -192,11 +196,17 @@ def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], terminal: Te
 
     names = tuple(case["case"] for case in worst if case["verdict"] != "failed")
     method = "fogml.report.blind_answer:diagnosis_with_page"
-    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=folder.path / _REPORTS)
+    reports = folder.path / _REPORTS
+    for name in names:
+        held, answer = (place / name / "gap.json" for place in (reports, folder.answers()))
+        # A page of an answer that was given anew since is another one's.
+        if held.is_file() and held.read_bytes() != answer.read_bytes():
+            shutil.rmtree(held.parent)
+    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=reports, retry=True)
     with terminal.work("drawing the worst cases", total=len(plan.left())) as work:
         run_cases(plan, lambda case: work.advance(doing=f"drawing {case}"))
     for case in worst:
-        if (plan.answers / case["case"] / "gap.html").is_file():
+        if (reports / case["case"] / "gap.html").is_file():
             case["report"] = f"{_REPORTS}/{case['case']}/gap.html"
 
 

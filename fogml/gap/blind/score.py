@@ -29,6 +29,7 @@ def score(
     methods: Sequence[str] | None = None,
     final: Path | None = None,
     progress: Progress | None = None,
+    workers: int = 1,
 ) -> dict[str, Any]:
     """Score the answers of a suite, as JSON-ready values of schema ``fogml.blind_score/1``.
 
@@ -43,6 +44,8 @@ def score(
         The ledger of uses of final seeds, to be given where the suite's seed is one; the use is added.
     progress
         Told each case's number.
+    workers
+        Processes.
 
     Raises
     ------
@@ -62,7 +65,8 @@ def score(
     methods = folder.methods() if methods is None else methods
     if not methods:
         raise InputError(f"{folder.path}: holds no answers; run a method first (fogml blind run)")
-    found: dict[str, Any] = {name: _method(folder, name, truths, progress) for name in methods}
+    marks = marks_of(folder, methods, truths, progress, workers)
+    found: dict[str, Any] = {name: _method(name, marks[name]) for name in methods}
     digest = hashlib.sha256((folder.truth / SUMS).read_bytes()).hexdigest()
     if final is not None:
         figures = {
@@ -89,16 +93,30 @@ def score(
 
 
 def marks_of(
-    folder: BlindFolder, method: str, truths: Sequence[Truth], progress: Progress | None = None
-) -> list[Mark]:
-    """Each case's answer held against its truth."""
-    found = []
-    for truth in truths:
-        answer = read_answer(folder.answers(method) / truth.case)
-        found.append(mark(truth, answer, relatives_of(folder, truth)))
+    folder: BlindFolder,
+    methods: Sequence[str],
+    truths: Sequence[Truth],
+    progress: Progress | None = None,
+    workers: int = 1,
+) -> dict[str, list[Mark]]:
+    """Each method's answers held against the truths, in their order."""
+    from joblib import Parallel, delayed
+
+    jobs = (delayed(_marks_of_case)(folder, tuple(methods), truth) for truth in truths)
+    found: dict[str, list[Mark]] = {method: [] for method in methods}
+    pool = Parallel(n_jobs=workers, return_as="generator")
+    for truth, marks in zip(truths, pool(jobs)):
+        for method, one in zip(methods, marks):
+            found[method].append(one)
         if progress:
-            progress(f"{method} {truth.case}")
+            progress(truth.case)
     return found
+
+
+def _marks_of_case(folder: BlindFolder, methods: tuple[str, ...], truth: Truth) -> list[Mark]:
+    # What is a relative does not depend on who names it: it is worked out once for all methods.
+    relative = relatives_of(folder, truth)
+    return [mark(truth, read_answer(folder.answers(m) / truth.case), relative) for m in methods]
 
 
 def gate(values: dict[str, Any], gates: Mapping[str, float], method: str) -> list[dict[str, Any]]:
@@ -136,10 +154,7 @@ def _more_is_better(key: str) -> bool:
     return figure.low is not None
 
 
-def _method(
-    folder: BlindFolder, name: str, truths: Sequence[Truth], progress: Progress | None
-) -> dict[str, Any]:
-    marks = marks_of(folder, name, truths, progress)
+def _method(name: str, marks: Sequence[Mark]) -> dict[str, Any]:
     return {
         "rows": rows(marks),
         "reliability": [_bin(part) for part in calibration(marks)],
