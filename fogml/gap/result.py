@@ -163,8 +163,8 @@ class RunSeries:
     """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
 
     ``recorded`` is less the reference; ``gap_before``, ``gap_recalibrated`` and ``gap_after`` are
-    recorded less replayed; ``explained`` is what the effects found add; ``rate_degc_min`` tells up
-    and down apart.
+    recorded less replayed; ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the
+    unit, ``note`` is what the run's facts say of it.
     """
 
     run: str
@@ -182,6 +182,9 @@ class RunSeries:
     gap_recalibrated: FloatArray
     gap_after: FloatArray
     floor: float
+    gyro: str | None = None
+    axis: str | None = None
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
