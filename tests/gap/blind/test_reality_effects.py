@@ -70,7 +70,10 @@ def test_d_prime_is_that_of_dense_covariances(name: str) -> None:
         i, hours = np.arange(1, count + 1), 30.0 / 3600.0
         dense = toeplitz(flicker) + c.N**2 / hours * np.eye(count) + c.K**2 * hours * np.minimum.outer(i, i)
         keep = slice(unit.skipped, None)
-        columns = unit.columns(run, recorded(unit, run, (effect,)))
+        # Constants in units in which their columns are of one size.
+        sizes = {"e0": 1e6, "k1": 1e4, "k2": 1e3, "b1": 0.1, "b2": 1e-3}
+        scale = [sizes.get(name, 1.0) for name in unit.constant_names]
+        columns = unit.columns(run, recorded(unit, run, (effect,))) * scale
         s = effect.contribution(unit, run)[keep]
         solved = np.linalg.solve(dense[keep, keep], np.concatenate([columns, s[:, None]], axis=1))
         gram = gram + columns.T @ solved[:, :-1]

@@ -12,8 +12,6 @@ PRIOR_SD = {"e0": 500.0, "k1": 50.0, "k2": 0.5, "b0": 5.0, "b1": 0.05, "b2": 5e-
 """Standard deviations of the priors about 0, units as `Constants`."""
 WINDOW_S = 64.0
 """Each of the two windows of DeltaT [s]."""
-FAST_DEG_S = 40.0
-"""A fast turn [deg/s]."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +73,12 @@ def output(constants: Constants, seen: Seen) -> FloatArray:
 def temperature_slopes(constants: Constants, sample_s: float) -> tuple[float, float]:
     """What a degree of independent noise on the sensors does to a replay's output, rms [deg/h/degC].
 
-    At rest, and by the scale factor at `FAST_DEG_S`.
+    At rest, and by the scale factor for each deg/s that it turns at.
     """
     c = constants
     held = max(WINDOW_S / sample_s, 1.0)
     rest = float(np.sqrt(c.b1**2 + 2.0 * c.g**2 + 2.0 * c.m**2 / held))
-    return rest, 3600e-6 * FAST_DEG_S * float(np.hypot(c.k1, 50.0 * c.k2))
+    return rest, 3600e-6 * float(np.hypot(c.k1, 50.0 * c.k2))
 
 
 def names(turning: bool, two_faces: bool) -> tuple[str, ...]:

@@ -31,6 +31,8 @@ class Demands:
         The chamber's fan stops for a while.
     power_on
         Each run begins with power-on.
+    top_rate
+        The greatest rate of the unit's ladders [deg/s].
     """
 
     turns: bool = False
@@ -40,6 +42,7 @@ class Demands:
     power_steps: bool = False
     fan_stops: bool = False
     power_on: bool = False
+    top_rate: float = 40.0
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ def draw_programme(rng: np.random.Generator, demands: Demands, sample_s: float) 
     corners, points, soaks = _chamber_path(rng, duration, demands.shock)
     turns: list[tuple[float, float, float]] = []
     if demands.turns:
-        turns += _ladders(rng, soaks, sample_s, demands.small_rates)
+        turns += _ladders(rng, _places(rng, corners, soaks, duration), sample_s, demands)
     if demands.slow_turns:
         turns += _slow_turns(rng, duration, sample_s, turns)
     steps = _power_steps(rng, duration) if demands.power_steps else ()
@@ -153,21 +156,28 @@ def _chamber_path(
     return np.array(corners), np.array(points), [s for s in soaks if s[1] < duration]
 
 
+def _places(
+    rng: np.random.Generator, corners: FloatArray, soaks: list[tuple[float, float]], duration: float
+) -> list[tuple[float, float]]:
+    """Soaks of a quarter of an hour and more, and some of the long ramps, for the table to turn in."""
+    places = [(a, b) for a, b in soaks if b - a > 900.0]
+    spans = set(zip(corners[:-1].tolist(), corners[1:].tolist())) - set(soaks)
+    ramps = sorted((a, b) for a, b in spans if b - a > 1800.0 and b < duration)
+    return sorted(places + [ramp for ramp in ramps if rng.random() < 0.5])
+
+
 def _ladders(
-    rng: np.random.Generator, soaks: list[tuple[float, float]], sample_s: float, small: bool
+    rng: np.random.Generator, places: list[tuple[float, float]], sample_s: float, demands: Demands
 ) -> list[tuple[float, float, float]]:
-    """Up to 8 rates of either sign near the end of soaks; each dwell is whole samples."""
+    """Up to 4 rates of either sign towards the end of each place; each dwell is whole samples."""
     turns: list[tuple[float, float, float]] = []
-    top = float(np.exp(rng.uniform(np.log(10.0), np.log(80.0))))
-    for start, stop in soaks:
-        if stop - start < 1500.0:
-            continue
+    for start, stop in places:
         count = int(rng.integers(2, 5))
-        if small:
+        if demands.small_rates:
             # Down to tenths of a deg/h: 1 deg/h is 2.8e-4 deg/s.
             sizes = np.exp(rng.uniform(np.log(3e-5), np.log(5e-3), size=count))
         else:
-            sizes = top * rng.uniform(0.1, 1.0, size=count)
+            sizes = demands.top_rate * rng.uniform(0.1, 1.0, size=count)
         dwell = sample_s * np.ceil(rng.uniform(40.0, 120.0) / sample_s)
         t = sample_s * np.ceil((stop - 2.0 * count * dwell - sample_s) / sample_s)
         signs = (1.0, -1.0) if rng.random() < 0.5 else (-1.0, 1.0)

@@ -143,7 +143,7 @@ def draw_unit(
     earth_stated = bool(rng.random() < 0.85)
     demands = _draw_demands(rng, forms)
     slope, turning_slope = nominal.temperature_slopes(constants, sample_s)
-    turning_slope *= float(demands.turns and not demands.small_rates)
+    turning_slope *= demands.top_rate * float(demands.turns and not demands.small_rates)
     instruments = instruments.finer(slope, turning_slope, noise.N / np.sqrt(sample_s / 3600.0))
 
     def run(name: str, programme: Programme, of: NoiseConstants, place: int) -> UnitRun:
@@ -183,13 +183,13 @@ def _draw_set_up(rng: np.random.Generator, forms: Sequence[type[Form]]) -> SetUp
 
 def _draw_demands(rng: np.random.Generator, forms: Sequence[type[Form]]) -> Demands:
     """What the forms ask for, and the rest by chance."""
-    asked = {name: any(getattr(f.demands, name) for f in forms) for name in vars(Demands())}
-    by_chance = rng.random(len(asked))
+    kinds = [name for name, value in vars(Demands()).items() if isinstance(value, bool)]
+    asked = {name: any(getattr(f.demands, name) for f in forms) for name in kinds}
+    by_chance = rng.random(len(kinds))
     still = any(f.name == "logger_skew" for f in forms)
-    chance = {"turns": 0.0 if still else 0.4, "power_steps": 0.3, "fan_stops": 0.15, "slow_turns": 0.0}
-    return Demands(
-        **{
-            name: bool(wanted or drawn < chance.get(name, 0.0))
-            for (name, wanted), drawn in zip(asked.items(), by_chance)
-        }
-    )
+    chance = {"turns": 0.0 if still else 0.4, "power_steps": 0.3, "fan_stops": 0.15}
+    drawn = {
+        name: bool(wanted or draw < chance.get(name, 0.0))
+        for (name, wanted), draw in zip(asked.items(), by_chance)
+    }
+    return Demands(**drawn, top_rate=float(np.exp(rng.uniform(np.log(10.0), np.log(80.0)))))
