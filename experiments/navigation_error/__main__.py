@@ -129,10 +129,9 @@ at the start, one gyro drifting, height held, spherical Earth. Config: `config.y
 **Verdict: reproduced.** Closed form (a matrix exponential) and integration are at most {apart:.1e} m apart
 over 24 h; the tests hold it against the full, not linearised equations too. A constant drift of
 {settings["drift"]} deg/h costs about a kilometre and a half in the first hour or two, whatever horizontal
-gyro it is of, with Schuler's 84 min on top; over a day the north and the down gyro's errors go on growing in longitude,
-the east
-gyro's is bounded by the 24 h oscillation. The condition: it is one of the ends of a budget. Alignment
-by gyrocompass with an east gyro of {settings["drift"]} deg/h alone puts the heading off by
+gyro it is of, with Schuler's 84 min on top; over a day the north and the down gyro's errors go on growing
+in longitude, the east gyro's is bounded by the 24 h oscillation. It is one line of a
+budget: alignment by gyrocompass with an east gyro of {settings["drift"]} deg/h alone puts the heading off by
 {gyrocompass_error_deg(settings["drift"], 39.9):.3f}° at 39.9°, more than the drift does in hours.
 
 ## A constant drift of {settings["drift"]} deg/h: position [km] / heading [deg]

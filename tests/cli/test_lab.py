@@ -143,10 +143,7 @@ def test_faulty_files_write_nothing(turns: Path, positions: Path, tmp_path: Path
     upright = [row for row in text.splitlines() if row.startswith("state") or row[1:4] == ",0,"]
     for change, message in (
         (text.replace("\n4,", "\n3,"), "no turns in state 4"),
-        (
-            "\n".join([text.splitlines()[0], *[r for r in text.splitlines() if r[1:3] == ",0"]]) + "\n",
-            "tilt 0",
-        ),
+        ("\n".join(upright) + "\n", "only tilt 0 deg"),
         (text.replace("state,", "x,", 1), "no column 'state'"),
         (text.replace("0.2\n", "nan\n", 1), "missing or not finite"),
     ):
