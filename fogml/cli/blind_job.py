@@ -53,6 +53,7 @@ class MakeSettings(SuiteSettings):
 class RunSettings(SuiteSettings):
     """Settings of ``fogml blind run``."""
 
+    path_keys: ClassVar[tuple[str, ...]] = ("directory", "code")
     methods: list[str] = [DIAGNOSIS]
     code: str | None = None
     name: str | None = None
@@ -74,6 +75,7 @@ class RunSettings(SuiteSettings):
 class ScoreSettings(SuiteSettings):
     """Settings of ``fogml blind score``."""
 
+    written_keys: ClassVar[tuple[str, ...]] = ("out", "ledger")
     methods: list[str] = []
     gates: dict[str, float] = {}
     final: bool = False
@@ -138,6 +140,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     if len(methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
     told = {}
+    config = settings.in_full().yaml("blind run")
     for method in methods:
         plan = RunPlan(
             folder=settings.folder(),
@@ -156,6 +159,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
                 work.advance(doing=f"{method}: {case}")
 
             answered, failed = (run_oracle if method == ORACLE else run_cases)(plan, progress)
+        (plan.answers / "run.yaml").write_text(config, encoding="utf-8")
         told[plan.name] = {"answered": answered, "failed": failed}
         terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
     terminal.result(told)
@@ -183,6 +187,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     with whole_folder(out) as staging:
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
         (staging / "score.json").write_text(text + "\n", encoding="utf-8")
+        (staging / "score.yaml").write_text(settings.in_full().yaml("blind score"), encoding="utf-8")
         (staging / "score.html").write_text(blind_page(values, linked=beside), encoding="utf-8")
     _print(values, judged, terminal)
     terminal.result(values)

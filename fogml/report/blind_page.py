@@ -9,7 +9,7 @@ from fogml.report.blind_words import figure_text, kind_words, value_text, wanted
 from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
-from fogml.report.words import MISSING, listed, number, percent, plural
+from fogml.report.words import MISSING, listed, number, percent, plural, stated
 
 _DIAGNOSIS = "diagnosis"
 _ORACLE = "oracle"
@@ -228,7 +228,7 @@ def _gates(gates: Sequence[Mapping[str, Any]]) -> Table:
             Row(
                 (
                     one["key"],
-                    f"{'≥' if one['at_least'] else '≤'} {number(one['limit'])}",
+                    f"{'≥' if one['at_least'] else '≤'} {stated(one['limit'])}",
                     number(one["value"]),
                     "✓ met" if one["met"] else "✗ not met",
                 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fogml.report.words import MISSING, number, percent
+from fogml.report.words import MISSING, number, percent, stated
 
 _KINDS = {
     "nothing": "nothing missing",
@@ -45,9 +45,10 @@ def figure_text(row: Mapping[str, Any]) -> str:
 def wanted_text(row: Mapping[str, Any]) -> str:
     """What is wanted of a figure, such as ``≤ 2 %``; empty where nothing is."""
     low, high = (row["wanted"][end] for end in ("low", "high"))
+    unit = " s" if row["format"] == "seconds" else ""
 
     def told(value: float) -> str:
-        return f"{100 * value:.3g} %" if row["format"] == "percent" else value_text(value, row["format"])
+        return f"{100 * value:.3g} %" if row["format"] == "percent" else f"{stated(value)}{unit}"
 
     if low is not None and high is not None:
         return f"{told(low)} … {told(high)}"

@@ -37,7 +37,7 @@ def reliability_plot(bins: Sequence[Mapping[str, Any]], error: float | None) -> 
         )
     )
     figure.update_xaxes(title_text="stated probability", range=[-0.02, 1.08])
-    figure.update_yaxes(title_text="share that is true", range=[-0.04, 1.04])
+    figure.update_yaxes(title_text="share that is true", range=[-0.1, 1.04])
     style.styled(figure, _HEIGHT)
     return Drawing(
         figure,
@@ -142,7 +142,8 @@ def strata_plot(rows: Sequence[Mapping[str, Any]]) -> Drawing:
         told.append(f"{row['words']}: {', '.join(percent(value) for value in values)}")
     figure.update_xaxes(title_text="d′ of the weakest missing effect", type="category")
     figure.update_yaxes(title_text="share of cases", range=[-0.02, 1.02])
-    style.styled(figure, _HEIGHT, legend={"y": 1.02, "orientation": "h"})
+    # Room between the legend and the tools that appear above it.
+    style.styled(figure, _HEIGHT + 40, margin={"t": 84})
     return Drawing(
         figure,
         alt="Figures by stratum of d′. " + "; ".join(told),

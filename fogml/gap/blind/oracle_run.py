@@ -18,9 +18,9 @@ from fogml.outputs import whole_folder
 def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
     """Answer the cases that are left; returns how many were answered now, and how many failed."""
     left = plan.left()
+    plan.answers.mkdir(parents=True, exist_ok=True)
     if not left:
         return 0, 0
-    plan.answers.mkdir(parents=True, exist_ok=True)
     failed = 0
     with ProcessPoolExecutor(plan.workers, mp_context=get_context("spawn")) as pool:
         waiting = [pool.submit(_one, plan.folder.path, plan.answers, name) for name in left]
