@@ -137,12 +137,12 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
     fits = tuple(_fit(state, slopes[state], cross_tilt) for state in STATES)
     c = np.array([fit.coefficients[:2] for fit in fits])
     values = _solve(c)
-    rate_noise, tilt_noise, variance, dof, notes = slope_noise(slopes, fits)
+    rate_noise, tilt_noise, variances, dof, notes = slope_noise(slopes, fits)
     se, region = None, None
     intervals: dict[str, tuple[float, float]] = {}
     covariance = None
-    if variance is not None:
-        covariance = covariance_of(_solve, c, fits, variance)
+    if variances is not None:
+        covariance = covariance_of(_solve, c, fits, variances)
         se, intervals, region = errors_of(values, covariance, dof)
     across, more = _cross_tilt_angle(fits, values, covariance) if cross_tilt else (None, ())
     return Misalignment(

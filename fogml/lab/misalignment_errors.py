@@ -60,8 +60,8 @@ class Slopes:
 
 def slope_noise(
     slopes: Mapping[int, Slopes], fits: tuple[StateFit, ...]
-) -> tuple[float | None, float | None, float | None, int, tuple[str, ...]]:
-    """Noise of a slope by the rates and by the tilts, the variance to use, its degrees of freedom, notes."""
+) -> tuple[float | None, float | None, tuple[FloatArray, ...] | None, int, tuple[str, ...]]:
+    """Noise of a slope by the rates and by the tilts, the variances to use, its degrees of freedom, notes."""
     dof_rates = sum(s.dof for s in slopes.values())
     per_output = sum(s.squares for s in slopes.values()) / dof_rates if dof_rates else None
     by_rates = (
@@ -80,7 +80,8 @@ def slope_noise(
                 "slopes scatter over the tilts more than noise explains: errors of the tilt settings, "
                 "or drift between the tilts; the standard errors hold them",
             )
-        return told[0], told[1], by_tilts, dof_tilts, notes
+            return told[0], told[1], _with_tilt_errors(fits, by_rates), dof_tilts, notes
+        return told[0], told[1], _uniform(fits, by_tilts), dof_tilts, notes
     dof = dof_tilts + dof_rates
     if dof == 0:
         return (
@@ -94,14 +95,35 @@ def slope_noise(
     note = (
         "few tilts: standard errors rest on the scatter over the rates and miss errors of the tilt settings"
     )
-    return told[0], told[1], variance, dof, (note,)
+    return told[0], told[1], _uniform(fits, variance), dof, (note,)
+
+
+def _uniform(fits: tuple[StateFit, ...], variance: float) -> tuple[FloatArray, ...]:
+    return tuple(np.full(len(fit.slopes), variance) for fit in fits)
+
+
+def _with_tilt_errors(fits: tuple[StateFit, ...], by_rates: float) -> tuple[FloatArray, ...]:
+    """Variances of slopes whose tilts err: noise, and one variance of tilts times the curve's slope squared.
+
+    The tilts' variance is the one that makes the residuals as large as they are.
+    """
+    steep, seen, expected = [], 0.0, 0.0
+    for fit in fits:
+        # Columns are cos, sin (and 1): the derivative of the curve over the tilt.
+        curve = -fit.coefficients[0] * fit.design[:, 1] + fit.coefficients[1] * fit.design[:, 0]
+        left = np.eye(len(fit.slopes)) - fit.design @ np.linalg.pinv(fit.design)
+        steep.append(curve**2)
+        seen += float(fit.residuals @ fit.residuals) - by_rates * float(np.trace(left))
+        expected += float(np.diag(left) @ curve**2)
+    tilt_variance = max(seen / expected, 0.0)
+    return tuple(by_rates + tilt_variance * squares for squares in steep)
 
 
 def covariance_of(
     solve: Callable[[FloatArray], FloatArray],
     c: FloatArray,
     fits: tuple[StateFit, ...],
-    variance: float,
+    variances: tuple[FloatArray, ...],
 ) -> FloatArray:
     """Covariance of what `solve` makes of c, shape (4, 2), by central differences."""
     jacobian = np.empty((6, 8))
@@ -112,9 +134,9 @@ def covariance_of(
         up, down = solve(c + moved.reshape(4, 2)), solve(c - moved.reshape(4, 2))
         jacobian[:, i] = (up - down) / (2.0 * step)
     blocks = np.zeros((8, 8))
-    for i, fit in enumerate(fits):
-        inverse = np.linalg.inv(fit.design.T @ fit.design)
-        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = variance * inverse[:2, :2]
+    for i, (fit, variance) in enumerate(zip(fits, variances, strict=True)):
+        solver = np.linalg.pinv(fit.design)[:2]
+        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = (solver * variance) @ solver.T
     return np.asarray(jacobian @ blocks @ jacobian.T)
 
 

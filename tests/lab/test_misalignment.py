@@ -121,10 +121,10 @@ def test_intervals_cover() -> None:
     assert np.std(in_errors) == pytest.approx(np.sqrt(8 / 6), rel=0.15)
 
 
-def test_intervals_nearly_cover_where_tilt_settings_err() -> None:
-    """Errors of the tilts act at high tilts only, which one variance for all does not know."""
+def test_intervals_cover_where_tilt_settings_err() -> None:
+    """Errors of the tilts act at high tilts only: one variance for all slopes covers under 90 %."""
     inside, _ = coverage(200, noise=1e-3, tilt_noise_deg=0.05)
-    assert min(inside.values()) >= 170, inside
+    assert min(inside.values()) >= 178, inside
 
 
 def test_zero_misalignment_lies_in_the_interval() -> None:
