@@ -101,16 +101,16 @@ class GlassGaussian(Additive):
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """dT/dt exp(-0.75 x**2) + r (1 + erf(x)) / 2 with x = (T - T_g) / w."""
-        rate = world.rates["T_coil"]
+        rate = world.rates["T_in"]
         transition = shape["transition_temperature"] + shape["shift"] * np.log10(np.hypot(rate, 0.02))
-        x = (world.nodes["T_coil"] - transition) / shape["width"]
+        x = (world.nodes["T_in"] - transition) / shape["width"]
         return rate * np.exp(-0.75 * x * x) + 0.5 * shape["static_ratio"] * (1.0 + erf(x))
 
 
 class Leads(Additive):
     """Leads along the way from the electronics to the hub and to the case."""
 
-    name, form, unit = "pigtail_shupe", "leads past hub and case", "m"
+    name, form = "pigtail_shupe", "leads past hub and case"
     records, fine_sensors = ("T_electronics", "T_case"), True
     demands = Demands(power_steps=True)
 

@@ -56,7 +56,7 @@ class MachinePickup(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Exponent over the duty, delay [s]."""
-        return {"exponent": rng.uniform(0.85, 1.2), "delay": rng.uniform(0.5, 10.0)}
+        return {"exponent": rng.uniform(0.95, 1.05), "delay": rng.uniform(0.5, 10.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """heater**p + compressor, lagged."""
@@ -76,7 +76,7 @@ class FieldBent(Additive):
         return {
             "phase": rng.uniform(0.0, 360.0),
             "axial_ratio": rng.uniform(0.1, 0.5),
-            "bend": rng.uniform(0.0, 0.15),
+            "bend": rng.uniform(0.0, 0.05),
         }
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:

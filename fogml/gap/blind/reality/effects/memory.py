@@ -23,7 +23,7 @@ def _prandtl_ishlinskii(temperature: FloatArray, half_width: float, spread: floa
 class HysteresisBoucWen(Additive):
     """Bouc-Wen's hysteresis with exponent 2."""
 
-    name, form, unit = "thermal_hysteresis", "Bouc-Wen", "deg/h"
+    name, form = "thermal_hysteresis", "Bouc-Wen"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """The half width that a play operator of the same knee has."""
@@ -37,7 +37,7 @@ class HysteresisBoucWen(Additive):
 class HysteresisPreisach(Additive):
     """Preisach's hysteresis with a density over half widths (Prandtl-Ishlinskii)."""
 
-    name, form, unit = "thermal_hysteresis", "Preisach", "deg/h"
+    name, form = "thermal_hysteresis", "Preisach"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Middle and spread of the half widths."""
@@ -52,7 +52,7 @@ class HysteresisPreisach(Additive):
 class ScaleFactorPreisach(ScaleFactor):
     """Preisach's hysteresis of the scale factor."""
 
-    name, form, unit = "sf_hysteresis", "Preisach", "ppm"
+    name, form = "sf_hysteresis", "Preisach"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Middle and spread of the half widths."""
@@ -66,7 +66,7 @@ class ScaleFactorPreisach(ScaleFactor):
 class StressSpectrum(Additive):
     """A log-normal spectrum of Maxwell elements with an activation energy."""
 
-    name, form, unit = "stress_relaxation", "spectrum of Maxwell elements", "deg/h/degC"
+    name, form = "stress_relaxation", "spectrum of Maxwell elements"
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Middle time constant at 25 degC, spread of its logarithm, activation energy."""
