@@ -199,7 +199,8 @@ cancel.
 
 Coverage: share of 95 % intervals that hold the truth. The interval of δ is what the joint region of x and y
 spans, and so covers more. With errors of the tilts ({settings["tilt_noise"]}°, one for each setting) the
-slopes scatter more at high tilts than at low ones: where that shows, a variance of the tilts is estimated beside that of the noise.
+slopes scatter more at high tilts than at low ones: where that shows, a variance
+of the tilts is estimated beside that of the noise.
 
 | case | mean error of K [ppm] | rms of K [ppm] | rms of x [deg] | standard error of x [deg] | K | x | δ |
 |---|---:|---:|---:|---:|---:|---:|---:|
