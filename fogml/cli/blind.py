@@ -13,7 +13,7 @@ from fogml.cli.terminal import Terminal
 app = typer.Typer(
     **options.APP_SETTINGS,
     no_args_is_help=True,
-    help="The check on withheld effects: make cases, answer them sealed off from the truth, score.",
+    help="The check on withheld effects: make cases, answer them, score.",
 )
 
 Folder = Annotated[str | None, typer.Argument(metavar="DIR", help="The suite's folder.")]
@@ -81,6 +81,7 @@ def run(
         str | None, typer.Option("--shard", metavar="I/N", help="Every N-th case from the I-th on.")
     ] = None,
     retry: Annotated[bool | None, typer.Option("--retry", help="Try failed cases again.")] = None,
+    seed: options.Seed = None,
     config: options.Config = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -98,6 +99,7 @@ def run(
         "limit": limit,
         "shard": shard,
         "retry": retry,
+        "seed": seed,
     }
     run_and_tell(RunSettings.gather(config, flags), Terminal(as_json, quiet))
 
@@ -126,6 +128,7 @@ def score(
     out: Annotated[
         Path | None, typer.Option("--out", "-o", help="Folder for score.json and score.html (DIR).")
     ] = None,
+    seed: options.Seed = None,
     config: options.Config = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
@@ -144,6 +147,7 @@ def score(
         "ledger": ledger,
         "workers": workers,
         "out": str(out) if out else None,
+        "seed": seed,
     }
     if not score_and_write(ScoreSettings.gather(config, flags), Terminal(as_json, quiet)):
         raise typer.Exit(1)

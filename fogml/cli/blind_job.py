@@ -152,6 +152,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
             limit_s=settings.limit,
             shard=settings.part,
             retry=settings.retry,
+            seed=settings.seed,
         )
         with terminal.work(method, total=len(plan.left())) as work:
 
@@ -181,7 +182,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
     values["gates"] = gate(values, settings.gates, judged)
     if judged == DIAGNOSIS:
-        _draw_reports(folder, values["methods"][judged]["worst"], terminal)
+        _draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
     out = Path(settings.out) if settings.out else folder.path
     beside = out.resolve() == folder.path.resolve()
     with whole_folder(out) as staging:
@@ -195,7 +196,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     return all(one["met"] for one in values["gates"])
 
 
-def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], terminal: Terminal) -> None:
+def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], seed: int, terminal: Terminal) -> None:
     """Diagnose the worst cases once more, to draw their pages, and link to those."""
     from fogml.gap.blind.run import RunPlan, run_cases
 
@@ -207,7 +208,7 @@ def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], terminal: Te
         # A page of an answer that was given anew since is another one's.
         if held.is_file() and held.read_bytes() != answer.read_bytes():
             shutil.rmtree(held.parent)
-    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=reports, retry=True)
+    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=reports, retry=True, seed=seed)
     with terminal.work("drawing the worst cases", total=len(plan.left())) as work:
         run_cases(plan, lambda case: work.advance(doing=f"drawing {case}"))
     for case in worst:

@@ -39,6 +39,8 @@ class CaseFiles:
         The static run for the noise, if there is one.
     without
         Ids that are no candidates.
+    seed
+        Of what a method draws.
     """
 
     name: str
@@ -46,6 +48,7 @@ class CaseFiles:
     held_out: tuple[Path, ...]
     noise: Path | None
     without: tuple[str, ...]
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -88,7 +91,7 @@ class BlindFolder:
         return tuple(found)
 
 
-def case_files(folder: Path) -> CaseFiles:
+def case_files(folder: Path, seed: int = 0) -> CaseFiles:
     """What lies in a case's folder.
 
     Raises
@@ -104,7 +107,7 @@ def case_files(folder: Path) -> CaseFiles:
     without = options.get("without", [])
     if not isinstance(without, list) or not all(isinstance(id, str) for id in without):
         raise InputError(f"{folder / 'options.json'}: key 'without' must list ids of effects")
-    return CaseFiles(folder.name, fit, held_out, static if static.is_file() else None, tuple(without))
+    return CaseFiles(folder.name, fit, held_out, static if static.is_file() else None, tuple(without), seed)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -63,6 +63,7 @@ def diagnosis(case: CaseFiles, out: Path) -> Any:
         [read_run(path) for path in case.held_out],
         noise=read_run(case.noise) if case.noise else None,
         without=case.without,
+        seed=case.seed,
     )
     text = json.dumps(found.as_dict(), allow_nan=False, ensure_ascii=False)
     (out / "gap.json").write_text(text + "\n", encoding="utf-8")

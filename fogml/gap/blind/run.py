@@ -50,6 +50,8 @@ class RunPlan:
         Numbers of the cases, where not all are wanted.
     into
         Folder of the answers, where it is not the method's.
+    seed
+        Of what a method draws.
     """
 
     folder: BlindFolder
@@ -63,6 +65,7 @@ class RunPlan:
     retry: bool = False
     only: tuple[str, ...] | None = None
     into: Path | None = None
+    seed: int = 0
 
     def __post_init__(self) -> None:
         i, n = self.shard
@@ -211,7 +214,7 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
     shutil.copytree(source, case)
     out.mkdir()
     try:
-        answer = worker.ask({"case": name, "out": out.name}, plan.limit_s)
+        answer = worker.ask({"case": name, "out": out.name, "seed": plan.seed}, plan.limit_s)
         if answer["done"] and not (out / "gap.json").is_file():
             answer |= {"done": False, "reason": "no answer", "message": "no gap.json was written"}
     except WorkerLost as lost:

@@ -45,7 +45,7 @@ def _answer(method: Any, home: Path, line: str) -> dict[str, Any]:
     began = time.perf_counter()
     answer: dict[str, Any] = {"case": asked["case"], "done": True, "reason": None, "message": ""}
     try:
-        method(case_files(home / asked["case"]), home / asked["out"])
+        method(case_files(home / asked["case"], asked["seed"]), home / asked["out"])
     except FogmlError as error:
         answer |= {"done": False, "reason": "refused", "message": str(error)}
     except Exception as error:

@@ -26,9 +26,11 @@ def random_forest(case: CaseFiles, out: Path) -> None:
     usable = np.flatnonzero(problem.visible(columns))
     picked = [problem.atoms[i] for i in usable]
     gap = fit.stack.gap - fit.recalibrated
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(case.seed)
     rows = rng.choice(len(gap), min(len(gap), _ROWS), replace=False)
-    forest = RandomForestRegressor(_TREES, max_depth=_DEPTH, min_samples_leaf=5, random_state=0, n_jobs=1)
+    forest = RandomForestRegressor(
+        _TREES, max_depth=_DEPTH, min_samples_leaf=5, random_state=case.seed, n_jobs=1
+    )
 
     def table(runs: Stack) -> FloatArray:
         return np.column_stack([runs.column(atom) for atom in picked])

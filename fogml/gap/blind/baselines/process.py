@@ -41,7 +41,7 @@ def gp_discrepancy(case: CaseFiles, out: Path) -> None:
     y = np.add.reduceat(gap, edges[:-1]) / counts
     size = float(y.std()) or 1.0
     kernel = ConstantKernel(1.0, (1e-3, 1e3)) * RBF(np.ones(x.shape[1]), (0.05, 50.0))
-    process = GaussianProcessRegressor(kernel + WhiteKernel(0.5, (1e-4, 10.0)), random_state=0)
+    process = GaussianProcessRegressor(kernel + WhiteKernel(0.5, (1e-4, 10.0)), random_state=case.seed)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         process.fit(x, y / size)

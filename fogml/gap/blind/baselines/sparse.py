@@ -34,7 +34,7 @@ def stlsq(case: CaseFiles, out: Path) -> None:
     usable = np.flatnonzero(problem.visible(columns))
     unit = columns[:, usable] / sizes[usable]
     blocks = np.array_split(np.arange(len(problem.stack)), _BLOCKS)
-    rng = np.random.default_rng(0)
+    rng = np.random.default_rng(case.seed)
     kept = np.zeros(len(usable))
     for _ in range(FITS):
         rows = np.concatenate([blocks[i] for i in rng.integers(0, _BLOCKS, _BLOCKS)])
