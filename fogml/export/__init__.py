@@ -1,1 +1,1 @@
-"""Compact weights: a fitted model as C99, ONNX, JSON with safetensors, or MATLAB file, checked before it is written."""
+"""Compact weights: a fitted model as C99, ONNX, JSON or MATLAB file, checked before it is written."""

@@ -25,7 +25,7 @@ IntArray = NDArray[np.int64]
 OUTPUT_BITS = 12
 """Outputs are multiples of 2**-12 deg/h."""
 EXP_ERROR = 3e-8
-"""Greatest absolute error of the generated exponential, its argument's rounding included; held by the tests."""
+"""Greatest absolute error of the generated exponential, its argument's rounding included."""
 _VALUE_BITS = 30
 _SUM_BITS = 60
 _MOST_DRIFT_BITS = 36
@@ -71,8 +71,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         plan, gyro, "time_us [us]", f"whole steps of 2^-{bits} degC, in the order of the places below"
     )
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
+    rates = any(o.method != "first" or o.unit_s is not None for o in windows.operators)
     return {
         "fixed": fixed,
+        "rates": rates,
+        "ratios": rates or bool(plan.centres and plan.edge_columns),
         "real": "int64_t",
         "suffix": "",
         "time_type": "int64_t",
@@ -175,9 +178,10 @@ def _sixteen_bits(plan: Plan) -> int:
 
 
 def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
+    shift = _HELD_BITS - bits + _SIGNAL_SHIFT
     factors = [
-        f"temperatures[FOGML_{name.upper()}] * INT64_C({round(c * 2.0 ** (_HELD_BITS - bits + _SIGNAL_SHIFT))})"
-        for name, c in parts
+        f"temperatures[FOGML_{name.upper()}] * INT64_C({round(coefficient * 2.0**shift)})"
+        for name, coefficient in parts
     ]
     return f"(int32_t)clipped(scaled({' + '.join(factors)}, {_SIGNAL_SHIFT}), INT64_C(1) << 29)"
 
@@ -276,7 +280,7 @@ def _constants(plan: Plan, windows: Layout, scales: _Scales, dtype: str) -> list
     lines = []
     if windows.operators:
         lines += [
-            f"#define LONGEST_GAP_US INT64_C({round(windows.longest_gap_s * 1e6)}) /* a longer one restarts all windows */",
+            f"#define LONGEST_GAP_US INT64_C({round(windows.longest_gap_s * 1e6)}) /* longest gap */",
             "#define TICKS_LIMIT (INT64_C(1) << 61)",
         ]
         if round(windows.tick_s * 1e6) > 1:

@@ -149,7 +149,7 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         lines += [
             f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
             f"#define COLUMNS {len(plan.steps)} /* features */",
-            f"#define TEMPERATURE_LIMIT {number(2.0**RANGE_BITS)} /* [degC], either way: no sensor tells more */",
+            f"#define TEMPERATURE_LIMIT {number(2.0**RANGE_BITS)} /* [degC], either way */",
         ]
     if windows.operators:
         lines += [

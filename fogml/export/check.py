@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import CSource
-from fogml.export.plan import Plan
+from fogml.export.plan import Plan, chosen_model
 from fogml.export.points import POINTS, box_points, history
 from fogml.models.base import DriftModel
 
@@ -33,6 +33,8 @@ class Difference:
         Up to a fifth of the span outside of it, where it is flagged.
     points, samples
         Points in the box and samples of a history that were compared.
+    good
+        Those of the history with flag 0.
     flags
         Samples of the history whose flag differs.
     scale_ppm
@@ -43,6 +45,7 @@ class Difference:
     outside: float
     points: int
     samples: int = 0
+    good: int = 0
     flags: int = 0
     scale_ppm: float | None = None
 
@@ -51,7 +54,12 @@ class Difference:
         values: dict[str, Any] = {
             "largest_difference": self.inside,
             "largest_difference_outside": self.outside,
-            "compared": {"points": self.points, "samples": self.samples, "flags_differ": self.flags},
+            "compared": {
+                "points": self.points,
+                "samples": self.samples,
+                "good": self.good,
+                "flags_differ": self.flags,
+            },
         }
         if self.scale_ppm is not None:
             values["scale_difference_ppm"] = self.scale_ppm
@@ -64,24 +72,17 @@ def plan_error(plan: Plan, model: DriftModel, seed: int) -> float:
     run = past.run(plan)
     atoms, full = past.atoms(plan)
     value, _ = plan.compensated(atoms, full, past.gyro)
-    model = getattr(model, "chosen_", model)
+    model = chosen_model(model)
     evaluation = model.evaluate_atoms(run, atoms, full)
-    gyro = run.gyro if plan.form == "joint" else run.gyro_deg_h
-    if plan.gyro_unit == "count":
-        # The run's facts hold no scale factor; the rate is what the model makes of the counts.
-        rate = model.regressor_.predict_unchecked(
-            model._columns(np.column_stack((gyro, plan.limited(atoms, full)[0])))
-        )  # type: ignore[attr-defined]
-        return float(np.max(np.abs(value - rate)))
-    return float(np.max(np.abs(value - (gyro - evaluation.drift))))
+    return float(np.max(np.abs(value - (run.gyro_deg_h - evaluation.drift))))
 
 
 def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> Difference:
     """Difference of generated C from a plan, at points and over a history with gaps."""
     fixed = source.numbers["fixed"]
-    gyro_step = fixed["gyro_value"] if fixed else None
+    gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
     past = history(plan, seed)
-    gyro = past.gyro if gyro_step is None else np.round(past.gyro / gyro_step) * gyro_step
+    gyro = np.round(past.gyro / gyro_step) * gyro_step if fixed else past.gyro
     atoms, full = past.atoms(plan)
     expected, flags = plan.compensated(atoms, full, gyro)
     if fixed:
@@ -94,19 +95,20 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
         out, told = program.steps(past.time, past.temperatures, gyro)
     off = np.abs(out.astype(np.float64) - expected)
     inside, outside = _largest(off[flags != 1]), _largest(off[flags == 1])
-    count = len(off)
+    count, good = len(off), int(np.count_nonzero(flags == 0))
     differ = int(np.count_nonzero(told != flags))
     if not plan.atoms:
-        return Difference(inside, outside, 0, count, differ)
+        return Difference(inside, outside, 0, count, good, differ)
     near = _atoms_off(plan, source, program, box_points(plan, seed), gyro[0])
     far = _atoms_off(plan, source, program, box_points(plan, seed, _BEYOND), gyro[0])
     ppm = None
     if plan.form == "joint":
-        turn = float(
-            np.round(_TURN_DEG_H / plan.arrays["scale"][0] / (gyro_step or 1e-9)) * (gyro_step or 1e-9)
-        )
+        turn = float(_TURN_DEG_H / plan.arrays["scale"][0])
+        turn = float(np.round(turn / gyro_step) * gyro_step) if fixed else turn
         ppm = 1e6 * _largest(_atoms_off(plan, source, program, box_points(plan, seed), turn)) / _TURN_DEG_H
-    return Difference(max(inside, _largest(near)), max(outside, _largest(far)), POINTS, count, differ, ppm)
+    return Difference(
+        max(inside, _largest(near)), max(outside, _largest(far)), POINTS, count, good, differ, ppm
+    )
 
 
 def _atoms_off(plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, gyro: float) -> FloatArray:
@@ -138,7 +140,7 @@ def pipeline_difference(
     plan: Plan, value: Callable[[FloatArray, FloatArray], FloatArray], length: int, seed: int
 ) -> Difference:
     """Difference of a function of (windows (n, m, s), output (n,)) from a plan's drift, over a history."""
-    past = history(plan, seed)
+    past = history(plan, seed, 2 * length)
     # A window knows nothing of gaps: the history on its grid is what it is made for.
     count = 1 + round((past.time[-1] - past.time[0]) / plan.sample_s)
     time = past.time[0] + plan.sample_s * np.arange(count)
@@ -150,7 +152,9 @@ def pipeline_difference(
     windows = np.stack([temperatures[end - length + 1 : end + 1] for end in ends])
     off = np.abs(whole.gyro[ends] - value(windows, whole.gyro[ends]) - expected[ends])
     inside = flags[ends] == 0
-    return Difference(_largest(off[inside]), _largest(off[~inside]), 0, len(ends))
+    return Difference(
+        _largest(off[inside]), _largest(off[~inside]), 0, len(ends), int(np.count_nonzero(inside))
+    )
 
 
 def _largest(off: NDArray[Any]) -> float:

@@ -1,4 +1,4 @@
-"""Exporting a fitted model: made small, written in one form, compared with the model, refused if too far off."""
+"""A fitted model made small, written in one form, compared with the model, and refused if too far off."""
 
 from __future__ import annotations
 
@@ -202,9 +202,9 @@ def _within(
 ) -> None:
     if not total <= tolerance:
         raise InputError(
-            f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, more "
-            f"than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or state "
-            "--tolerance if that is good enough. Nothing was written"
+            f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, "
+            f"more than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or "
+            "state --tolerance if that is good enough. Nothing was written"
         )
     if (
         difference.scale_ppm is not None
@@ -252,8 +252,9 @@ def _card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
             f"trained box   {safe(name)}: {low:.6g} to {high:.6g}"
             for name, (low, high) in card["box"].items()
         ),
-        f"accuracy      90 % of {card['averaging_s']:g} s averages within {card['half_width_90_deg_h']:.3g} deg/h, by parts of the training runs",
-        "              that were left out; outside the trained box it is not known",
+        f"accuracy      90 % of {card['averaging_s']:g} s averages within "
+        f"{card['half_width_90_deg_h']:.3g} deg/h,",
+        "              by parts of the training runs that were left out; not known outside the trained box",
         f"numbers       {dtype}"
         + (f", pruned to {card['pruned_to_bytes']} bytes of weights" if "pruned_to_bytes" in card else ""),
     ]
@@ -306,10 +307,10 @@ def _write_numbers(
         return {"difference": _write_onnx(plan, folder, dtype, settings, stored, card)}, exported
     if settings.to == "json":
         number_files.write_json(folder, plan, stored, dtype, card)
-        read = number_files.read_json(folder, plan)
+        read = [*number_files.read_json(folder, plan)]
     else:
         number_files.write_mat(folder, plan, stored, dtype, card)
-        read = (number_files.read_mat(folder, plan),)
+        read = [number_files.read_mat(folder, plan)]
     differences = [value_difference(plan, lambda c, g, p=p: p.value(c, g), seed) for p in read]  # type: ignore[misc]
     return {"difference": max(differences, key=lambda difference: difference.inside)}, exported
 

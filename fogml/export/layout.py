@@ -150,8 +150,8 @@ def layout(plan: Plan, number: Number) -> Layout:
     for (signal, window, unit_s), gap_s in zip(keys, gaps):
         place = signals.index(signal)
         operators.append(_operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s, number))
-    of_atom = tuple(-1 if _key(atom) is None else keys.index(_key(atom)) for atom in plan.atoms)  # type: ignore[arg-type]
-    longest = max(gaps, default=0.0)
+    of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
+    longest_gap = max(gaps, default=0.0)
     return Layout(
         tick_s,
         TEMPERATURE_BITS[number],
@@ -161,8 +161,8 @@ def layout(plan: Plan, number: Number) -> Layout:
         tuple(signals.index(atom.signal) for atom in plan.atoms),
         held,
         ring,
-        longest,
-        round(longest / tick_s),
+        longest_gap,
+        round(longest_gap / tick_s),
     )
 
 

@@ -32,7 +32,7 @@ LIMITING = (
 def write_json(
     folder: Path, plan: Plan, stored: Mapping[str, Stored], dtype: str, card: Mapping[str, Any]
 ) -> None:
-    """Write `JSON_FILE`, which holds everything in words and numbers, and `TENSORS_FILE`, the packed numbers."""
+    """Write `JSON_FILE`, everything in words and numbers, and `TENSORS_FILE`, the numbers packed."""
     from safetensors.numpy import save_file
 
     arrays = arrays_to_write(stored, plan, dtype)

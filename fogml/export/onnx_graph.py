@@ -41,6 +41,10 @@ def onnx_model(
         from onnx import TensorProto, checker, helper
     except ImportError:
         raise InputError("export: onnx is not installed; pip install 'fogml[export]'") from None
+    if plan.form == "constant":
+        raise InputError(
+            f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
+        )
     if plan.form == "joint" and plan.gyro_unit != "deg/h":
         raise InputError(
             f"export: this joint model takes the output in {plan.gyro_unit} and gives a rate, which ONNX's "
@@ -95,13 +99,16 @@ def window_weights(plan: Plan) -> FloatArray:
     length = int(np.ceil(memory / plan.sample_s - 1e-6)) + 2
     if length * max(1, len(plan.sensors)) > _MOST_WINDOW:
         raise InputError(
-            f"export: the windows look back over {length} samples, too many for a graph; leave out --with-pipeline"
+            f"export: the windows look back over {length} samples, too many for a graph; "
+            "leave out --with-pipeline"
         )
     weights = np.zeros((length, len(plan.sensors), len(rates)))
     time = plan.sample_s * np.arange(2 * length - 1)
     for place, sensor in enumerate(plan.sensors):
-        columns = {name: np.zeros(len(time)) for name in ("time", "gyro", *plan.sensors)}
-        columns["time"] = time
+        columns: dict[str, FloatArray] = {
+            name: np.zeros(len(time)) for name in ("time", "gyro", *plan.sensors)
+        }
+        columns["time"] = np.asarray(time, dtype=np.float64)
         columns[sensor][length - 1] = 1.0
         answer, _ = evaluate(rates, Run("impulse", columns), plan.sample_s)
         weights[:, place] = answer[length - 1 :][::-1]
@@ -186,10 +193,6 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> str:
 def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:
     """Drift (n) of feature columns (n, k)."""
     constant = graph.stored(stored["constant"])
-    if plan.form == "constant":
-        raise InputError(
-            f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
-        )
     linear = graph.sum(graph.add("Mul", [columns, graph.stored(stored["linear"])]), 1)
     value = graph.add("Add", [linear, constant])
     if plan.form == "joint":

@@ -65,14 +65,14 @@ class Limits:
         return cls(*[np.empty(0)] * 7)
 
     def apply(self, atoms: FloatArray, heeded: BoolArray) -> tuple[FloatArray, BoolArray]:
-        """Limited atoms (n, a) and where a row is outside (n,); `heeded` (n, a): values that mean something."""
+        """Limited atoms (n, a), and rows outside (n,); `heeded` (n, a): where values mean something."""
         above, below = atoms - self.high, self.low - atoms
         beyond = np.where(heeded, np.maximum(np.maximum(above, below), 0.0), 0.0)
         soft = self.margin * beyond / (self.margin + beyond)
         limited = np.where(above > 0.0, self.high + soft, self.low - soft)
         limited = np.where(beyond > 0.0, limited, atoms)
         outside = heeded & ((atoms < self.inner) | (atoms > self.outer))
-        return limited, outside.any(axis=1)
+        return np.asarray(limited), np.asarray(outside.any(axis=1))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,17 +136,16 @@ class Plan:
         InputError
             If the model is made of something that has no compact form.
         """
-        model = getattr(model, "chosen_", model)
+        model = chosen_model(model)
         model._check_fitted()
         interval = model.card_.sample_s if sample_s is None else sample_s
         if not (np.isfinite(interval) and interval > 0.0):
             raise InputError(f"export: a sample interval of {interval} s; state one with --sample-s")
         features = model.features_
         if features is None:
-            bias = np.array([float(model.bias_)])  # type: ignore[attr-defined]
-            empty: tuple[Any, ...] = ((), (), (), (), Limits.none(), {"constant": bias})
-            return cls(model.kind, "constant", *empty, interval)
-        shared = {
+            arrays = {"constant": np.array([float(getattr(model, "bias_", 0.0))])}
+            return cls(model.kind, "constant", (), (), (), (), Limits.none(), arrays, interval)
+        shared: dict[str, Any] = {
             "kind": model.kind,
             "sensors": features.sensors,
             "atoms": features.atoms,
@@ -236,6 +235,12 @@ class Plan:
         return drawn
 
 
+def chosen_model(model: DriftModel) -> DriftModel:
+    """The model itself, or the one that an automatic choice stands for."""
+    chosen = getattr(model, "chosen_", None)
+    return chosen if isinstance(chosen, DriftModel) else model
+
+
 def _regression(model: DriftModel, features: Features) -> dict[str, Any]:
     """What a model with features maps their columns to drift by."""
     from fogml.models.joint import JointModel
@@ -243,7 +248,7 @@ def _regression(model: DriftModel, features: Features) -> dict[str, Any]:
     from fogml.models.rbf.fitted import NetworkRegressor
     from fogml.models.regressors import goes_on_linearly
 
-    regressor = model.regressor_  # type: ignore[attr-defined]
+    regressor: Any = getattr(model, "regressor_", None)
     if isinstance(model, JointModel):
         scale, linear = np.split(np.asarray(regressor.coef_, dtype=np.float64), [3])
         arrays = {"scale": scale, "linear": linear, "constant": np.array([regressor.intercept_])}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.features.features import Features
+from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
@@ -55,7 +56,10 @@ class History:
         """As a run."""
         columns: dict[str, Any] = {"time": self.time, "gyro": self.gyro}
         columns |= {name: self.temperatures[:, i] for i, name in enumerate(plan.sensors)}
-        return Run("history", columns, gyro_unit="count" if plan.gyro_unit == "count" else "deg/h")
+        if plan.gyro_unit != "count":
+            return Run("history", columns)
+        nominal = ScaleFactor(value=1.0 / float(plan.arrays["scale"][0]))
+        return Run("history", columns, Facts(scale_factor=nominal), "count")
 
     def atoms(self, plan: Plan) -> tuple[FloatArray, NDArray[np.bool_]]:
         """Atom values (n, a) and where all windows are full, as the library works them out."""
@@ -64,25 +68,27 @@ class History:
         return Features(", ".join(plan.names)).atom_values(self.run(plan), plan.sample_s)
 
 
-def history(plan: Plan, seed: int) -> History:
+def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths."""
     rng = np.random.default_rng([seed, 2])
     longest = max((atom.window.span_s for atom in plan.atoms if atom.window), default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
+    count = max(count, least)
     step = plan.sample_s
     time = step * np.arange(count)
     ranges = [sensor_range(plan, sensor) for sensor in plan.sensors]
-    paths = np.empty((count, len(ranges)))
+    paths: FloatArray = np.empty((count, len(ranges)))
     for i, (low, high, fastest) in enumerate(ranges):
         span = high - low
-        speed = min(fastest, 240.0 * span / (count * step) * 4.0) / 60.0
-        path = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed)
-        offset = _offset(plan, plan.sensors[i]) if i else None
-        if offset is not None:
-            # A sensor that is known by its difference to the first keeps within that.
-            middle, width = offset
-            path = paths[:, 0] - middle - width * np.sin(2.0 * np.pi * (1.5 + i) * time / time[-1])
-        paths[:, i] = path
+        speed = fastest / 60.0
+        if i == 0:
+            paths[:, i] = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed)
+            continue
+        # Sensors of one gyro move together; how far apart is told by their difference, or by their ranges.
+        first_low, first_high, _ = ranges[0]
+        apart = 0.5 * (first_low + first_high - low - high), 0.02 * span
+        middle, width = _offset(plan, plan.sensors[i]) or apart
+        paths[:, i] = paths[:, 0] - middle - width * np.sin(2.0 * np.pi * (1.5 + i) * time / time[-1])
     size = _GYRO_DEG_H / (abs(plan.arrays["scale"][0]) if plan.form == "joint" else 1.0)
     gyro = size * rng.uniform(-1.0, 1.0, count)
     keep = np.ones(count, dtype=np.bool_)
@@ -90,7 +96,7 @@ def history(plan: Plan, seed: int) -> History:
         start, length = int(rng.integers(count // 2, count - 2)), round(length_s / step)
         keep[start : start + min(length, count // 20)] = False
     keep[-1] = True
-    return History(time[keep], paths[keep], gyro[keep])
+    return History(np.asarray(time[keep], dtype=np.float64), paths[keep], gyro[keep])
 
 
 def _walk(

@@ -143,6 +143,6 @@ def _solved(columns: FloatArray, target: FloatArray) -> FloatArray:
 
 def _too_small(plan: Plan, budget: int, dtype: str, least: int) -> InputError:
     return InputError(
-        f"export: --bytes {budget} is too few: the smallest form of this '{plan.kind}' takes {least} bytes in "
-        f"{dtype}; give at least that, or a smaller --dtype"
+        f"export: --bytes {budget} is too few: the smallest form of this '{plan.kind}' takes {least} bytes "
+        f"in {dtype}; give at least that, or a smaller --dtype"
     )

@@ -12,6 +12,8 @@ from fogml.export.plan import Plan
 
 _CHECKS = 8
 _PERIOD = 12
+_USUAL_RATE = 2.0
+# Of chambers [degC/min], where the box tells none.
 _FLOAT_TOLERANCE = {"float64": 1e-9, "float32": 2e-5}
 
 
@@ -126,9 +128,13 @@ def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
     """Lowest and highest value of a sensor [degC] in the trained box, and its fastest rate [degC/min]."""
     low, high, fastest = 10.0, 40.0, np.inf
     for i, atom in enumerate(plan.atoms):
-        if atom.signal.is_sensor and atom.signal.sensors == (sensor,):
-            if atom.operator == "value":
-                low, high = plan.limits.box_low[i], plan.limits.box_high[i]
-            elif atom.operator == "d":
-                fastest = max(abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
-    return float(low), float(high), float(fastest)
+        ends = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
+        weights = dict(atom.signal.parts)
+        total = abs(sum(weights.values()))
+        if atom.operator == "value" and atom.signal.is_sensor and sensor in weights:
+            low, high = ends
+        elif atom.window and atom.operator in ("d", "diff") and sensor in weights and total > 1e-9:
+            seconds = atom.window.length_s or plan.sample_s
+            per_minute = 60.0 / seconds if atom.operator == "diff" else 1.0
+            fastest = min(fastest, max(abs(end) for end in ends) * per_minute / total)
+    return low, high, fastest if np.isfinite(fastest) else _USUAL_RATE

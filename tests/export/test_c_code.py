@@ -1,0 +1,235 @@
+"""Generated C gives what `fogml compensate` gives, on this machine and on ARM, without warnings or faults."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from fogml.errors import InputError
+from fogml.export.c_fixed import EXP_ERROR as FIXED_EXP_ERROR
+from fogml.export.c_float import EXP_ERROR
+from fogml.export.c_program import FLAGS, CProgram, cortex_m4_size
+from fogml.export.c_source import c_source
+from fogml.export.check import expected_outputs
+from fogml.export.plan import Plan
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+from tests.export.conftest import NAMES, training_run
+
+needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+pytestmark = needs_cc
+SANITIZERS = (*FLAGS, "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
+BOUND = {"float64": 2e-6, "float32": 2e-3, "q31": 2e-3}
+
+
+def disturbed(seed: int, jitter: float = 0.0) -> Run:
+    """Other ramps than in training, out of the trained box too, with gaps of every length."""
+    rng = np.random.default_rng(seed)
+    time = 2.0 * np.arange(2500)
+    inner = 20.0 + 55.0 * np.sin(2 * np.pi * time / 3600.0) + 3.0 * np.sin(time / 97.0)
+    outer = inner - 1.5 * np.cos(2 * np.pi * time / 3600.0)
+    keep = rng.random(len(time)) > 0.01
+    for start, length in ((600, 3), (700, 4), (800, 7), (900, 9), (1000, 16), (1300, 60), (1800, 2)):
+        keep[start : start + length] = False
+    time = time + jitter * rng.uniform(-1.0, 1.0, len(time))
+    gyro = rng.normal(0.0, 10.0, len(time))
+    columns = {"time": time[keep], "gyro": gyro[keep], "T_in": inner[keep], "T_out": outer[keep]}
+    return Run("disturbed", columns)
+
+
+def outputs(program: CProgram, source, run: Run):
+    """Outputs [deg/h] and flags of the program for a run."""
+    plan, fixed = source.plan, source.numbers["fixed"]
+    temperatures = np.column_stack([run.temperature(name) for name in plan.sensors]) if plan.sensors else []
+    if fixed is None:
+        return program.steps(run.time, temperatures, run.gyro)
+    whole = np.round(np.asarray(temperatures) / fixed["temperature_value"])
+    out, flag = program.steps(np.round(run.time * 1e6), whole, np.round(run.gyro / fixed["gyro_value"]))
+    return out * fixed["compensated_value"], flag
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q31"])
+@pytest.mark.parametrize("name", NAMES)
+def test_equals_compensate_sample_by_sample(model_of, tmp_path, name, dtype):
+    model = model_of(name)
+    source = c_source(Plan.of(model), dtype, ["card"])
+    program = CProgram(source, tmp_path)
+    run = disturbed(5)
+    expected = model.compensate(run)
+    out, flag = outputs(program, source, run)
+    scale = 1.0 if name != "rbf-patent" else 5.0
+    if name == "rich" and dtype != "float64":
+        scale = 20.0  # a first difference of rounded temperatures
+    np.testing.assert_allclose(out, expected.compensated, atol=scale * BOUND[dtype], rtol=1e-6)
+    assert np.count_nonzero(flag != expected.flag) <= (0 if dtype == "float64" else 2)
+    if name not in ("none", "mean"):
+        assert set(flag.tolist()) == {0, 1, 2}
+
+
+def test_true_times_are_heeded(model_of, tmp_path):
+    model = model_of("rich")
+    source = c_source(Plan.of(model), "float64", [])
+    run = disturbed(6, jitter=0.3)
+    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    expected = model.compensate(run)
+    np.testing.assert_allclose(out, expected.compensated, atol=1e-4)
+    np.testing.assert_array_equal(flag, expected.flag)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
+@pytest.mark.parametrize("name", ["mean", "rich", "rbf", "joint"])
+def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name, dtype):
+    source = c_source(Plan.of(model_of(name)), dtype, ["a card with a */ in it".replace("*/", "* /")])
+    source = source.with_expected(*expected_outputs(source, tmp_path))
+    program = CProgram(source, tmp_path, flags=SANITIZERS)
+    assert program.self_test() == 0
+    out, _ = outputs(program, source, disturbed(7))
+    assert np.all(np.isfinite(out))
+    wild = np.random.default_rng(0).uniform(-120.0, 120.0, (300, program.places))
+    if source.numbers["fixed"]:
+        wild = np.round(wild / source.numbers["fixed"]["temperature_value"])
+    program.steps(np.cumsum(np.full(300, 2.0 if "float" in dtype else 2e6)), wild, np.zeros(300))
+
+
+@pytest.mark.parametrize("dtype", ["float64", "q15"])
+def test_the_self_test_notices_a_changed_number(model_of, tmp_path, dtype):
+    source = c_source(Plan.of(model_of("rbf")), dtype, [])
+    source = source.with_expected(*expected_outputs(source, tmp_path))
+    text = source.files["fogml_model.c"]
+    line = next(line for line in text.splitlines() if line.startswith("#define CONSTANT"))
+    changed = "#define CONSTANT 0.125" if dtype == "float64" else "#define CONSTANT INT64_C(12345)"
+    source.files["fogml_model.c"] = text.replace(line, changed)
+    assert CProgram(source, tmp_path).self_test() != 0
+
+
+def test_a_broken_sensor_or_clock_is_flagged_and_nothing_is_subtracted(model_of, tmp_path):
+    program = CProgram(c_source(Plan.of(model_of("polynomial")), "float64", []), tmp_path, flags=SANITIZERS)
+    time = 2.0 * np.arange(200.0)
+    temperature = np.full((200, 1), 20.0)
+    temperature[150], temperature[151], temperature[152] = np.nan, np.inf, -1e30
+    time[160] = np.nan
+    out, flag = program.steps(time, temperature, np.full(200, 3.0))
+    for broken in (150, 151, 152, 160):
+        assert flag[broken] == 1
+        assert out[broken] == 3.0
+    assert np.all(np.isfinite(np.delete(out, [150, 151, 152, 160])))
+    assert flag[199] == 0
+
+
+def test_a_clock_that_steps_back_starts_the_windows_anew(model_of, tmp_path):
+    program = CProgram(c_source(Plan.of(model_of("polynomial")), "float64", []), tmp_path)
+    time = np.concatenate([2.0 * np.arange(100.0), 2.0 * np.arange(100.0)])
+    _, flag = program.steps(time, np.full((200, 1), 20.0), np.zeros(200))
+    np.testing.assert_array_equal(flag[:100], flag[100:])
+    assert flag[0] == 2
+    assert flag[99] == 0
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
+def test_arm_gives_the_same_bits(model_of, tmp_path, dtype):
+    for tool in ("arm-linux-gnueabihf-gcc", "qemu-arm"):
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+    source = c_source(Plan.of(model_of("rbf")), dtype, [])
+    here = outputs(CProgram(source, tmp_path), source, disturbed(8))
+    arm = tmp_path / "arm"
+    arm.mkdir()
+    flags = (*FLAGS, "-static", "-march=armv7-a", "-mfpu=vfpv4")
+    there = CProgram(source, arm, "arm-linux-gnueabihf-gcc", flags, ["qemu-arm"])
+    for mine, theirs in zip(here, outputs(there, source, disturbed(8))):
+        assert mine.tobytes() == theirs.tobytes()
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
+def test_compiles_for_a_cortex_m4(model_of, tmp_path, dtype):
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("arm-none-eabi-gcc is not installed")
+    source = c_source(Plan.of(model_of("rich")), dtype, [])
+    size = cortex_m4_size(source, tmp_path)
+    assert 500 < size["flash_bytes"] < 10_000
+    assert source.layout.ring * 8 < size["ram_bytes"] < source.layout.ring * 32 + 600
+
+
+def test_nothing_of_the_c_library_is_called(model_of, tmp_path):
+    source = c_source(Plan.of(model_of("rbf")), "float64", [])
+    CProgram(source, tmp_path)
+    source_file, target = tmp_path / "fogml_model.c", tmp_path / "model.o"
+    subprocess.run(["gcc", *FLAGS, "-c", str(source_file), "-o", str(target)], check=True)
+    undefined = subprocess.run(["nm", "-u", str(target)], capture_output=True, text=True, check=True).stdout
+    assert not {"malloc", "free", "exp", "exp2", "floor", "pow"} & set(undefined.split())
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_exponential_against_long_double(model_of, tmp_path, dtype):
+    program = CProgram(c_source(Plan.of(model_of("rbf")), dtype, []), tmp_path)
+    u = np.concatenate([np.linspace(0.0, 40.0, 100_001), np.geomspace(1e-12, 79.0, 20_001)])
+    u = u.astype(np.float32 if dtype == "float32" else np.float64)
+    exact = np.exp(-u.astype(np.longdouble))
+    error = np.abs((program.exponential(u) - exact) / exact)
+    assert float(error.max()) < EXP_ERROR[dtype]
+    assert float(error.max()) > 0.01 * EXP_ERROR[dtype]
+    assert program.exponential([1e6, np.inf, np.nan]).tolist() == [0.0, 0.0, 0.0]
+
+
+def test_fixed_point_exponential_against_long_double(model_of, tmp_path):
+    program = CProgram(c_source(Plan.of(model_of("rbf")), "q31", []), tmp_path)
+    u = np.arange(0, 30 << 26, 9973)
+    exact = np.exp(-(u.astype(np.longdouble) / 2**26))
+    error = np.abs(program.exponential(u) / np.longdouble(2**30) - exact)
+    assert float(error.max()) < FIXED_EXP_ERROR
+
+
+WINDOWS = st.sampled_from(["", "[block, 16 s]", "[slope, 30 s]", "[exp, 40 s]", "[first]", "[slope, 7 s]"])
+SENSORS = st.sampled_from(["T_in", "T_out", "(T_in-T_out)", "(0.25*T_in+0.75*T_out)"])
+
+
+@st.composite
+def feature_texts(draw) -> str:
+    def atom() -> str:
+        sensor = draw(SENSORS)
+        kind = draw(st.sampled_from(["value", "d", "diff", "sign"]))
+        inner = f"({sensor.strip('()')})"
+        window = draw(WINDOWS)
+        return {
+            "value": sensor,
+            "d": f"d{inner}{window}",
+            "diff": f"diff{inner}{window}",
+            "sign": f"sign(d{inner}{window})",
+        }[kind]
+
+    terms = []
+    for _ in range(draw(st.integers(1, 4))):
+        power = draw(st.integers(1, 3))
+        terms.append(f"{atom()}^{power}" if draw(st.booleans()) else f"{atom()}*{atom()}")
+    return ", ".join(dict.fromkeys(terms))
+
+
+@settings(
+    max_examples=8,
+    phases=[Phase.explicit, Phase.generate],
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(text=feature_texts(), seed=st.integers(0, 99), dtype=st.sampled_from(["float64", "q31"]))
+def test_any_features(tmp_path, text, seed, dtype):
+    try:
+        model = make_model("polynomial", features=text).fit(training_run())
+    except InputError as error:
+        assert "twice" in str(error)
+        return
+    source = c_source(Plan.of(model), dtype, [])
+    run = disturbed(seed)
+    expected = model.compensate(run)
+    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    if dtype == "float64":
+        size = float(np.abs(expected.drift).max()) + 1.0
+        np.testing.assert_allclose(out, expected.compensated, atol=1e-5 * size)
+        np.testing.assert_array_equal(flag, expected.flag)
+    else:
+        # Directions and cubes of first differences magnify the step of a temperature at single samples.
+        assert np.median(np.abs(out - expected.compensated)) < 2e-3
+        assert np.mean(flag != expected.flag) < 0.02
