@@ -3,6 +3,7 @@
 from fogml.report.blind_page import blind_page
 from fogml.report.certificate import certificate
 from fogml.report.compare_page import compare_page
+from fogml.report.gap_page import gap_page
 from fogml.report.index_page import index_page
 from fogml.report.inspect_page import inspect_page
 from fogml.report.misalignment_page import misalignment_page
@@ -15,6 +16,7 @@ __all__ = [
     "blind_page",
     "certificate",
     "compare_page",
+    "gap_page",
     "index_page",
     "inspect_page",
     "misalignment_page",

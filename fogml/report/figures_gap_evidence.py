@@ -1,0 +1,260 @@
+"""Figures of a diagnosis' evidence: candidates, amplitudes by run, constants, the check of the noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport
+from fogml.report import style
+from fogml.report.axes import log_axis
+from fogml.report.gap_words import STATUS_WORDS, title_of, unit_words, with_error
+from fogml.report.page import Drawing
+from fogml.report.words import number
+
+SHOWN = 16
+"""Candidates that the figure shows, the best first, and all that are named."""
+LEAST_LENGTH = 3.0
+_Z95, _Z90 = 1.96, 1.645
+_LOOKS = {
+    "named": (style.MODEL, ""),
+    "possible": (style.ORANGE, "x"),
+    "no_sign": (style.SKY_BLUE, "/"),
+    "undetectable": (style.GREY, "."),
+}
+_GAIN_TICKS = (-10, -3, 0, 3, 10, 30, 100, 300, 1000, 3000, 10000, 100000, 1000000)
+
+
+def shown_evidence(evidence: Sequence[CandidateEvidence]) -> list[CandidateEvidence]:
+    """The candidates with the largest gain, and all that are named; none that no run can tell at all."""
+    seen = [e for e in evidence if e.status != "in_constants"]
+    return [e for i, e in enumerate(seen) if i < SHOWN or e.status == "named"]
+
+
+def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
+    """What each candidate alone gains, and what the runs could show of it."""
+    shown = shown_evidence(evidence)
+    labels = [e.title for e in shown]
+    figure = make_subplots(
+        rows=1, cols=2, shared_yaxes=True, horizontal_spacing=0.03, column_widths=[0.6, 0.4]
+    )
+    for status, (colour, pattern) in _LOOKS.items():
+        rows = [e for e in shown if e.status == status]
+        if rows:
+            figure.add_trace(
+                go.Bar(
+                    x=[_folded(e.gain) for e in rows],
+                    y=[e.title for e in rows],
+                    orientation="h",
+                    name=STATUS_WORDS[status],
+                    marker={"color": colour, "pattern": {"shape": pattern, "fgcolor": "white", "size": 6}},
+                    customdata=[e.gain for e in rows],
+                    hovertemplate="%{y}: %{customdata:.3g} nats<extra></extra>",
+                ),
+                row=1,
+                col=1,
+            )
+    lengths = [max(e.usual_length, 1e-2) for e in shown]
+    figure.add_trace(
+        go.Scatter(
+            x=lengths,
+            y=labels,
+            mode="markers",
+            name="what the runs could show",
+            marker={"symbol": "diamond-open", "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
+        ),
+        row=1,
+        col=2,
+    )
+    figure.add_vline(x=LEAST_LENGTH, row=1, col=2, line=style.FLOOR_LINE)
+    low, high = _folded(min(0.0, *(e.gain for e in shown))), _folded(max(3.0, *(e.gain for e in shown)))
+    room = 0.04 * (high - low)
+    ticks = [t for t in _GAIN_TICKS if low - room <= _folded(t) <= high + room]
+    figure.update_xaxes(
+        title_text="gain in log evidence, alone [nats]",
+        tickvals=[_folded(t) for t in ticks],
+        ticktext=[str(t).replace("-", "−") for t in ticks],
+        range=[low - room, high + room],
+        row=1,
+        col=1,
+    )
+    figure.update_xaxes(
+        title_text="length at its usual size [1]",
+        row=1,
+        col=2,
+        **log_axis(min(1.0, *lengths), max(10.0, *lengths)),
+    )
+    figure.add_vline(x=0.0, row=1, col=1, line={"color": style.BLACK, "width": 1})
+    figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")
+    style.styled(figure, 120 + 25 * len(shown), bargap=0.3, barmode="overlay", legend={"y": 1.01})
+    best = "; ".join(f"{e.title} {number(e.gain)} nats ({STATUS_WORDS[e.status]})" for e in shown[:5])
+    return Drawing(
+        figure,
+        alt=f"Gain in log evidence of each candidate by itself, and what the runs could show of it. {best}.",
+        caption=(
+            "Left: how much better each candidate, by itself, explains the fit runs than the twin's "
+            "constants and noise do (its shape averaged over its range; the scale is linear near 0, logarithmic "
+            "beyond). A candidate that is not named can gain too: it resembles what is. Right: the length, "
+            "in standard deviations of the noise, that its usual size would have in these runs once the "
+            f"constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs could not show it. "
+            "One that is far larger than usual can be named all the same."
+        ),
+    )
+
+
+def _folded(gain: float) -> float:
+    """Linear about 0 and logarithmic far from it, so that 3 and 3000 nats are seen side by side."""
+    return math.copysign(math.log10(1.0 + abs(gain)), gain)
+
+
+def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
+    """An effect's amplitude from each run alone, and from all together."""
+    unit = unit_words(found.amplitude.unit) or "1"
+    labels = [item.run for item in found.by_run]
+    figure = go.Figure()
+    value, se = found.amplitude.value, found.amplitude.se
+    figure.add_vrect(
+        x0=value - _Z90 * se, x1=value + _Z90 * se, fillcolor="rgba(0, 158, 115, 0.18)", line_width=0
+    )
+    figure.add_vline(x=value, line={"color": style.AFTER, "width": 1.6})
+    figure.add_trace(
+        go.Scatter(
+            x=[item.value for item in found.by_run],
+            y=labels,
+            mode="markers",
+            name="one run alone",
+            showlegend=False,
+            marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
+            error_x={"type": "data", "array": [_Z90 * item.se for item in found.by_run], "width": 5},
+        )
+    )
+    figure.add_vline(x=0.0, line={"color": style.BLACK, "width": 1, "dash": "dot"})
+    figure.update_xaxes(title_text=f"amplitude [{unit}]")
+    figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")
+    style.styled(figure, 96 + 32 * len(labels), margin={"t": 12})
+    title = title_of(found.effect, names)
+    agree = "agree" if found.consistent else "do not agree"
+    told = "; ".join(f"{item.run} {with_error(item.value, item.se)}" for item in found.by_run)
+    return Drawing(
+        figure,
+        alt=f"Amplitude of {title} by run, which {agree}: {told} {unit}.",
+        caption=(
+            f"{title}: dots, from each run that can show it, by itself; band, from all together. "
+            "90 % intervals."
+        ),
+        half=True,
+    )
+
+
+def constants_moved(constants: Sequence[ConstantFit]) -> Drawing:
+    """How far each constant moved from its prior, in the prior's standard deviations."""
+    shown = [c for c in constants if c.prior_sd > 0.0]
+    labels = [c.name for c in shown]
+    figure = go.Figure()
+    for reach, tint in ((2.0, "rgba(0, 114, 178, 0.08)"), (1.0, "rgba(0, 114, 178, 0.14)")):
+        figure.add_vrect(x0=-reach, x1=reach, fillcolor=tint, line_width=0)
+    figure.add_trace(
+        go.Scatter(
+            x=[(c.value - c.prior_mean) / c.prior_sd for c in shown],
+            y=labels,
+            mode="markers",
+            name="fitted",
+            showlegend=False,
+            marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
+            error_x={"type": "data", "array": [_Z90 * c.se / c.prior_sd for c in shown], "width": 5},
+        )
+    )
+    figure.update_xaxes(title_text="fitted less prior mean [prior standard deviations]")
+    figure.update_yaxes(categoryorder="array", categoryarray=labels[::-1], type="category")
+    style.styled(figure, 110 + 27 * len(shown), margin={"t": 12})
+    far = [c for c in shown if abs(c.value - c.prior_mean) > 3.0 * c.prior_sd]
+    return Drawing(
+        figure,
+        alt="Constants less their prior means, in prior standard deviations: "
+        + "; ".join(f"{c.name} {number((c.value - c.prior_mean) / c.prior_sd)}" for c in shown)
+        + ".",
+        caption="Fitted with 90 % intervals; bands: one and two standard deviations of the prior. An "
+        "interval as wide as the prior says that these runs tell nothing of that constant."
+        + (f" Beyond three: {', '.join(c.name for c in far)}." if far else ""),
+        half=True,
+    )
+
+
+def variance_ratios(noise: NoiseReport) -> Drawing:
+    """Variance of block means of the innovations over what the noise model expects."""
+    scales, ratios = np.asarray(noise.scales_s), np.asarray(noise.variance_ratio)
+    blocks = np.maximum(noise.samples * scales[0] / scales, 1.0)
+    reach = _Z95 * np.sqrt(2.0 / blocks)
+    figure = go.Figure(
+        [
+            _band(scales, np.maximum(1.0 - reach, 0.02), 1.0 + reach),
+            go.Scatter(
+                x=scales,
+                y=ratios,
+                mode="lines+markers",
+                name="held-out data",
+                marker={"symbol": "circle", "size": 8, "color": style.BEFORE},
+                line={"color": style.BEFORE, "width": 1.2},
+            ),
+        ]
+    )
+    figure.add_hline(y=1.0, line=style.FLOOR_LINE)
+    seen = [0.5, 2.0, *(float(r) for r in ratios if r > 0.05)]
+    figure.update_xaxes(title_text="time scale [s]", **log_axis(float(scales[0]), float(scales[-1])))
+    figure.update_yaxes(title_text="variance / expected [1]", **log_axis(min(seen), max(seen)))
+    style.styled(figure, 320)
+    told = "; ".join(f"{s:g} s {number(float(r))}" for s, r in zip(scales, ratios, strict=True))
+    return Drawing(
+        figure,
+        alt=f"Variance of the whitened held-out gap over the expected one, by time scale: {told}.",
+        caption="Variance of the whitened gap on held-out data, by time scale; 1 is as the noise model "
+        "expects. Too much at long scales: something slow is left, or the noise is more than was fitted.",
+        half=True,
+    )
+
+
+def autocorrelations(noise: NoiseReport) -> Drawing:
+    """Autocorrelation of the innovations on held-out data."""
+    lags = np.asarray(noise.lags_s)
+    reach = np.full(len(lags), _Z95 / math.sqrt(max(noise.samples, 1)))
+    figure = go.Figure(
+        [
+            _band(lags, -reach, reach),
+            go.Scatter(
+                x=lags,
+                y=list(noise.autocorrelation),
+                mode="markers",
+                name="held-out data",
+                marker={"symbol": "circle", "size": 8, "color": style.BEFORE},
+            ),
+        ]
+    )
+    figure.add_hline(y=0.0, line={"color": style.BLACK, "width": 1})
+    high = max(0.1, *(1.15 * abs(v) for v in noise.autocorrelation))
+    figure.update_xaxes(title_text="lag [s]", **log_axis(float(lags[0]), float(lags[-1])))
+    figure.update_yaxes(title_text="autocorrelation [1]", range=[-high, high])
+    style.styled(figure, 320)
+    told = "; ".join(f"{lag:g} s {number(v, 2)}" for lag, v in zip(lags, noise.autocorrelation, strict=True))
+    return Drawing(
+        figure,
+        alt=f"Autocorrelation of the whitened held-out gap by lag: {told}.",
+        caption="Autocorrelation of the whitened gap on held-out data; a right noise model leaves none.",
+        half=True,
+    )
+
+
+def _band(x: np.ndarray, low: np.ndarray, high: np.ndarray) -> go.Scatter:
+    return go.Scatter(
+        x=np.concatenate([x, x[::-1]]),
+        y=np.concatenate([high, low[::-1]]),
+        mode="lines",
+        line={"color": style.GREY, "width": 0},
+        fill="toself",
+        fillcolor="rgba(0, 158, 115, 0.20)",
+        name="95 % of right models",
+        hoverinfo="skip",
+    )

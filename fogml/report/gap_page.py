@@ -1,0 +1,321 @@
+"""The page of ``fogml diagnose``: where the gap lies, which effect causes it, how far it closes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fogml.gap.result import Diagnosis, RunSeries
+from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables
+from fogml.report.gap_words import (
+    cause_words,
+    closed_words,
+    hardest,
+    headline,
+    held_out_words,
+    interval_words,
+    probability_words,
+    title_of,
+    titles,
+    verdict_sentences,
+    verdict_words,
+)
+from fogml.report.page import Drawing, Tile, render
+from fogml.report.words import MISSING, averages, duration, listed, number, plural
+
+MOST_RUNS_DRAWN = 8
+
+
+@dataclass(frozen=True)
+class RunSection:
+    """A run as the page shows it."""
+
+    name: str
+    held_out: bool
+    drawing: Drawing
+
+
+def gap_page(found: Diagnosis) -> str:
+    """The self-contained HTML page of a diagnosis.
+
+    Parameters
+    ----------
+    found
+        As :func:`fogml.gap.diagnose` gives it.
+
+    Returns
+    -------
+    str
+        The page, to be written as UTF-8.
+    """
+    names = titles(found)
+    where = found.where
+    drawn = _drawn(found)
+    return render(
+        "gap.html",
+        title=f"{_subject(found)} – {verdict_words(found).lower()}",
+        found=found,
+        headline=headline(found),
+        kicker=_kicker(found),
+        verdict=verdict_sentences(found),
+        tiles=_tiles(found, names),
+        strip=figures_gap.how_far_strip(found.how_far, bool(found.named)) if found.how_far else None,
+        warnings=_warnings(found, names),
+        causes=gap_tables.causes_table(found.found, names) if found.found else None,
+        classes=gap_tables.classes_table(found.found, names),
+        how_far=gap_tables.how_far_table(found.how_far) if found.how_far else None,
+        runs=drawn,
+        not_drawn=[s.run for s in found.series if s.run not in {d.name for d in drawn}],
+        against_temperature=figures_gap.against_temperature(found) if _fit_series(found) else None,
+        by_regime=figures_gap_where.by_regime(where.regime) if where.regime else None,
+        by_timescale=figures_gap_where.by_timescale(where.timescale) if where.timescale else None,
+        by_temperature=figures_gap_where.by_temperature(where.temperature) if where.temperature else None,
+        by_stage=figures_gap_where.by_stage(where.stage) if where.stage else None,
+        regimes=gap_tables.regimes_table(found) if where.regime else None,
+        segments=gap_tables.segments_table(found),
+        evidence=(
+            figures_gap_evidence.evidence_bars(found.evidence)
+            if figures_gap_evidence.shown_evidence(found.evidence)
+            else None
+        ),
+        candidates=gap_tables.evidence_table(found),
+        undetectable=[title_of(id, names) for id in found.undetectable],
+        by_run=[figures_gap_evidence.amplitude_by_run(f, names) for f in found.found if f.by_run],
+        inconsistent=[title_of(f.effect, names) for f in found.found if not f.consistent],
+        separating=_separating(found, names),
+        constants=figures_gap_evidence.constants_moved(found.constants) if found.constants else None,
+        constants_table=gap_tables.constants_table(found),
+        noise_table=gap_tables.noise_table(found),
+        noise_words=_noise_words(found),
+        noise_figures=(
+            [
+                figures_gap_evidence.variance_ratios(found.noise),
+                figures_gap_evidence.autocorrelations(found.noise),
+            ]
+            if found.noise.scales_s and found.noise.lags_s
+            else []
+        ),
+        about=_about(found),
+        notes=_notes(found),
+    )
+
+
+def _subject(found: Diagnosis) -> str:
+    """The unit and axis where the runs state them, else the fit runs."""
+    unit = next((s.gyro for s in found.series if s.gyro), None)
+    axis = next((s.axis for s in found.series if s.axis), None)
+    if unit:
+        return f"{unit}, axis {axis}" if axis else unit
+    return listed(list(found.fit))
+
+
+def _kicker(found: Diagnosis) -> str:
+    held = (
+        "the last stretch of the last run kept back"
+        if found.held_out_is_part
+        else (f"{plural(len(found.held_out), 'run')} held out" if found.held_out else "nothing held out")
+    )
+    return (
+        f"Gap between the twin “{found.model}” and {_subject(found)}: "
+        f"fitted on {plural(len(found.fit), 'run')}, {held}"
+    )
+
+
+def _tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
+    kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "missed"}
+    tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), kind.get(found.verdict, ""))]
+    tiles += [_cause_tile(found, names), _confidence_tile(found)]
+    unknown = probability_words(found.unknown.probability)
+    if found.verdict != "unknown":
+        tiles.append(Tile("Something unknown", unknown, "", "probability that no candidate explains all"))
+    tiles.append(_closed_tile(found))
+    if found.how_far:
+        item = hardest(found.how_far)
+        left = item.after if found.named else item.recalibrated
+        tiles.append(
+            Tile("Left", number(left), "deg/h", f"floor {number(item.floor)}, {averages(item.averaging_s)}")
+        )
+    return tiles
+
+
+def _verdict_note(found: Diagnosis) -> str:
+    return {
+        "no_gap": "within the noise",
+        "explained": "each effect alone in its class",
+        "ambiguous": "a class of several",
+        "partly_explained": "something is left",
+        "unknown": "no candidate explains it",
+    }[found.verdict]
+
+
+def _cause_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
+    named = found.named
+    if not named:
+        return Tile("Cause", "none named", "", found.unknown.looks_like and f"it {found.unknown.looks_like}")
+    title = title_of(named[0].effect, names)
+    if len(named) > 1:
+        value = plural(len(named), "effect")
+        return Tile("Cause", value, "", "; ".join(cause_words(f, names) for f in named))
+    if len(named[0].members) > 1:
+        return Tile("Cause", f"one of {len(named[0].members)}", "", cause_words(named[0], names))
+    return Tile("Cause", "one effect", "", title)
+
+
+def _confidence_tile(found: Diagnosis) -> Tile:
+    if found.named:
+        least = min(f.probability for f in found.named)
+        note = "that it acts" if len(found.named) == 1 else "the least certain of those named"
+        if any(len(f.members) > 1 for f in found.named) and len(found.named) == 1:
+            note = "that one of them acts"
+        return Tile("Confidence", probability_words(least), "", note)
+    if found.verdict == "unknown":
+        return Tile(
+            "Confidence", probability_words(found.unknown.probability), "", "that something unknown acts"
+        )
+    most = max((f.probability for f in found.found), default=0.0)
+    note = "that something acts unseen"
+    return Tile(
+        "Likeliest effect",
+        probability_words(most) if found.found else "none",
+        "",
+        note if found.found else "",
+    )
+
+
+def _closed_tile(found: Diagnosis) -> Tile:
+    if not found.how_far:
+        return Tile("Closed", MISSING, "", "nothing was held out")
+    item = hardest(found.how_far)
+    on = f"{item.run}, kept-back part" if found.held_out_is_part else item.run
+    if len(found.how_far) > 1:
+        on = f"the least of {len(found.how_far)} held-out runs: {item.run}"
+    if item.closed is None:
+        return Tile("Closed", "nothing to close", "", f"at the floor on {on}")
+    if not found.named:
+        return Tile("Closed", "0 %", "", f"nothing was added; {on}")
+    interval = f"90 %: {interval_words(*item.closed_ci90)}; " if item.closed_ci90 else ""
+    return Tile("Closed", closed_words(item), "", f"{interval}{on}")
+
+
+def _warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
+    told = []
+    if found.held_out_is_part:
+        run = found.held_out[0] if found.held_out else "the last run"
+        told.append(
+            f"No run was held out. The last stretch of {run} was kept back for the figures: it shares "
+            "power-on and conditions with what was fitted, so they flatter. Hold out a run of its own."
+        )
+    elif not found.how_far:
+        told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
+    for run, reason in found.unusable:
+        told.append(f"{run} was not used: {reason.removeprefix(f'{run}: ')}.")
+    for f in found.named:
+        if not f.consistent:
+            told.append(
+                f"{title_of(f.effect, names)} does not show with the same sign and size on every run that "
+                "can show it: doubt it."
+            )
+    if found.noise.white is False:
+        told.append(
+            "The noise check fails on held-out data: intervals and probabilities may be too sure. "
+            + "; ".join(found.noise.failed[:2]).capitalize()
+            + "."
+        )
+    return told
+
+
+def _fit_series(found: Diagnosis) -> list[RunSeries]:
+    return [s for s in found.series if s.role == "fit" and len(s.time_s)]
+
+
+def _drawn(found: Diagnosis) -> list[RunSection]:
+    """Held-out runs first, then fit runs, those with most of the gap where there are many."""
+    named = bool(found.named)
+    energy = {s.run: float((s.gap_recalibrated**2).sum()) for s in found.series}
+    held = [s for s in found.series if s.role == "held_out"]
+    fit = [s for s in found.series if s.role == "fit"]
+    kept = sorted(fit, key=lambda s: -energy[s.run])[: max(MOST_RUNS_DRAWN - len(held), 2)]
+    shown = [*held[:MOST_RUNS_DRAWN], *(s for s in fit if s in kept)]
+    return [
+        RunSection(
+            name=s.run,
+            held_out=s.role == "held_out",
+            drawing=figures_gap.run_in_time(
+                s, [g for g in found.where.segments if s.role == "fit" and g.run == s.run], named
+            ),
+        )
+        for s in shown
+        if len(s.time_s)
+    ]
+
+
+@dataclass(frozen=True)
+class Separating:
+    """The separating run in words."""
+
+    separates: str
+    programme: str
+    facts: list[tuple[str, str]]
+    steps: tuple[str, ...]
+    alternatives: list[str]
+
+
+def _separating(found: Diagnosis, names: dict[str, str]) -> Separating | None:
+    run = found.separating_run
+    if run is None:
+        return None
+    facts = [
+        ("lasts", f"{number(run.hours)} h"),
+        ("expected distance", f"{number(run.distance)} standard deviations"),
+    ]
+    others = [
+        ", ".join(
+            f"{key.replace('_', ' ')} {number(v) if isinstance(v, float) else v}" for key, v in other.items()
+        )
+        for other in run.alternatives
+    ]
+    return Separating(
+        listed([title_of(id, names) for id in run.separates], 6), run.programme, facts, run.steps, others
+    )
+
+
+def _noise_words(found: Diagnosis) -> str:
+    noise = found.noise
+    if noise.white is None:
+        return f"Fitted on: {noise.source}. There was too little held-out data to check it."
+    p = f"p = {number(noise.p_value, 2)}" if noise.p_value is not None else ""
+    if noise.white:
+        return (
+            f"Fitted on: {noise.source}. Checked on {plural(noise.samples, 'held-out sample')}: white ({p})."
+        )
+    return (
+        f"Fitted on: {noise.source}. Checked on {plural(noise.samples, 'held-out sample')}: not white ({p}): "
+        + "; ".join(noise.failed)
+        + "."
+    )
+
+
+def _about(found: Diagnosis) -> list[tuple[str, str]]:
+    held = listed(list(found.held_out), 12) or "none"
+    if found.held_out_is_part and found.held_out:
+        held = held_out_words(found, found.held_out[0])
+    rows = [
+        ("twin", found.model),
+        ("fitted on", listed(list(found.fit), 12)),
+        ("held out", held),
+        ("noise run", found.noise_run or "none: the noise was fitted on the fit runs' quiet stretches"),
+    ]
+    spans = [s for s in found.series if len(s.time_s)]
+    if spans:
+        hours = sum(float(s.time_s[-1] - s.time_s[0]) + s.averaging_s for s in spans)
+        rows.append(("recorded in all", duration(hours)))
+    rows += [("not used", f"{run}: {reason.removeprefix(f'{run}: ')}") for run, reason in found.unusable]
+    return rows
+
+
+def _notes(found: Diagnosis) -> list[str]:
+    """What the runs' facts say of them, each once."""
+    by_note: dict[str, list[str]] = {}
+    for s in found.series:
+        if s.note:
+            by_note.setdefault(s.note, []).append(s.run)
+    return [f"{listed(list(dict.fromkeys(runs)))}: {note}" for note, runs in by_note.items()]

@@ -1,0 +1,272 @@
+"""Tables of a diagnosis: causes, look-alikes, how far, segments, constants, noise."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from fogml.gap.result import Diagnosis, Found, HowFar
+from fogml.report.gap_words import (
+    STATUS_WORDS,
+    closed_words,
+    estimate_words,
+    interval_words,
+    probability_words,
+    title_of,
+    unit_words,
+    with_error,
+)
+from fogml.report.shading import regime_word
+from fogml.report.tables import Column, Row, Table
+from fogml.report.words import MISSING, averages, duration, number, percent
+from fogml.twin.registry import effects
+
+MOST_SEGMENTS = 12
+_NOISE = {
+    "N": ("angle random walk", "deg/√h"),
+    "B": ("flicker", "deg/h"),
+    "K": ("rate random walk", "deg/h/√h"),
+}
+_CONSTANTS = {
+    "e0": "scale factor error",
+    "k1": "its slope over temperature",
+    "k2": "its curvature over temperature",
+    "b0": "bias",
+    "b1": "its slope over temperature",
+    "b2": "its curvature over temperature",
+    "g": "bias by gradient, T_in − T_out",
+    "m": "bias by change of temperature, ΔT",
+}
+
+
+def causes_table(found: Sequence[Found], names: dict[str, str]) -> Table:
+    """Every effect that was found, the most certain first."""
+    rows = []
+    for f in found:
+        shape = "; ".join(
+            f"{name.replace('_', ' ')} {estimate_words(value)}" for name, value in f.parameters.items()
+        )
+        others = [title_of(m, names) for m in f.members if m != f.effect]
+        cells = (
+            f"{title_of(f.effect, names)} ({f.effect})",
+            probability_words(f.probability),
+            with_error(f.amplitude.value, f.amplitude.se),
+            unit_words(f.amplitude.unit) or MISSING,
+            shape or MISSING,
+            "; ".join(others) or "nothing: alone in its class",
+            _consistency(f),
+        )
+        rows.append(Row(cells, "chosen" if f.named else ""))
+    return Table(
+        columns=(
+            ("Effect", "", "text"),
+            ("Probability", "", "figure"),
+            ("Amplitude", "± standard error", "figure"),
+            ("Unit", "", "text"),
+            ("Shape", "± standard error", "text"),
+            ("Can't be told from", "", "text"),
+            ("On the runs", "", "text"),
+        ),
+        rows=tuple(rows),
+        caption="Highlighted: named (probability 50 % or more). The probability is that one of its class "
+        "acts; amplitude and shape are of the effect that stands for the class.",
+    )
+
+
+def _consistency(found: Found) -> str:
+    if len(found.by_run) > 1:
+        count = len(found.by_run)
+        return (
+            f"agree in sign and size ({count} runs)" if found.consistent else f"do not agree ({count} runs)"
+        )
+    return "one run alone can show it" if found.by_run else MISSING
+
+
+def classes_table(found: Sequence[Found], names: dict[str, str]) -> Table | None:
+    """For each pair that the runs can't tell apart, what separates them; None where all stand alone."""
+    catalogue = effects()
+    rows = []
+    for f in found:
+        for first, second in combinations(f.members, 2):
+            told = []
+            for a, b in ((first, second), (second, first)):
+                if a in catalogue and b in catalogue[a].confused_with:
+                    told.append(catalogue[a].confused_with[b])
+            # The two cards often say the same of each other.
+            separates = "; or: ".join(dict.fromkeys(told)) or "the cards name no simple test"
+            rows.append(Row((title_of(first, names), title_of(second, names), separates)))
+    if not rows:
+        return None
+    return Table(
+        columns=(("These", "", "text"), ("look alike here", "", "text"), ("What separates them", "", "text")),
+        rows=tuple(rows),
+    )
+
+
+def how_far_table(items: Sequence[HowFar]) -> Table:
+    """Rms on each held-out run and what is closed of the structural gap."""
+    rows = [
+        Row(
+            (
+                item.run,
+                *(number(v) for v in (item.before, item.recalibrated, item.after, item.floor)),
+                closed_words(item),
+                interval_words(*item.closed_ci90) if item.closed_ci90 else MISSING,
+                item.note,
+            )
+        )
+        for item in items
+    ]
+    noted = any(item.note for item in items)
+    columns: tuple[Column, ...] = (
+        ("Held out", "", "text"),
+        ("Nominal", "deg/h", "figure"),
+        ("Recalibrated", "deg/h", "figure"),
+        ("With what was found", "deg/h", "figure"),
+        ("Noise floor", "deg/h", "figure"),
+        ("Closed", "", "figure"),
+        ("90 % interval", "", "figure"),
+        ("Note", "", "text"),
+    )
+    if not noted:
+        columns, rows = columns[:-1], [Row(row.cells[:-1]) for row in rows]
+    return Table(
+        columns=columns,
+        rows=tuple(rows),
+        caption=f"Rms of {averages(items[0].averaging_s)} of recorded less replayed. Closed: the part of "
+        "recalibrated² − floor² that goes; above 100 % or below 0 is chance or a misfit.",
+    )
+
+
+def segments_table(found: Diagnosis) -> Table | None:
+    """The segments with the largest excess, in order of time."""
+    segments = sorted(found.where.segments, key=lambda s: -s.excess_rms * (s.to_s - s.from_s) ** 0.5)
+    if not segments:
+        return None
+    kept = sorted(segments[:MOST_SEGMENTS], key=lambda s: (s.run, s.from_s))
+    more = len(segments) - len(kept)
+    return Table(
+        columns=(
+            ("Run", "", "text"),
+            ("From", "s", "figure"),
+            ("To", "s", "figure"),
+            ("Lasts", "", "figure"),
+            ("Excess rms", "deg/h", "figure"),
+        ),
+        rows=tuple(
+            Row(
+                (s.run, f"{s.from_s:.0f}", f"{s.to_s:.0f}", duration(s.to_s - s.from_s), number(s.excess_rms))
+            )
+            for s in kept
+        ),
+        caption="Segments in which the gap exceeds the floor"
+        + (f"; {more} smaller ones are in gap.json." if more else "."),
+    )
+
+
+def regimes_table(found: Diagnosis) -> Table:
+    """Excess and share in each regime, with their intervals."""
+    rows = []
+    for s in found.where.regime:
+        low, high = s.excess_rms_ci90 or (None, None)
+        part = interval_words(*s.share_ci90) if s.share_ci90 else MISSING
+        rows.append(
+            Row(
+                (
+                    regime_word(s.name),
+                    number(s.excess_rms),
+                    f"{number(low)} … {number(high)}",
+                    percent(s.share),
+                    part,
+                )
+            )
+        )
+    return Table(
+        columns=(
+            ("Regime", "", "text"),
+            ("Excess rms", "deg/h", "figure"),
+            ("90 % interval", "deg/h", "figure"),
+            ("Share", "", "figure"),
+            ("90 % interval", "", "figure"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def constants_table(found: Diagnosis) -> Table:
+    """Prior and fitted value of each constant."""
+    rows = [
+        Row(
+            (
+                c.name,
+                _CONSTANTS.get(c.name, ""),
+                f"{number(c.prior_mean)} ± {number(c.prior_sd)}",
+                with_error(c.value, c.se),
+                unit_words(c.unit),
+                percent(1.0 - min(c.se / c.prior_sd, 1.0)) if c.prior_sd > 0.0 else MISSING,
+            )
+        )
+        for c in found.constants
+    ]
+    return Table(
+        columns=(
+            ("Constant", "", "text"),
+            ("Of", "", "text"),
+            ("Prior", "± deviation", "figure"),
+            ("Fitted", "± standard error", "figure"),
+            ("Unit", "", "text"),
+            ("Learnt", "", "figure"),
+        ),
+        rows=tuple(rows),
+        caption="Learnt: by how much the runs narrowed the prior.",
+    )
+
+
+def noise_table(found: Diagnosis) -> Table:
+    """Coefficients of the noise with their standard errors."""
+    rows = []
+    for name, value in found.noise.coefficients.items():
+        words, unit = _NOISE.get(name, (name, ""))
+        spread = found.noise.relative_se.get(name)
+        rows.append(
+            Row((f"{name}, {words}", number(value), MISSING if spread is None else percent(spread), unit))
+        )
+    return Table(
+        columns=(
+            ("Coefficient", "", "text"),
+            ("Value", "", "figure"),
+            ("Standard error", "", "figure"),
+            ("Unit", "", "text"),
+        ),
+        rows=tuple(rows),
+    )
+
+
+def evidence_table(found: Diagnosis) -> Table:
+    """Every candidate, the largest gain first."""
+    return Table(
+        columns=(
+            ("Candidate", "", "text"),
+            ("Stage", "", "text"),
+            ("Gain alone", "nats", "figure"),
+            ("Probability", "", "figure"),
+            ("Length at usual size", "", "figure"),
+            ("Outcome", "", "text"),
+        ),
+        rows=tuple(
+            Row(
+                (
+                    f"{e.title} ({e.effect})",
+                    e.stage.replace("_", " "),
+                    MISSING if e.status == "in_constants" else number(e.gain),
+                    MISSING
+                    if e.status in ("in_constants", "undetectable") and e.probability == 0.0
+                    else probability_words(e.probability),
+                    MISSING if e.status == "in_constants" else number(e.usual_length),
+                    STATUS_WORDS[e.status],
+                ),
+                "chosen" if e.status == "named" else "",
+            )
+            for e in found.evidence
+        ),
+    )

@@ -1,0 +1,208 @@
+"""A diagnosis in plain words: headline, verdict, causes, units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from fogml.gap.result import Diagnosis, Estimate, Found, HowFar
+from fogml.report.words import MISSING, averages, listed, number, percent, plural
+from fogml.twin.registry import effects
+
+_UNITS = (("sqrt(h)", "√h"), ("degC2", "°C²"), ("degC", "°C"))
+_HEADLINES = {
+    "no_gap": "No gap",
+    "explained": "Explained",
+    "ambiguous": "Ambiguous",
+    "partly_explained": "Partly explained",
+    "unknown": "Unknown",
+}
+_LIKELY_MEMBERS = 4
+
+
+def verdict_words(found: Diagnosis) -> str:
+    """The verdict as a word or two."""
+    return _HEADLINES[found.verdict]
+
+
+def unit_words(unit: str) -> str:
+    """A card's unit as pages write it; nothing for a pure number."""
+    for spelt, written in _UNITS:
+        unit = unit.replace(spelt, written)
+    return "" if unit == "1" else unit
+
+
+def titles(found: Diagnosis) -> dict[str, str]:
+    """Title of every candidate and of every effect of the catalogue, by id."""
+    return {id: e.title for id, e in effects().items()} | {e.effect: e.title for e in found.evidence}
+
+
+def title_of(id: str, names: dict[str, str]) -> str:
+    """The title of an effect, its id in words where there is none."""
+    return names.get(id, id.replace("_", " ").capitalize())
+
+
+def probability_words(probability: float) -> str:
+    """A probability in whole percent, never as certainty."""
+    if probability < 0.01:
+        return "under 1 %"
+    if probability > 0.99:
+        return "over 99 %"
+    return f"{100 * probability:.0f} %"
+
+
+def estimate_words(value: Estimate) -> str:
+    """``0.0210 ± 0.0010 deg/h``: two figures of the standard error decide how many are told."""
+    return f"{with_error(value.value, value.se)} {unit_words(value.unit)}".rstrip()
+
+
+def with_error(value: float, se: float) -> str:
+    """A value with its standard error, both to the error's second figure; bare where there is none."""
+    if not (math.isfinite(se) and se > 0.0):
+        return number(value)
+    places = 1 - math.floor(math.log10(se))
+    if places < -2 or places > 6:
+        return f"{number(value)} ± {number(se, 2)}"
+    if places <= 0:
+        return f"{value:.0f} ± {se:.0f}".replace("-", "−")
+    return f"{value:.{places}f} ± {se:.{places}f}".replace("-", "−")
+
+
+def interval_words(low: float, high: float) -> str:
+    """An interval of shares in percent."""
+    return f"{100 * low:.0f} … {100 * high:.0f} %".replace("-", "−")
+
+
+def closed_words(item: HowFar) -> str:
+    """What is closed of the structural gap, in percent."""
+    return MISSING if item.closed is None else f"{100 * item.closed:.0f} %".replace("-", "−")
+
+
+def cause_words(found: Found, names: dict[str, str]) -> str:
+    """An effect, or all of its class, as one cause."""
+    members = [found.effect, *(m for m in found.members if m != found.effect)]
+    told = [title_of(m, names) for m in members]
+    if len(told) <= _LIKELY_MEMBERS:
+        return " or ".join(told)
+    return " or ".join(told[: _LIKELY_MEMBERS - 1]) + f" or one of {len(told) - _LIKELY_MEMBERS + 1} more"
+
+
+def headline(found: Diagnosis) -> str:
+    """The page's heading: verdict and cause in one line."""
+    names = titles(found)
+    named = [title_of(f.effect, names) for f in found.named]
+    causes = " + ".join(named)
+    match found.verdict:
+        case "no_gap":
+            return "No gap: the recalibrated twin and the gyro agree within the noise"
+        case "explained":
+            return f"Explained. Missing from the twin: {causes}"
+        case "ambiguous":
+            if len(named) == 1:
+                return f"Ambiguous. Missing from the twin: {cause_words(found.named[0], names)}"
+            return f"Ambiguous. Missing from the twin: {causes}, or what looks like them"
+        case "partly_explained":
+            return f"Partly explained. Missing from the twin: {causes}, and something unknown"
+        case _:
+            return "Unknown: the gap is there, and no candidate explains it"
+
+
+def verdict_sentences(found: Diagnosis) -> list[str]:
+    """What the verdict means here, the most important first."""
+    names = titles(found)
+    sentences = [_first(found, names)]
+    if found.verdict in ("explained", "ambiguous", "partly_explained"):
+        alike = [f for f in found.named if len(f.members) > 1]
+        if alike:
+            sentences.append(
+                f"{listed([cause_words(f, names) for f in alike], 2)} look alike in these runs: only "
+                "another run can tell which it is."
+            )
+    if found.verdict == "partly_explained":
+        sentences.append(
+            f"Beside, with probability {probability_words(found.unknown.probability)}, something acts that "
+            f"no candidate explains{_looks(found)}."
+        )
+    sentences.append(_closing(found))
+    return [s for s in sentences if s]
+
+
+def _first(found: Diagnosis, names: dict[str, str]) -> str:
+    among = plural(len(found.evidence), "candidate effect")
+    if found.verdict == "no_gap":
+        leading = found.found[0] if found.found else None
+        most = (
+            f" The likeliest, {title_of(leading.effect, names)}, has probability "
+            f"{probability_words(leading.probability)}."
+            if leading
+            else ""
+        )
+        return (
+            f"With its own constants fitted the twin leaves nothing that stands out of the noise: none of "
+            f"{among} is named.{most}"
+        )
+    if found.verdict == "unknown":
+        return (
+            f"With probability {probability_words(found.unknown.probability)} something acts that none of "
+            f"{among} explains{_looks(found)}."
+        )
+    told = [f"{title_of(f.effect, names)} ({_amplitude_words(f)})" for f in found.named]
+    if len(told) == 1:
+        sure = f"with probability {probability_words(found.named[0].probability)}"
+    else:
+        sure = f"with probabilities of {listed([probability_words(f.probability) for f in found.named])}"
+    return f"Of {among}, {listed(told)} {'is' if len(told) == 1 else 'are'} named, {sure}."
+
+
+def _amplitude_words(found: Found) -> str:
+    """The amplitude; one that is within two standard errors of none says so."""
+    told = estimate_words(found.amplitude)
+    weak = abs(found.amplitude.value) < 2.0 * found.amplitude.se
+    return f"amplitude {told}, poorly known" if weak else f"amplitude {told}"
+
+
+def _looks(found: Diagnosis) -> str:
+    return f": what is left {found.unknown.looks_like}" if found.unknown.looks_like else ""
+
+
+def _closing(found: Diagnosis) -> str:
+    """How far, on the held-out run where least is closed."""
+    if not found.how_far:
+        return "No run could be held out, so how far the gap closes on data not seen is not known."
+    item = hardest(found.how_far)
+    within = averages(item.averaging_s)
+    recalibrated = (
+        f"On {held_out_words(found, item.run)}, recalibrating took the rms of {within} from "
+        f"{number(item.before)} to {number(item.recalibrated)} deg/h"
+    )
+    if found.named:
+        recalibrated += f", and what was found to {number(item.after)} deg/h"
+    return f"{recalibrated}; noise alone would leave {number(item.floor)}."
+
+
+def held_out_words(found: Diagnosis, run: str) -> str:
+    """A held-out run by name, or what was kept back for want of one."""
+    return f"the last stretch of {run}, kept back" if found.held_out_is_part else f"{run}, held out"
+
+
+def hardest(items: Sequence[HowFar]) -> HowFar:
+    """The held-out run on which least is closed, or else on which most is left."""
+    rated = [item for item in items if item.closed is not None]
+    if rated:
+        return min(rated, key=lambda item: item.closed if item.closed is not None else 1.0)
+    return max(items, key=lambda item: item.after / item.floor if item.floor > 0.0 else item.after)
+
+
+def share_words(share: float) -> str:
+    """A share of the structural gap's energy."""
+    return "none" if share <= 0.0 else percent(share)
+
+
+STATUS_WORDS = {
+    "named": "named",
+    "possible": "possible",
+    "no_sign": "no sign of it",
+    "undetectable": "these runs could not show it",
+    "in_constants": "same as the constants",
+}
+"""What became of a candidate."""
