@@ -27,6 +27,7 @@ COMMANDS = {
     "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
     "sweep": ("fogml.cli.sweep", "Search features, models and sizes on held-out parts of the training runs."),
     "lab": ("fogml.cli.lab", "Procedures of a laboratory: misalignment, north seeking."),
+    "fleet": ("fogml.cli.fleet", "The same job for every unit of a manifest, here or on a cluster."),
     "effects": ("fogml.cli.effects", "The catalogue of effects that a twin can have, or the card of one."),
     "simulate": ("fogml.cli.simulate", "A synthetic run from a programme and a twin."),
     "replay": ("fogml.cli.replay", "A twin's output for a run's inputs, or what one effect changes."),

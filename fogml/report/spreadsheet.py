@@ -17,6 +17,8 @@ from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudg
 if TYPE_CHECKING:
     from xlsxwriter.worksheet import Worksheet
 
+SAFE_TEXT = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
+"""Options of a workbook: names come from files, and no text may turn into a formula or a link."""
 _LONGEST_NAME = 31
 _MOST_ROWS = 1_048_575
 _FORBIDDEN = str.maketrans(dict.fromkeys("[]:*?/\\'", "_"))
@@ -54,22 +56,19 @@ def spreadsheet(judgement: Judgement, path: str | Path) -> None:
     """
     import xlsxwriter
 
-    with whole_file(path) as partial:
-        # Names of runs come from files: no text may turn into a formula or a link.
-        options = {"strings_to_formulas": False, "strings_to_urls": False, "strings_to_numbers": False}
-        with xlsxwriter.Workbook(str(partial), options) as workbook:
-            writer = _Writer(workbook)
-            _summary(writer, judgement)
-            _figures(writer, judgement)
-            if coefficients_of(judgement.model):
-                _coefficients(writer, judgement)
-            _findings(writer, judgement)
-            for kind, runs in (("test", judgement.test), ("train", judgement.train)):
-                for index, run in enumerate(runs, start=1):
-                    _averages(writer, f"{kind} {index} {run.run}", run)
+    with whole_file(path) as partial, xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
+        writer = Writer(workbook)
+        _summary(writer, judgement)
+        _figures(writer, judgement)
+        if coefficients_of(judgement.model):
+            _coefficients(writer, judgement)
+        _findings(writer, judgement)
+        for kind, runs in (("test", judgement.test), ("train", judgement.train)):
+            for index, run in enumerate(runs, start=1):
+                _averages(writer, f"{kind} {index} {run.run}", run)
 
 
-class _Writer:
+class Writer:
     """Sheets with a bold header, frozen, and cells by type."""
 
     def __init__(self, workbook: Any) -> None:
@@ -110,7 +109,7 @@ class _Writer:
             sheet.write_number(row, column, float(value))
 
 
-def _summary(writer: _Writer, judgement: Judgement) -> None:
+def _summary(writer: Writer, judgement: Judgement) -> None:
     sheet = writer.sheet("Summary")
     sheet.set_column(0, 0, 30)
     sheet.set_column(1, 6, 16)
@@ -153,7 +152,7 @@ def _summary(writer: _Writer, judgement: Judgement) -> None:
     writer.table(sheet, ("model", ""), model_card(judgement.model), row)
 
 
-def _figures(writer: _Writer, judgement: Judgement) -> None:
+def _figures(writer: Writer, judgement: Judgement) -> None:
     sheet = writer.sheet("Figures")
     rows: list[tuple[Any, ...]] = []
     for part, runs in (("test", judgement.test), ("train", judgement.train)):
@@ -183,7 +182,7 @@ def _figures(writer: _Writer, judgement: Judgement) -> None:
     sheet.freeze_panes(1, 1)
 
 
-def _coefficients(writer: _Writer, judgement: Judgement) -> None:
+def _coefficients(writer: Writer, judgement: Judgement) -> None:
     sheet = writer.sheet("Coefficients")
     heads = ("term", "coefficient [deg/h per unit of the term]", "standard error")
     writer.table(sheet, heads, coefficients_of(judgement.model))
@@ -191,7 +190,7 @@ def _coefficients(writer: _Writer, judgement: Judgement) -> None:
     sheet.freeze_panes(1, 0)
 
 
-def _findings(writer: _Writer, judgement: Judgement) -> None:
+def _findings(writer: Writer, judgement: Judgement) -> None:
     sheet = writer.sheet("Findings and notes")
     rows = []
     for run in (*judgement.train, *judgement.test):
@@ -205,7 +204,7 @@ def _findings(writer: _Writer, judgement: Judgement) -> None:
     sheet.freeze_panes(1, 0)
 
 
-def _averages(writer: _Writer, name: str, run: RunJudgement) -> None:
+def _averages(writer: Writer, name: str, run: RunJudgement) -> None:
     sheet = writer.sheet(name)
     count = min(len(run.series.time), _MOST_ROWS)
     for column, (key, head) in enumerate(_SERIES):
@@ -223,7 +222,7 @@ def _averages(writer: _Writer, name: str, run: RunJudgement) -> None:
     _chart(writer, sheet, run.series, count)
 
 
-def _chart(writer: _Writer, sheet: Worksheet, series: AveragedSeries, count: int) -> None:
+def _chart(writer: Writer, sheet: Worksheet, series: AveragedSeries, count: int) -> None:
     """Before and after against time, beside the columns that they are drawn from."""
     chart = writer.workbook.add_chart({"type": "scatter", "subtype": "straight"})
     keys = [key for key, _ in _SERIES]

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.models.rbf.together import joined
+
 if TYPE_CHECKING:
     import torch
 
@@ -132,8 +134,19 @@ class Objective:
         design[:, :count] = torch.mm(self._moments, self._tensor(exponent.T)).clamp_(self._floor, 0.0).exp_()
         return design
 
+    @property
+    def form(self) -> tuple[object, ...]:
+        """What objectives have to share to be worked out as one batch."""
+        place = self._linear.device, self._linear.dtype
+        return self.rows, self.dimensions, self._linear_columns, self._evidence, *place
+
     def __call__(self, shape: Shape) -> Value:
         """Objective and gradient at a shape; infinite where the normal equations break down."""
+        together = joined()
+        return self.value(shape) if together is None else together.value(self, shape)
+
+    def value(self, shape: Shape) -> Value:
+        """As called, worked out alone."""
         torch = self._torch
         count = len(shape.centres)
         ridge = float(np.exp(shape.log_ridge))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,6 +13,7 @@ from fogml.models.rbf.blocks import AveragedRows
 from fogml.models.rbf.centres import kmeans_centres, ols_centres
 from fogml.models.rbf.objective import Objective, Shape
 from fogml.models.rbf.stopping import Watch, held_out_rows
+from fogml.models.rbf.together import joined
 from fogml.models.rbf.tuning import LOG_WIDTH_RANGE, TuningSettings, tune_own, tune_shared
 from fogml.models.tall_least_squares import one_blas_thread
 
@@ -116,7 +117,7 @@ class Search:
         sizes = sorted({min(size, most) for size in self.settings.sizes} - {0})
         if dimensions == 0 or not sizes or self._linear_suffices():
             return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0}, 1.0)
-        with one_blas_thread(), _one_torch_thread():
+        with one_blas_thread(), _one_torch_thread(), self._beside_others():
             starts = self._best_starts(min(sizes[0], _TRIED_CENTRES))
             value, best = self._best(sizes[0], starts)
             tried = {sizes[0]: value}
@@ -128,6 +129,12 @@ class Search:
                     break
                 best = shape
         return Found(best, tried, self._share)
+
+    @staticmethod
+    def _beside_others() -> AbstractContextManager[None]:
+        """Meet the descents of other fits, where there are some."""
+        together = joined()
+        return nullcontext() if together is None else together.descending()
 
     def _linear_suffices(self) -> bool:
         """Whether the linear part leaves nothing but rounding."""

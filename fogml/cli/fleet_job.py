@@ -1,0 +1,165 @@
+"""The job of ``fogml fleet``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import field_validator
+
+from fogml.cli.fleet_unit import UnitWork
+from fogml.cli.settings import LimitSettings, named_values
+from fogml.cli.terminal import Terminal, Work, number
+from fogml.errors import InputError
+from fogml.fleet.engines import run_tasks
+from fogml.fleet.manifest import Unit, read_manifest
+from fogml.fleet.shared import FORM, shared_model
+from fogml.fleet.summary import fleet_json
+from fogml.fleet.tasks import DONE, Task
+from fogml.outputs import whole_folder
+from fogml.validation.report_json import finite_json
+
+
+_SHOWN = 40
+
+
+class FleetSettings(LimitSettings):
+    """Settings of ``fogml fleet``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("manifest", "prior")
+    manifest: str | None = None
+    model: str = "auto"
+    features: str | None = None
+    parameters: dict[str, Any] = {}
+    models: list[str] = ["all"]
+    form: str = FORM
+    prior: str | None = None
+    twin: str = "nominal"
+    workers: int = 1
+    cluster: str | None = None
+    device: str | None = None
+    batch: int = 64
+    repair: bool = False
+    strict: bool = False
+    any_unit: bool = False
+    out: str = "fleet-results"
+
+    @field_validator("parameters", mode="before")
+    @classmethod
+    def _set_by_flags(cls, value: object) -> object:
+        return named_values(value) if isinstance(value, list) else value
+
+    def for_units(self) -> dict[str, Any]:
+        """What units' results depend on."""
+        left_out = {"manifest", "prior", "workers", "cluster", "device", "batch", "out"}
+        values = self.model_dump(mode="json", exclude=left_out)
+        if self.device is not None:
+            values["parameters"] = {**self.parameters, "device": self.device}
+        return values
+
+
+def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
+    """Do every unit's job, write the fleet's results, print them; whether all are done and meet limits."""
+    from fogml.report.fleet_page import fleet_page
+    from fogml.report.fleet_spreadsheet import fleet_spreadsheet
+
+    if settings.manifest is None:
+        raise InputError("no manifest is given; name a CSV or YAML file of units")
+    units = read_manifest(settings.manifest)
+    tasks = _tasks(settings, units)
+    home = Path(settings.out)
+    if home.exists() and not home.is_dir():
+        raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
+    with terminal.work("fleet", total=len(tasks)) as work:
+        outcomes = _run(settings, tasks, work, terminal)
+    values = finite_json(fleet_json(outcomes, settings.for_units()))
+    with whole_folder(settings.out) as folder:
+        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
+        (folder / "fleet.json").write_text(text + "\n", encoding="utf-8")
+        (folder / "fleet.html").write_text(fleet_page(values, Path(settings.manifest).name), encoding="utf-8")
+        fleet_spreadsheet(values, folder / "fleet.xlsx")
+        (folder / "config.yaml").write_text(settings.in_full().yaml("fleet"), encoding="utf-8")
+    _print(values, terminal)
+    terminal.result(values)
+    terminal.say(f"Written to {settings.out}: open {home / 'fleet.html'}")
+    return all(unit["status"] == DONE and unit["met"] is not False for unit in values["units"])
+
+
+def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
+    from fogml.features.parse import parse_features
+    from fogml.models.names import make_model
+
+    shared = None if settings.prior is None else _shared(settings.prior)
+    parse_features(settings.form)
+    own = settings.for_units()
+    if settings.device is not None:
+        _check_device(settings)
+    make_model(settings.model, settings.features, settings.seed, own["parameters"])
+    work = UnitWork(own, settings.form, shared)
+    told = {**own, "shared": shared}
+    # Units that are done are known by their settings: workers write into one folder, wherever they run.
+    return [Task(unit, work, str(Path(settings.out).absolute()), told) for unit in units]
+
+
+def _shared(path: str) -> dict[str, Any]:
+    try:
+        values = json.loads(Path(path).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"--prior {path}: no such file; a fleet.json was expected") from None
+    except ValueError:
+        raise InputError(f"--prior {path}: is no JSON; a fleet.json was expected") from None
+    if not isinstance(values, dict) or "shared" not in values:
+        raise InputError(
+            f"--prior {path}: tells no shared constants; a fleet.json of three units or more does"
+        )
+    shared_model(values["shared"])
+    return dict(values["shared"])
+
+
+def _check_device(settings: FleetSettings) -> None:
+    import torch
+
+    if settings.model != "rbf":
+        raise InputError(f"--device trains RBF networks in batches; '{settings.model}' is none: --model rbf")
+    try:
+        torch.zeros(1, device=settings.device)
+    except (RuntimeError, AssertionError) as error:
+        reason = str(error).split("\n")[0]
+        raise InputError(f"--device {settings.device}: is not there ({reason}); cpu always is") from None
+
+
+def _run(
+    settings: FleetSettings, tasks: Sequence[Task], work: Work, terminal: Terminal
+) -> list[dict[str, Any]]:
+    def told(outcome: dict[str, Any]) -> None:
+        label = f"{outcome['unit']} {outcome['axis']}".strip()
+        work.advance(1.0, f"{label} {outcome['status']}")
+        if outcome["status"] != DONE:
+            terminal.note(f"{label}: {outcome['reason']}")
+
+    if settings.device is not None:
+        from fogml.fleet.batched import run_batched
+
+        return run_batched(tasks, settings.batch, told)
+    return run_tasks(tasks, workers=settings.workers, cluster=settings.cluster, progress=told)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    rows = []
+    for unit in values["units"][:_SHOWN]:
+        label = f"{unit['unit']} {unit['axis']}".strip()
+        told = unit["verdict"].replace("_", " ") or unit["model"] or unit["reason"]
+        figures = [number(unit[key]) for key in ("before", "after", "floor")]
+        rows.append([label, unit["job"], unit["status"], *figures, told])
+    heads = ["unit", "job", "status", "rms before", "rms after", "floor", "model or reason"]
+    times = {unit["averaging_s"] for unit in values["units"] if unit["averaging_s"]}
+    over = f", {times.pop():g} s averages" if len(times) == 1 else ""
+    terminal.table(f"Worst test run of each unit [deg/h]{over}", heads, rows)
+    for key, what in (("outliers", "Unlike the others"), ("again", "Needs another run")):
+        for item in values[key][:_SHOWN]:
+            terminal.say(f"{what}: {item['unit']}: {item['why']}")
+    most = max(len(values[key]) for key in ("units", "outliers", "again"))
+    if most > _SHOWN:
+        terminal.say(f"The first {_SHOWN} of each are shown; fleet.html and fleet.xlsx hold all.")

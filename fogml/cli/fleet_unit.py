@@ -1,0 +1,177 @@
+"""One unit's job in a fleet: train, compare or diagnose, and what the fleet wants of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.fleet.manifest import Unit
+
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
+    from fogml.runs.run import Run
+    from fogml.validation.results import Judgement
+
+
+@dataclass(frozen=True)
+class UnitWork:
+    """Does a unit's job as ``fogml train``, ``compare`` or ``diagnose`` would, and prints nothing.
+
+    Attributes
+    ----------
+    settings
+        Settings that all units share, by the names of those commands.
+    form
+        Form of the constants that units are compared in.
+    shared
+        ``shared`` of an earlier fleet's ``fleet.json``: constants are drawn to that fleet's.
+    """
+
+    settings: Mapping[str, Any]
+    form: str
+    shared: Mapping[str, Any] | None = None
+
+    def __call__(self, unit: Unit, folder: Path) -> Mapping[str, Any]:
+        """Do the job, and give what the fleet wants of it."""
+        do = {"train": self._train, "compare": self._compare, "diagnose": self._diagnose}
+        return do[unit.job](unit, folder)
+
+    def _train(self, unit: Unit, folder: Path) -> dict[str, Any]:
+        from fogml.cli.train_job import (
+            TrainSettings,
+            check_settings,
+            fit_and_judge,
+            split_runs,
+            write_results,
+        )
+        from fogml.outputs import whole_folder
+        from fogml.validation.judge import judge
+
+        terminal = Terminal(quiet=True)
+        settings = self._for(TrainSettings, unit, folder, runs=list(unit.train), test=list(unit.test))
+        check_settings(settings)
+        with whole_folder(folder) as staging:
+            train_runs, test_runs = split_runs(settings, terminal)
+            check_belong(unit, (*train_runs, *test_runs))
+            if self.shared is None:
+                model, judgement = fit_and_judge(settings, train_runs, test_runs, terminal)
+            else:
+                from fogml.fleet.shared import shared_model
+
+                model = shared_model(self.shared).fit(train_runs)
+                judgement = judge(
+                    model,
+                    train_runs,
+                    test_runs,
+                    averaging_s=settings.averaging,
+                    design_index=settings.design_index,
+                    limits=settings.limits,
+                    any_unit=settings.any_unit,
+                )
+            write_results(staging, settings, model, judgement, terminal)
+        return {**_told(judgement), "constants": self._constants(train_runs), "parameters": _count(model)}
+
+    def _compare(self, unit: Unit, folder: Path) -> dict[str, Any]:
+        import json
+
+        from fogml.cli.compare_job import CompareSettings, compare_and_write
+
+        settings = self._for(CompareSettings, unit, folder, runs=list(unit.train), test=list(unit.test))
+        met = compare_and_write(settings, Terminal(quiet=True))
+        models = json.loads((folder / "compare.json").read_text(encoding="utf-8"))["models"]
+        worst = {
+            name: max(body["test"], key=lambda run: run["after"]["rms"]) for name, body in models.items()
+        }
+        # What is told is the automatic choice where it is there: the best by the test would be chosen by it.
+        name = "auto" if "auto" in worst else min(worst, key=lambda key: worst[key]["after"]["rms"])
+        run = worst[name]
+        return {
+            "model": name,
+            "met": met,
+            "worst": {
+                "run": run["run"],
+                "averaging_s": run["averaging_s"],
+                "before": run["before"]["rms"],
+                "after": run["after"]["rms"],
+                "floor": run["floor"],
+                "outside_training": run["outside_training"],
+            },
+            "notes": models[name]["notes"],
+        }
+
+    def _diagnose(self, unit: Unit, folder: Path) -> dict[str, Any]:
+        from fogml.cli.diagnose_job import DiagnoseSettings, diagnose_and_write
+
+        settings = self._for(DiagnoseSettings, unit, folder, runs=list(unit.train), held_out=list(unit.test))
+        found = diagnose_and_write(settings, Terminal(quiet=True))
+        far = [item for item in found.how_far if item.after is not None]
+        worst = max(far, key=lambda item: item.after) if far else None
+        return {
+            "verdict": found.verdict,
+            "effects": [item.effect for item in found.found],
+            "worst": None
+            if worst is None
+            else {
+                "run": worst.run,
+                "averaging_s": worst.averaging_s,
+                "before": worst.before,
+                "after": worst.after,
+                "floor": worst.floor,
+                "outside_training": None,
+            },
+        }
+
+    def _for(self, kind: Any, unit: Unit, folder: Path, **own: Any) -> Any:
+        """Settings of a command: those that it knows of the fleet's, and the unit's own."""
+        known = {key: value for key, value in self.settings.items() if key in kind.model_fields}
+        return kind.model_validate({**known, **own, "out": str(folder)})
+
+    def _constants(self, runs: Sequence[Run]) -> dict[str, Any] | None:
+        from fogml.fleet.shared import UnitConstants
+
+        try:
+            return UnitConstants.of(runs, self.form).as_dict()
+        except InputError:
+            return None
+
+
+def check_belong(unit: Unit, runs: Sequence[Run]) -> None:
+    """Check that runs are of the unit and axis that the manifest names.
+
+    Raises
+    ------
+    InputError
+        Naming the run.
+    """
+    for run in runs:
+        for what, stated, wanted in (
+            ("unit", run.facts.unit, unit.name),
+            ("axis", run.facts.axis, unit.axis),
+        ):
+            if stated and wanted and str(stated) != wanted:
+                raise InputError(f"{run.name}: is of {what} '{stated}', the manifest names '{wanted}'")
+
+
+def _told(judgement: Judgement) -> dict[str, Any]:
+    worst = max(judgement.test, key=lambda run: run.after.rms)
+    return {
+        "model": str(judgement.model["kind"]),
+        "met": judgement.met,
+        "worst": {
+            "run": worst.run,
+            "averaging_s": worst.averaging_s,
+            "before": worst.before.rms,
+            "after": worst.after.rms,
+            "floor": worst.floor,
+            "outside_training": worst.outside_training,
+        },
+        "notes": [str(note) for note in (*judgement.notes, *judgement.model.get("notes", ()))],
+    }
+
+
+def _count(model: DriftModel) -> int:
+    return model.parameter_count()

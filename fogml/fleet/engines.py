@@ -1,0 +1,158 @@
+"""What runs a fleet's tasks: this process, loky's processes here, or a Dask cluster."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import as_completed
+from contextlib import contextmanager
+from typing import Any
+
+from fogml.errors import InputError
+from fogml.fleet.tasks import Task, finished, lost, run_task
+
+Outcome = dict[str, Any]
+Progress = Callable[[Outcome], None]
+_ANSWER_S = 10
+_BROKEN_POOLS = 2
+# Pools that may break before units are run one by one, to find the one that breaks them.
+_THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+
+
+def run_tasks(
+    tasks: Sequence[Task],
+    *,
+    workers: int = 1,
+    cluster: str | None = None,
+    progress: Progress | None = None,
+) -> list[Outcome]:
+    """Run every task that is not done yet; outcomes in the order of the tasks.
+
+    Parameters
+    ----------
+    tasks
+        What to do.
+    workers
+        Processes on this machine; with one, tasks run in this process.
+    cluster
+        Address of a Dask scheduler, ``tcp://host:port``; its workers do the tasks, and need the
+        runs and the fleet's folder at the same paths.
+    progress
+        Called with each outcome as it comes.
+
+    Raises
+    ------
+    InputError
+        If the cluster does not answer, or the disk is full; finished units are kept.
+    """
+    if workers < 1:
+        raise InputError(f"workers {workers}: at least 1 is needed")
+    told = progress or (lambda outcome: None)
+    outcomes: dict[str, Outcome] = {}
+
+    def keep(task: Task, outcome: Outcome) -> None:
+        outcomes[task.unit.folder] = outcome
+        told(outcome)
+
+    todo = []
+    for task in tasks:
+        known = finished(task)
+        if known is None:
+            todo.append(task)
+        else:
+            keep(task, known)
+    if cluster is not None:
+        _on_cluster(todo, cluster, keep)
+    elif workers == 1:
+        with _one_thread():
+            for task in todo:
+                keep(task, run_task(task))
+    else:
+        _in_processes(todo, min(workers, max(len(todo), 1)), keep)
+    return [outcomes[task.unit.folder] for task in tasks]
+
+
+def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Outcome], None]) -> None:
+    """Run tasks in processes; one that ends its process is found, and the rest go on."""
+    left = {task.unit.folder: task for task in tasks}
+
+    def run(some: Sequence[Task], processes: int) -> bool:
+        from joblib.externals.loky import ProcessPoolExecutor
+        from joblib.externals.loky.process_executor import BrokenProcessPool
+
+        with ProcessPoolExecutor(max_workers=processes, env=_THREADS) as pool:
+            futures = {pool.submit(run_task, task): task for task in some}
+            try:
+                for future in as_completed(futures):
+                    task = futures[future]
+                    outcome = future.result()
+                    del left[task.unit.folder]
+                    keep(task, outcome)
+            except BrokenProcessPool:
+                return False
+            except BaseException:
+                pool.shutdown(wait=True, kill_workers=True)
+                raise
+        return True
+
+    for _ in range(_BROKEN_POOLS):
+        if not left or run(list(left.values()), workers):
+            return
+    for task in list(left.values()):
+        if not run([task], 1):
+            del left[task.unit.folder]
+            keep(task, lost(task, "ended its process: out of memory, or killed"))
+
+
+def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outcome], None]) -> None:
+    if not tasks:
+        return
+    try:
+        from distributed import Client
+        from distributed import as_completed as completed_on
+        from distributed.scheduler import KilledWorker
+    except ImportError:
+        raise InputError("a cluster needs Dask: pip install 'fogml[cluster]'") from None
+    try:
+        client = Client(address, timeout=_ANSWER_S, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise InputError(
+            f"--cluster {address}: does not answer ({_first_line(error)}); start it with 'dask scheduler' "
+            "and 'dask worker', or leave --cluster out"
+        ) from None
+    with client:
+        # Tasks have effects: each is its own, and none may be taken for another.
+        futures = {
+            client.submit(
+                run_task, task, key=f"fogml-{task.unit.folder}-{task.fingerprint()}", pure=False
+            ): task
+            for task in tasks
+        }
+        for future in completed_on(list(futures), raise_errors=False):
+            task = futures[future]
+            try:
+                outcome = future.result()
+            except InputError:
+                raise
+            except KilledWorker:
+                outcome = lost(task, "ended several workers: out of memory, or killed")
+            except Exception as error:
+                raise InputError(
+                    f"--cluster {address}: stopped answering ({_first_line(error)}); finished units are "
+                    "kept, run the command again"
+                ) from error
+            keep(task, outcome)
+            # The outcome is on disk: a worker that dies later takes nothing along.
+            future.release()
+
+
+def _first_line(error: BaseException) -> str:
+    return (str(error).strip() or type(error).__name__).split("\n")[0]
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """One thread for linear algebra, as in processes: results are the same however many there are."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(limits=1):
+        yield

@@ -1,0 +1,188 @@
+"""Manifests: a list of units with the job and the runs of each, as CSV or YAML."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from fogml.errors import InputError
+from fogml.runs.facts import read_yaml
+
+MANIFEST_SCHEMA = "fogml.manifest/1"
+COLUMNS = ("unit", "job", "train", "test", "axis")
+JOBS = ("train", "compare", "diagnose")
+SHIPPED = "shipped:"
+_UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
+
+
+@dataclass(frozen=True)
+class Unit:
+    """One line of a manifest.
+
+    Attributes
+    ----------
+    name
+        Serial number.
+    job
+        ``train``, ``compare`` or ``diagnose``.
+    train, test
+        Paths of runs; for ``diagnose`` those fitted to, and those held out.
+    axis
+        Axis, or an empty text.
+    folder
+        Name of the unit's own folder, unlike every other's.
+    """
+
+    name: str
+    job: str
+    train: tuple[str, ...]
+    test: tuple[str, ...]
+    axis: str
+    folder: str
+
+    @property
+    def label(self) -> str:
+        """Serial number and axis."""
+        return f"{self.name} {self.axis}".strip()
+
+
+def read_manifest(path: str | Path) -> list[Unit]:
+    """The units of a manifest, in its order.
+
+    A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``.
+    A YAML file is a list of mappings with these keys, or has them under ``units``. Runs are looked
+    for from here, then from where the manifest lies.
+
+    Raises
+    ------
+    InputError
+        Naming file, row and column of the first fault; a run that is not there is one.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; a manifest was expected, CSV or YAML")
+    rows = _yaml_rows(path) if path.suffix.lower() in (".yaml", ".yml") else _csv_rows(path)
+    units = [_unit(row, place, path) for place, row in rows]
+    if not units:
+        raise InputError(f"{path.name}: holds no unit")
+    return _with_folders(units, path)
+
+
+def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            reader = csv.DictReader(
+                (line for line in file if not line.startswith("#")), skipinitialspace=True
+            )
+            heads = [str(name).strip() for name in reader.fieldnames or ()]
+            _check_keys(heads, f"{path.name}: header")
+            reader.fieldnames = heads
+            return [(f"row {number}", row) for number, row in enumerate(reader, start=2) if any(row.values())]
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path.name}: is no UTF-8 text ({error.reason} at byte {error.start})") from None
+    except csv.Error as error:
+        raise InputError(f"{path.name}: {error}") from None
+
+
+def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
+    values = read_yaml(path)
+    if isinstance(values, dict):
+        if values.get("schema", MANIFEST_SCHEMA) != MANIFEST_SCHEMA:
+            raise InputError(
+                f"{path.name}: 'schema' is {values['schema']!r}; {MANIFEST_SCHEMA} is understood"
+            )
+        values = values.get("units")
+    if not isinstance(values, list) or not all(isinstance(row, dict) for row in values):
+        raise InputError(f"{path.name}: a list of units was expected, each with {', '.join(COLUMNS)}")
+    rows = []
+    for number, row in enumerate(values, start=1):
+        _check_keys([str(key) for key in row], f"{path.name}: unit {number}")
+        rows.append((f"unit {number}", row))
+    return rows
+
+
+def _check_keys(keys: Iterable[str], place: str) -> None:
+    keys = list(keys)
+    for key in keys:
+        if key not in COLUMNS:
+            near = get_close_matches(key, COLUMNS, n=1)
+            hint = f"did you mean '{near[0]}'? " if near else ""
+            raise InputError(f"{place}: unknown column '{key}'; {hint}known are {', '.join(COLUMNS)}")
+    for key in ("unit", "train"):
+        if key not in keys:
+            raise InputError(f"{place}: column '{key}' is missing; columns are {', '.join(COLUMNS)}")
+
+
+def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
+    where = f"{path.name}: {place}"
+    if None in row:
+        raise InputError(f"{where}: has more cells than the header; separate runs by ';'")
+    name, job, axis = (_text(row.get(key)) for key in ("unit", "job", "axis"))
+    job = job or "train"
+    if not name:
+        raise InputError(f"{where}: column 'unit' is empty; a serial number was expected")
+    if job not in JOBS:
+        raise InputError(f"{where}: column 'job': '{job}'; {', '.join(JOBS)} were expected")
+    train, test = (
+        tuple(_found(run, f"{where}: column '{key}'", path.parent) for run in _listed(row.get(key)))
+        for key in ("train", "test")
+    )
+    if not train:
+        raise InputError(f"{where}: column 'train' names no run")
+    if not test and job != "diagnose":
+        raise InputError(f"{where}: column 'test' names no run; '{job}' judges on at least one")
+    return Unit(name, job, train, test, axis, "")
+
+
+def _text(value: Any) -> str:
+    return "" if value is None else str(value).strip()
+
+
+def _listed(value: Any) -> list[str]:
+    items = value if isinstance(value, list) else _text(value).split(";")
+    return [text for item in items if (text := _text(item))]
+
+
+def _found(run: str, place: str, folder: Path) -> str:
+    """The run's path in full."""
+    if run.startswith(SHIPPED):
+        from fogml.runs.shipped import shipped_names
+
+        if run.removeprefix(SHIPPED) not in shipped_names():
+            raise InputError(f"{place}: {run}: no such recording ships")
+        return run
+    for home in (Path(), folder):
+        if (home / run).is_file():
+            return str((home / run).absolute())
+    raise InputError(f"{place}: {run}: no such file, here or beside the manifest")
+
+
+def _with_folders(units: list[Unit], path: Path) -> list[Unit]:
+    from dataclasses import replace
+
+    twice = Counter((unit.name, unit.axis, unit.job) for unit in units)
+    for (name, axis, job), count in twice.items():
+        if count > 1:
+            raise InputError(
+                f"{path.name}: unit {name}{' axis ' + axis if axis else ''} has the job '{job}' {count} "
+                "times; once was expected"
+            )
+    jobs = len({unit.job for unit in units}) > 1
+    placed, taken = [], set()
+    for unit in units:
+        parts = [unit.name, unit.axis, unit.job if jobs else ""]
+        wanted = _UNSAFE.sub("_", "-".join(part for part in parts if part)).strip(".") or "unit"
+        folder, number = wanted, 1
+        # Names that differ only in case are one folder on some systems.
+        while folder.lower() in taken:
+            number += 1
+            folder = f"{wanted}-{number}"
+        taken.add(folder.lower())
+        placed.append(replace(unit, folder=folder))
+    return placed

@@ -1,0 +1,149 @@
+"""One unit's job: done once, its outcome kept beside its results."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import json
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from fogml.errors import FogmlError, InputError
+from fogml.fleet.manifest import SHIPPED, Unit
+from fogml.outputs import whole_file
+
+OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
+DONE, FAILED = "done", "failed"
+_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+
+UnitJob = Callable[[Unit, Path], Mapping[str, Any]]
+"""Does a unit's job, writes the results into a folder, and gives what the fleet wants of them, JSON-ready.
+
+It has to be importable by name: other processes and machines call it.
+"""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A unit, its job, and where the results go.
+
+    Attributes
+    ----------
+    unit
+        Unit and runs.
+    job
+        What does it.
+    home
+        The fleet's folder; on a cluster, one that every machine sees.
+    settings
+        What results depend on beside the runs, JSON-ready.
+    """
+
+    unit: Unit
+    job: UnitJob
+    home: str
+    settings: Mapping[str, Any]
+
+    @property
+    def folder(self) -> Path:
+        """The unit's own folder."""
+        return Path(self.home) / self.unit.folder
+
+    def fingerprint(self) -> str:
+        """What tells this task from another: the line of the manifest, the settings, the runs' files."""
+        runs = {path: _stamp(path) for path in (*self.unit.train, *self.unit.test)}
+        values = {
+            "unit": [self.unit.name, self.unit.job, self.unit.axis],
+            "runs": [runs[path] for path in self.unit.train] + [[]] + [runs[path] for path in self.unit.test],
+            "settings": self.settings,
+        }
+        return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def run_task(task: Task) -> dict[str, Any]:
+    """Do a unit's job unless its outcome is there already; the outcome.
+
+    What is wrong with one unit becomes a failed outcome; nothing of it is left half-written.
+
+    Raises
+    ------
+    InputError
+        If the disk is full: then other units would fail as well.
+    """
+    fingerprint = task.fingerprint()
+    known = finished(task, fingerprint)
+    if known is not None:
+        return known
+    outcome: dict[str, Any] = {
+        "schema": OUTCOME_SCHEMA,
+        "unit": task.unit.name,
+        "axis": task.unit.axis,
+        "job": task.unit.job,
+        "folder": task.unit.folder,
+        "fingerprint": fingerprint,
+    }
+    try:
+        outcome |= {"status": DONE, "found": dict(task.job(task.unit, task.folder))}
+    except OSError as error:
+        if error.errno in _NO_ROOM:
+            raise _full(task, error) from error
+        outcome |= {"status": FAILED, "reason": f"{error.filename or ''}: {error.strerror}".lstrip(": ")}
+    except FogmlError as error:
+        outcome |= {"status": FAILED, "reason": str(error)}
+    except Exception as error:
+        # Whatever one unit runs into, the others go on.
+        outcome |= {"status": FAILED, "reason": f"{type(error).__name__}: {error}"}
+    try:
+        task.folder.mkdir(parents=True, exist_ok=True)
+        with whole_file(task.folder / OUTCOME) as partial:
+            text = json.dumps(outcome, indent=1, allow_nan=False, ensure_ascii=False)
+            partial.write_text(text + "\n", encoding="utf-8")
+    except OSError as error:
+        raise _full(task, error) from error
+    return outcome
+
+
+def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | None:
+    """The outcome of a unit that was done before with the same runs and settings; None if it was not.
+
+    Units that failed are tried again.
+    """
+    try:
+        outcome = json.loads((task.folder / OUTCOME).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    same = isinstance(outcome, dict) and outcome.get("fingerprint") == (fingerprint or task.fingerprint())
+    return outcome if same and outcome.get("status") == DONE else None
+
+
+def lost(task: Task, reason: str) -> dict[str, Any]:
+    """The outcome of a unit whose job ended its process."""
+    return {
+        "schema": OUTCOME_SCHEMA,
+        "unit": task.unit.name,
+        "axis": task.unit.axis,
+        "job": task.unit.job,
+        "folder": task.unit.folder,
+        "status": FAILED,
+        "reason": reason,
+    }
+
+
+def _full(task: Task, error: OSError) -> InputError:
+    return InputError(
+        f"{task.home}: cannot be written ({error.strerror or error}); finished units are kept, make room and "
+        "run the command again"
+    )
+
+
+def _stamp(path: str) -> list[Any]:
+    """Name, size and time of change of a run and of its side file."""
+    if path.startswith(SHIPPED):
+        return [path]
+    stamps: list[Any] = [Path(path).name]
+    for file in (Path(path), Path(path).with_suffix(".yaml")):
+        if file.exists():
+            stamps += [file.stat().st_size, file.stat().st_mtime_ns]
+    return stamps

@@ -1,0 +1,196 @@
+"""A linear model whose coefficients have a prior: what other units' coefficients were."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from sklearn.utils.validation import check_is_fitted, validate_data
+
+from fogml.errors import InputError
+from fogml.models.linear import LinearRegressor
+from fogml.models.rbf.search import independent_share
+from fogml.runs.run import FloatArray
+
+_SPREADS = np.logspace(0.0, 8.0, 33)
+# Factors by which a unit's prior covariance may be wider than its fleet's.
+_FREEDOM = 4.0
+# Degrees of freedom of the t distribution that the factors make of the prior.
+_ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class Prior:
+    """Normal distribution of a fleet's coefficients in the columns ``[1, (x - shift) / scale]``.
+
+    Attributes
+    ----------
+    mean, covariance
+        Of the constant and the k coefficients [deg/h], shapes (k + 1,) and (k + 1, k + 1).
+    shift, scale
+        Of the k columns, in their units, shape (k,).
+    """
+
+    mean: FloatArray
+    covariance: FloatArray
+    shift: FloatArray
+    scale: FloatArray
+
+    def columns(self, X: FloatArray) -> FloatArray:
+        """The columns of rows of features, shape (n, k + 1)."""
+        return np.column_stack([np.ones(len(X)), (X - self.shift) / self.scale])
+
+    def as_dict(self) -> dict[str, Any]:
+        """The prior as JSON-ready values."""
+        return {key: np.asarray(value).tolist() for key, value in vars(self).items()}
+
+    @classmethod
+    def from_dict(cls, values: dict[str, Any]) -> Prior:
+        """The prior that `as_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            If the numbers do not make a prior.
+        """
+        try:
+            arrays = {name: np.asarray(values[name], dtype=np.float64) for name in cls.__annotations__}
+            width = len(arrays["mean"])
+            shapes = [arrays[name].shape for name in ("covariance", "shift", "scale")]
+            if shapes != [(width, width), (width - 1,), (width - 1,)]:
+                raise ValueError("shapes do not match")
+            np.linalg.cholesky(arrays["covariance"])
+        except (KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
+            raise InputError(f"the fleet's prior is not understood ({error})") from None
+        return cls(**arrays)
+
+
+class PriorRegressor(LinearRegressor):
+    """Linear model with a normal prior on its coefficients, of a width that the rows may overrule.
+
+    The prior's covariance is multiplied by a factor of at least one, whose distribution makes the
+    prior a t distribution; it is averaged over, weighed by the evidence. A unit like its fleet is
+    drawn to the fleet's mean where its own rows tell little; an odd one makes wide priors likely,
+    and is left to least squares.
+
+    Rows that are alike count as fewer: residuals' precision is multiplied by one over their
+    integrated autocorrelation.
+
+    Parameters
+    ----------
+    prior
+        As `Prior.as_dict` gives it.
+
+    Attributes
+    ----------
+    spread_ : float
+        Factor of the prior's covariance with the greatest weight; 1 for a unit like its fleet.
+    """
+
+    def __init__(self, prior: dict[str, Any] | None = None) -> None:
+        self.prior = prior
+        self.ridge = 0.0
+        self.fit_intercept = True
+
+    def fit(self, X: ArrayLike, y: ArrayLike, folds: ArrayLike | None = None) -> Self:
+        """Fit to rows in time order; `folds` are not needed.
+
+        Raises
+        ------
+        InputError
+            If there is no prior, or it is for another number of columns.
+        """
+        inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
+        if self.prior is None:
+            raise InputError("a fleet's prior is needed")
+        prior = Prior.from_dict(self.prior)
+        if len(prior.shift) != inputs.shape[1]:
+            raise InputError(
+                f"the fleet's prior is for {len(prior.shift)} columns, {inputs.shape[1]} are given"
+            )
+        columns = prior.columns(inputs)
+        solution, *_ = np.linalg.lstsq(columns, target, rcond=None)
+        freedom = max(1.0, len(target) - columns.shape[1])
+        for _ in range(_ROUNDS):
+            left = target - columns @ solution
+            variance = max(float(left @ left) / freedom, 1e-24)
+            precision = independent_share(left) / variance
+            solution, covariance, self.spread_ = posterior(
+                precision * columns.T @ columns, precision * columns.T @ target, prior
+            )
+        to_raw = _to_raw(prior)
+        raw, raw_covariance = to_raw @ solution, to_raw @ covariance @ to_raw.T
+        self.intercept_, self.coef_ = float(raw[0]), raw[1:]
+        self.covariance_ = raw_covariance
+        self.residual_std_ = float(np.sqrt(variance))
+        self.ridge_, self.rank_ = 0.0, inputs.shape[1]
+        return self
+
+    def refitted(self, X: ArrayLike, y: ArrayLike) -> PriorRegressor:
+        """A new regressor with the same prior fitted to other rows."""
+        check_is_fitted(self)
+        return PriorRegressor(self.prior).fit(X, y)
+
+    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
+        """The fitted regressor as JSON-ready values and arrays."""
+        values, arrays = super().to_saved()
+        return {**values, "prior": self.prior, "spread": self.spread_}, arrays
+
+    @classmethod
+    def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
+        """The regressor that `to_saved` gave."""
+        plain = LinearRegressor.from_saved(values, arrays)
+        model = cls(prior=values["prior"])
+        for name, value in vars(plain).items():
+            if name.endswith("_"):
+                setattr(model, name, value)
+        model.spread_ = float(values["spread"])
+        return model
+
+
+def posterior(
+    information: FloatArray, image: FloatArray, prior: Prior, spreads: Sequence[float] | FloatArray = _SPREADS
+) -> tuple[FloatArray, FloatArray, float]:
+    """Mean and covariance of coefficients given rows, and the likeliest factor of the prior's covariance.
+
+    Parameters
+    ----------
+    information, image
+        ``Z'Z / s^2`` and ``Z'y / s^2`` of the rows, shapes (k + 1, k + 1) and (k + 1,).
+    prior
+        What the fleet tells.
+    spreads
+        Factors to average over.
+    """
+    root = np.linalg.cholesky(prior.covariance)
+    inner = root.T @ information @ root
+    values, vectors = np.linalg.eigh(inner)
+    values = np.maximum(values, 0.0)
+    seen = vectors.T @ (root.T @ (image - information @ prior.mean))
+    means, weights = [], []
+    for spread in spreads:
+        gain = spread / (1.0 + spread * values)
+        means.append(prior.mean + root @ (vectors @ (gain * seen)))
+        # The t distribution as a mixture of normals: its factor is inverse gamma.
+        factor = -(0.5 * _FREEDOM) * np.log(spread) - 0.5 * _FREEDOM / spread
+        weights.append(factor + 0.5 * float(gain @ seen**2) - 0.5 * float(np.log1p(spread * values).sum()))
+    share = np.exp(np.array(weights) - np.max(weights))
+    share /= share.sum()
+    best = int(np.argmax(share))
+    mean = np.einsum("i,ij->j", share, np.array(means))
+    spread = float(np.asarray(spreads)[best])
+    half = root @ vectors * np.sqrt(spread / (1.0 + spread * values))
+    return mean, half @ half.T, spread
+
+
+def _to_raw(prior: Prior) -> FloatArray:
+    """Matrix from (constant, coefficients) in the prior's columns to those in the features' own."""
+    width = len(prior.shift)
+    matrix = np.zeros((width + 1, width + 1))
+    matrix[0, 0] = 1.0
+    matrix[0, 1:] = -prior.shift / prior.scale
+    matrix[1:, 1:] = np.diag(1.0 / prior.scale)
+    return matrix

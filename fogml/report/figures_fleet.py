@@ -1,0 +1,169 @@
+"""Figures of a fleet: what units had and have left, and their constants over serial numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from fogml.report import style
+from fogml.report.axes import log_axis
+from fogml.report.page import Drawing
+from fogml.report.words import number, plural
+
+_COLUMNS = 2
+_LABELS = 24
+
+
+def distribution(fleet: Mapping[str, Any]) -> Drawing:
+    """Rms before and after of all units, as cumulated shares, with the median floor."""
+    judged = _judged(fleet)
+    figure = go.Figure()
+    shares = 100.0 * (np.arange(len(judged)) + 0.5) / len(judged)
+    for key, name, colour, dash in (
+        ("before", "before", style.TRAINING, "dash"),
+        ("after", "after", style.GREEN, "solid"),
+    ):
+        values = sorted(unit[key] for unit in judged)
+        figure.add_trace(
+            go.Scatter(
+                x=values,
+                y=shares,
+                mode="lines+markers",
+                name=name,
+                line={"color": colour, "dash": dash, "shape": "hv"},
+                marker={"size": 5},
+            )
+        )
+    floor = fleet["distribution"]["floor"]["median"]
+    figure.add_vline(x=floor, line=style.FLOOR_LINE)
+    figure.add_trace(style.floor_in_legend())
+    every = [unit[key] for unit in judged for key in ("before", "after")] + [floor]
+    figure.update_xaxes(
+        title_text="rms on the worst test run [deg/h], logarithmic",
+        **log_axis(min(v for v in every if v > 0), max(every)),
+    )
+    figure.update_yaxes(title_text="units at or below [%]", range=[0, 100])
+    style.styled(figure, 360)
+    before, after = fleet["distribution"]["before"], fleet["distribution"]["after"]
+    return Drawing(
+        figure,
+        alt=(
+            f"Rms of {plural(len(judged), 'unit')}: median {number(before['median'])} before and "
+            f"{number(after['median'])} deg/h after, median noise floor {number(floor)}."
+        ),
+        caption="Each unit's worst test run. Dashed line: the units' median noise floor.",
+    )
+
+
+def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outliers: set[str]) -> Drawing:
+    """Rms before and after and the floor of each unit, in order of serial numbers."""
+    units = [unit for unit in order if unit["after"] is not None]
+    labels = [_label(unit) for unit in units]
+    figure = go.Figure()
+    for key, symbol, colour in (
+        ("before", "circle-open", style.TRAINING),
+        ("after", "circle", style.GREEN),
+        ("floor", "line-ew-open", style.BLACK),
+    ):
+        figure.add_trace(
+            go.Scatter(
+                x=labels,
+                y=[unit[key] for unit in units],
+                mode="markers",
+                name="noise floor" if key == "floor" else key,
+                marker={"symbol": symbol, "size": 9, "color": colour},
+            )
+        )
+    odd = [unit for unit in units if _label(unit) in outliers]
+    if odd:
+        figure.add_trace(
+            go.Scatter(
+                x=[_label(unit) for unit in odd],
+                y=[unit["after"] for unit in odd],
+                mode="markers",
+                name="unlike the others",
+                marker={
+                    "symbol": "circle-open",
+                    "size": 17,
+                    "color": style.VERMILION,
+                    "line": {"width": 2.5},
+                },
+            )
+        )
+    every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v and v > 0]
+    figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(min(every), max(every)))
+    _serials(figure, labels)
+    style.styled(figure, 400)
+    return Drawing(
+        figure,
+        alt=f"Rms before and after of {plural(len(units), 'unit')} in order of serial numbers.",
+        caption="Each unit's worst test run, in order of serial numbers.",
+    )
+
+
+def constants(fleet: Mapping[str, Any]) -> Drawing:
+    """The units' constants in the common form over serial numbers, with the fleet's spread."""
+    found = fleet["constants"]
+    names, labels = found["names"], found["units"]
+    rows = -(-len(names) // _COLUMNS)
+    figure = make_subplots(
+        rows=rows, cols=_COLUMNS, shared_xaxes=True, horizontal_spacing=0.1, vertical_spacing=0.12 / rows
+    )
+    values, errors = np.array(found["values"]), np.array(found["se"])
+    for place, name in enumerate(names):
+        row, column = place // _COLUMNS + 1, place % _COLUMNS + 1
+        mean, std = found["mean"][place], found["std"][place]
+        for end in (mean - 2 * std, mean + 2 * std):
+            figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
+        figure.add_trace(
+            go.Scatter(
+                x=labels,
+                y=values[:, place],
+                mode="markers",
+                error_y={"type": "data", "array": errors[:, place], "thickness": 1, "width": 2},
+                marker={"size": 7, "color": style.BLUE},
+                showlegend=False,
+            ),
+            row=row,
+            col=column,
+        )
+        title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"
+        figure.update_yaxes(title_text=title, title_font_size=12, tickformat=".3~g", row=row, col=column)
+    _serials(figure, labels)
+    style.styled(figure, 90 + 170 * rows)
+    moving = [trend["name"] for trend in found["trends"] if trend["seen"]]
+    told = f"Drift over serial numbers is seen in {', '.join(moving)}." if moving else "No drift is seen."
+    return Drawing(
+        figure,
+        alt=f"Constants of {plural(len(labels), 'unit')} in the form {found['features']}. {told}",
+        caption=(
+            "The form's constants from each unit's training runs, drawn to the fleet where they tell little, "
+            "with standard errors; the constant is at the fleet's mean temperature and rate. Dashed: two "
+            f"standard deviations of the fleet. {told}"
+        ),
+    )
+
+
+def _serials(figure: go.Figure, labels: Sequence[str]) -> None:
+    """An axis of serial numbers, of which as many are written as there is room for."""
+    step = max(1, -(-len(labels) // _LABELS))
+    figure.update_xaxes(
+        type="category",
+        categoryorder="array",
+        categoryarray=list(labels),
+        tickmode="array",
+        tickvals=list(labels)[::step],
+        tickangle=-60 if len(labels) > 8 else 0,
+    )
+
+
+def _judged(fleet: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    return [unit for unit in fleet["units"] if unit["after"] is not None]
+
+
+def _label(unit: Mapping[str, Any]) -> str:
+    return f"{unit['unit']} {unit['axis']}".strip()
