@@ -11,7 +11,7 @@ $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --upgrade -c constraints.txt pip setuptools
 	$(PIP) install --quiet -c constraints.txt torch
-	$(PIP) install --quiet -c constraints.txt -e '.[hdf5,sweep,cluster,test]'
+	$(PIP) install --quiet -c constraints.txt -e '.[hdf5,sweep,cluster,export,test]'
 	touch $(READY)
 
 ## Train on one leg of a real thermal cycle, judge on another, and say which page to open.

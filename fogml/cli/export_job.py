@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any, ClassVar
-
-from pydantic import Field
 
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import Settings, absolute
@@ -22,7 +19,7 @@ class ExportJobSettings(Settings):
     model: str | None = None
     to: str = "c"
     dtype: str | None = None
-    byte_budget: int | None = Field(default=None, alias="bytes")
+    bytes: int | None = None
     with_pipeline: bool = False
     tolerance: float | None = None
     sample_s: float | None = None
@@ -49,7 +46,7 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
         wanted = ExportSettings(
             settings.to,
             settings.dtype,
-            settings.byte_budget,
+            settings.bytes,
             settings.tolerance,
             settings.with_pipeline,
             settings.sample_s,
@@ -74,11 +71,13 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         ["operations per sample", str(report["operations_per_sample"])],
     ]
     if pruning := report.get("pruning"):
-        text = f"{pruning['bytes_whole']} to {report['bytes_weights']} bytes, rms {pruning['rms_difference']:.2g} deg/h"
+        text = f"{pruning['bytes_whole']} to {report['bytes_weights']} bytes, "
+        text += f"rms {pruning['rms_difference']:.2g} deg/h"
         rows.append(["pruned", text])
     accuracy = report["accuracy"]
     if "rms_model" in accuracy:
-        text = f"{accuracy['rms_model']:.4g} deg/h with the model, {accuracy['rms_exported']:.4g} with the export"
+        text = f"{accuracy['rms_model']:.4g} deg/h with the model, "
+        text += f"{accuracy['rms_exported']:.4g} with the export"
         rows.append([f"rms of {accuracy['averaging_s']:g} s averages on training folds", text])
     if size := report.get("cortex_m4"):
         rows.append(["Cortex-M4", f"{size['flash_bytes']} bytes of flash, {size['ram_bytes']} of RAM"])

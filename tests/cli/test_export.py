@@ -1,0 +1,76 @@
+"""``fogml export``: files and figures, whole or not at all."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import pytest
+import yaml
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+
+
+@pytest.fixture
+def model(invoke, run_files, tmp_path):
+    out = tmp_path / "trained"
+    invoke("train", run_files[0], "--test", run_files[1], "--model", "polynomial", "-o", out, "--quiet")
+    return out / "model"
+
+
+def test_c_with_figures(invoke_json, model, tmp_path):
+    out = tmp_path / "firmware"
+    values = invoke_json("export", model, "--to", "c", "--dtype", "float32", "-o", out)
+    written = json.loads((out / "export.json").read_text())
+    assert written == values
+    assert (values["schema"], values["to"], values["dtype"]) == ("fogml.export/1", "c", "float32")
+    assert values["unit"] == "deg/h"
+    assert values["bytes_weights"] == 4 * 6
+    assert 0.0 <= values["largest_difference"] <= values["tolerance"]
+    assert values["operations_per_sample"] > 20
+    header = (out / "fogml_model.h").read_text()
+    assert "int fogml_step(fogml_state *state, float time_s, const float *temperatures" in header
+    assert "int fogml_self_test(void);" in header
+    assert "FOG-1, axis x" in header
+
+
+def test_the_configuration_gives_the_same_files(invoke, model, tmp_path):
+    out = tmp_path / "firmware"
+    invoke("export", model, "--dtype", "q31", "--bytes", "400", "-o", out)
+    first = {path.name: path.read_bytes() for path in out.iterdir()}
+    assert yaml.safe_load((out / "config.yaml").read_text())["bytes"] == 400
+    again = tmp_path / "again.yaml"
+    shutil.move(out / "config.yaml", again)
+    invoke("export", "--config", again)
+    assert {path.name: path.read_bytes() for path in out.iterdir()} == first
+
+
+def test_training_runs_prune_and_judge(invoke_json, model, run_files, tmp_path):
+    arguments = ("--to", "json", "--bytes", "30", "--train", run_files[0], "-o", tmp_path / "small")
+    values = invoke_json("export", model, *arguments)
+    assert values["bytes_weights"] <= 30
+    assert values["accuracy"]["on"] == "training folds"
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("--tolerance", "0"), "differs by up to"),
+        (("--to", "pdf"), "known are"),
+        (("--bytes", "3"), "too few"),
+        (("--sample-s", "200"), "too short"),
+    ],
+)
+def test_refused_and_nothing_written(invoke, model, tmp_path, words, message):
+    out = tmp_path / "refused"
+    result = invoke("export", model, *words, "-o", out, status=2)
+    assert message in result.stderr
+    assert "Traceback" not in result.stderr
+    assert not out.exists()
+    assert not list(tmp_path.glob(".partial-*"))
+
+
+def test_without_a_compiler_c_is_refused(invoke, model, tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    result = invoke("export", model, "-o", tmp_path / "refused", status=2)
+    assert "no C compiler" in result.stderr

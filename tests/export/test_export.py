@@ -1,0 +1,180 @@
+"""Files of every kind hold the model, prune to a budget, and are refused where they differ."""
+
+from __future__ import annotations
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.export.export import ExportSettings, export_model
+from fogml.export.plan import Plan
+from fogml.export.points import box_points, history
+from fogml.export.storage import FILE_DTYPES, stored_array
+from fogml.models.names import make_model
+from tests.export.conftest import NAMES, training_run
+from tests.export.test_c_code import disturbed
+
+needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_plain_form_is_the_model(model_of, name):
+    model = model_of(name)
+    plan, run = Plan.of(model), disturbed(3)
+    if model.features_ is None:
+        atoms, full = np.empty((len(run), 0)), np.ones(len(run), dtype=bool)
+    else:
+        atoms, full = model.features_.atom_values(run)
+    value, flag = plan.compensated(atoms, full, run.gyro)
+    expected = model.compensate(run)
+    np.testing.assert_allclose(value, expected.compensated, rtol=1e-12, atol=1e-9)
+    np.testing.assert_array_equal(flag, expected.flag)
+
+
+@pytest.mark.parametrize("name", ["polynomial", "rich", "rbf", "joint"])
+def test_histories_go_through_the_trained_box(model_of, name):
+    plan = Plan.of(model_of(name))
+    past = history(plan, 0)
+    _, flag = plan.compensated(*past.atoms(plan), past.gyro)
+    assert np.mean(flag == 0) > 0.1
+    assert np.any(flag == 1) and np.any(flag == 2)
+
+
+@pytest.mark.parametrize("to", ["json", "mat"])
+@pytest.mark.parametrize("dtype", FILE_DTYPES)
+@pytest.mark.parametrize("name", ["mean", "polynomial", "rbf", "joint"])
+def test_number_files_hold_the_model(model_of, tmp_path, name, to, dtype):
+    report = export_model(model_of(name), tmp_path, ExportSettings(to, dtype, tolerance=1.0))
+    bound = {"float64": 1e-9, "float32": 1e-4, "float16": 0.02, "int8": 0.2}[dtype]
+    assert report["largest_difference"] < bound
+    sizes = {"float64": 8, "float32": 4, "float16": 3, "int8": 2}
+    count = sum(values.size for values in Plan.of(model_of(name)).arrays.values())
+    assert report["bytes_weights"] <= sizes[dtype] * count + 64
+    files = {"json": ["fogml_model.json", "fogml_model.safetensors"], "mat": ["fogml_model.mat"]}
+    assert report["files"] == files[to]
+
+
+def test_json_alone_is_enough_to_compute_the_drift(model_of, tmp_path):
+    model = model_of("rbf")
+    export_model(model, tmp_path, ExportSettings("json", "float64"))
+    held = json.loads((tmp_path / "fogml_model.json").read_text())
+    arrays = {name: np.array(entry["values"]) for name, entry in held["arrays"].items()}
+    plan = Plan.of(model)
+    # Well within the trained rates: beyond them the network goes on along its slope.
+    f = plan.compose(box_points(plan, 1, count=50) * [0.9, 0.3])
+    x = f[:, held["network_columns"]]
+    z = (x[:, None] - arrays["centres"]) / arrays["widths"]
+    drift = arrays["constant"] + f @ arrays["linear"] + np.exp(-(z**2).sum(axis=2)) @ arrays["weights"]
+    np.testing.assert_allclose(drift, model.regressor_.predict(f), atol=1e-9)
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "int8"])
+@pytest.mark.parametrize("pipeline", [False, True])
+@pytest.mark.parametrize("name", ["polynomial", "rich", "rbf", "joint"])
+def test_onnx(model_of, tmp_path, name, pipeline, dtype):
+    pytest.importorskip("onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    model = model_of(name)
+    if dtype == "int8" and pipeline:
+        pytest.skip("the weights are those of the graph from features")
+    settings = ExportSettings("onnx", dtype, tolerance=1.0, pipeline=pipeline)
+    export_model(model, tmp_path, settings)
+    session = runtime.InferenceSession(str(tmp_path / "fogml_model.onnx"), providers=["CPUExecutionProvider"])
+    run = training_run() if name != "joint" else disturbed(4)
+    plan = Plan.of(model)
+    real = np.float64 if dtype == "float64" else np.float32
+    assert [output.name for output in session.get_outputs()] == ["drift"]
+    if pipeline:
+        entry = session.get_inputs()[0]
+        assert entry.name == "temperatures"
+        length = entry.shape[1]
+        if length > len(run) // 2:
+            pytest.skip("the exponential window looks back over the whole run")
+        ends = np.arange(length, len(run), 371) if name != "joint" else np.array([520, 580])
+        paths = np.column_stack([run.temperature(sensor) for sensor in plan.sensors])
+        feed = {"temperatures": np.stack([paths[end - length + 1 : end + 1] for end in ends]).astype(real)}
+        if name == "joint":
+            pytest.skip("gaps in the run: compared by the export itself")
+    else:
+        ends = np.flatnonzero(model.evaluate(run).full)[::50]
+        feed = {"features": model.features_.transform(run, limited=True, linear=True)[ends].astype(real)}
+    if name == "joint":
+        feed["gyro"] = run.gyro[ends].astype(real)
+    drift = session.run(["drift"], feed)[0]
+    bound = {"float64": 1e-8, "float32": 2e-3, "int8": 0.2}[dtype]
+    np.testing.assert_allclose(drift, model.predict(run)[ends], atol=bound)
+
+
+@needs_cc
+@pytest.mark.parametrize("name", ["rbf", "rich"])
+@pytest.mark.parametrize("train", [False, True])
+def test_a_byte_budget_is_kept_and_more_bytes_are_no_worse(model_of, tmp_path, name, train):
+    model = model_of(name)
+    runs = [training_run()] if train else []
+    errors = []
+    for budget in (60, 120, 200) if name == "rbf" else (12, 24, 36):
+        report = export_model(model, tmp_path, ExportSettings("json", "float32", budget), runs)
+        assert report["bytes_weights"] <= budget
+        pruning = report["pruning"]
+        assert pruning["chosen_on"] == ("training runs" if train else "points in the trained box")
+        errors.append(report["accuracy"]["rms_exported"] if train else pruning["rms_difference"])
+    assert errors == sorted(errors, reverse=True)
+
+
+def test_a_pruned_model_runs_in_c(model_of, tmp_path):
+    if shutil.which("gcc") is None:
+        pytest.skip("gcc is not installed")
+    report = export_model(model_of("rbf"), tmp_path, ExportSettings("c", "float32", 150))
+    assert report["bytes_weights"] <= 150
+    assert report["largest_difference"] < 1e-4
+
+
+def test_accuracy_on_training_folds(model_of, tmp_path):
+    settings = ExportSettings("json", "int8", tolerance=1.0)
+    accuracy = export_model(model_of("rbf"), tmp_path, settings, [training_run()])["accuracy"]
+    assert accuracy["on"] == "training folds"
+    assert len(accuracy["folds"]) == 5
+    assert accuracy["rms_model"] <= accuracy["rms_exported"] < 3.0 * accuracy["rms_model"]
+
+
+def test_only_training_runs_may_choose(model_of, tmp_path):
+    with pytest.raises(InputError, match="not one of the runs that the model was trained on"):
+        export_model(model_of("rbf"), tmp_path, ExportSettings("json"), [disturbed(1)])
+
+
+REFUSED = [
+    (ExportSettings("c", "int8"), "float64, float32, q31, q15"),
+    (ExportSettings("json", "q15"), "for --to c"),
+    (ExportSettings("exe"), "known are c, onnx, json, mat"),
+    (ExportSettings("c", "float8"), "--dtype 'float8' is not known"),
+    (ExportSettings("json", pipeline=True), "is for --to onnx"),
+    (ExportSettings("json", budget=0), "positive"),
+    (ExportSettings("json", "float32", 8), "takes 16 bytes"),
+    (ExportSettings("json", "float16", tolerance=1e-9), r"differs by up to [0-9.e-]+ deg/h"),
+    (ExportSettings("json", budget=150, tolerance=1e-9), "differs by up to"),
+    (ExportSettings("c", sample_s=100.0), "too short"),
+    (ExportSettings("c", "q31", sample_s=1e-3), "holds .* samples"),
+    (ExportSettings("c", sample_s=-1.0), "sample interval"),
+]
+
+
+@pytest.mark.parametrize(("settings", "message"), REFUSED)
+def test_refusals_say_why(model_of, tmp_path, settings, message):
+    with pytest.raises(InputError, match=message):
+        export_model(model_of("rbf"), tmp_path, settings)
+
+
+def test_a_regressor_without_a_compact_form_is_refused(tmp_path):
+    model = make_model("sklearn.linear_model.Ridge", "T, dT").fit(training_run())
+    with pytest.raises(InputError, match="no compact form"):
+        export_model(model, tmp_path, ExportSettings())
+
+
+@pytest.mark.parametrize("dtype", ["float16", "int8"])
+def test_small_formats_keep_numbers_of_any_size(dtype):
+    values = np.array([4e-7, -3e-5, 0.0, 1.0, 2e5])
+    decoded = stored_array("linear", values, dtype).decoded
+    np.testing.assert_allclose(decoded, values, rtol=1e-3 if dtype == "float16" else 1e-2)
