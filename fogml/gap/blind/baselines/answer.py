@@ -55,8 +55,13 @@ def write_answer(
     fit: Prediction,
     held_out: Prediction,
     noise: NoiseModel,
+    structural: FloatArray | None = None,
 ) -> None:
-    """Write ``gap.json``; findings in any order, those of no probability left out."""
+    """Write ``gap.json``; findings in any order, those of no probability left out.
+
+    `structural` is the structural gap on the fit runs [deg/h], shape (n,), where it is known without
+    noise.
+    """
     listed = sorted((f for f in findings if f.probability > 0.0), key=lambda f: -f.probability)
     units = {id: c.amplitude.unit for id, c in fit.stack.model.candidates().items()}
     values = {
@@ -74,7 +79,7 @@ def write_answer(
             for f in listed
         ],
         "unknown": {"probability": unknown},
-        "where": {"segments": _segments(fit, noise)},
+        "where": {"segments": _segments(fit, noise, structural)},
         "how_far": _how_far(held_out, noise),
     }
     with whole_file(out / "gap.json") as partial:
@@ -119,11 +124,13 @@ def _how_far(held_out: Prediction, noise: NoiseModel) -> list[dict[str, Any]]:
     return rows
 
 
-def _segments(fit: Prediction, noise: NoiseModel) -> list[dict[str, Any]]:
+def _segments(fit: Prediction, noise: NoiseModel, structural: FloatArray | None) -> list[dict[str, Any]]:
     """Stretches of at least 600 s whose averages exceed the floor."""
-    limit, found = _OVER_FLOOR * floor_of(noise), []
-    stack = fit.stack
-    for name, time, values in zip(stack.names, stack.time, stack.split(stack.gap - fit.recalibrated)):
+    limit, found = floor_of(noise), []
+    stack, gap = fit.stack, structural
+    if gap is None:
+        limit, gap = _OVER_FLOOR * limit, stack.gap - fit.recalibrated
+    for name, time, values in zip(stack.names, stack.time, stack.split(gap)):
         averages = block_averages(time, values, window_s=AVERAGING_S)
         over = np.concatenate(([False], np.abs(averages.values[0]) > limit, [False]))
         edges = np.flatnonzero(np.diff(over.astype(np.int8)))

@@ -59,7 +59,9 @@ def oracle(folder: BlindFolder, truth: Truth, out: Path) -> None:
         Prediction(stack, stack.nominal @ nothing, stack.nominal @ rest + s[:, named].sum(axis=1))
         for stack, s in zip((fit, held_out), contributions)
     ]
-    write_answer(out, found, unknown, predictions[0], predictions[1], noise)
+    total = contributions[0].sum(axis=1)
+    structural = total - fit.nominal @ _constants(fit, noise, total)
+    write_answer(out, found, unknown, predictions[0], predictions[1], noise, structural)
 
 
 def _design(stack: Stack, noise: NoiseModel) -> FloatArray:
