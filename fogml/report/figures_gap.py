@@ -97,14 +97,14 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
         figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
 
     line("temperature", series.temperature_degc, "temperature", color=style.BLUE, width=1.6)
-    line("output", series.replayed_before, "replayed: nominal", color=style.GREY, width=1.6, dash="dot")
+    line("output", series.replayed_before, "replayed, nominal", color=style.GREY, width=1.6, dash="dot")
     line("output", series.recorded, "recorded", color=style.BEFORE, width=1.3)
     replayed = {"color": style.SKY_BLUE, "width": 2.0, "dash": "dashdot"}
-    line("output", series.replayed_recalibrated, "replayed: recalibrated", **replayed)
+    line("output", series.replayed_recalibrated, "replayed, recalibrated", **replayed)
     line("recalibrated", series.gap_recalibrated, "gap, recalibrated", color=style.BEFORE, width=1.3)
     if named:
         found = {"color": style.MODEL, "width": 2.0, "dash": "dash"}
-        line("output", series.replayed_after, "replayed: with what was found", **found)
+        line("output", series.replayed_after, "with what was found", **found)
         line("after", series.gap_after, "gap, with what was found", color=style.AFTER, width=1.3)
     off_panel = _output_range(figure, series, panels.index("output") + 1)
     low, high = _gap_range(series)

@@ -19,6 +19,8 @@ from fogml.report.words import number
 SHOWN = 16
 """Candidates that the figure shows, the best first, and all that are named."""
 LEAST_LENGTH = 3.0
+"""Length under which the runs could not show an effect."""
+_LEAST_DRAWN = 0.1
 _Z95, _Z90 = 1.96, 1.645
 _LOOKS = {
     "named": (style.MODEL, ""),
@@ -51,25 +53,34 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
                     y=[e.title for e in rows],
                     orientation="h",
                     name=STATUS_WORDS[status],
-                    marker={"color": colour, "pattern": {"shape": pattern, "fgcolor": "white", "size": 6}},
+                    marker={
+                        "color": colour,
+                        "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white", "size": 6},
+                    },
                     customdata=[e.gain for e in rows],
                     hovertemplate="%{y}: %{customdata:.3g} nats<extra></extra>",
                 ),
                 row=1,
                 col=1,
             )
-    lengths = [max(e.usual_length, 1e-2) for e in shown]
-    figure.add_trace(
-        go.Scatter(
-            x=lengths,
-            y=labels,
-            mode="markers",
-            name="what the runs could show",
-            marker={"symbol": "diamond-open", "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
-        ),
-        row=1,
-        col=2,
-    )
+    lengths = [max(e.usual_length, _LEAST_DRAWN) for e in shown]
+    for words, symbol, small in (
+        ("what the runs could show", "diamond-open", False),
+        (f"under {_LEAST_DRAWN:g}", "triangle-left", True),
+    ):
+        rows = [e for e in shown if (e.usual_length < _LEAST_DRAWN) is small]
+        if rows:
+            figure.add_trace(
+                go.Scatter(
+                    x=[max(e.usual_length, _LEAST_DRAWN) for e in rows],
+                    y=[e.title for e in rows],
+                    mode="markers",
+                    name=words,
+                    marker={"symbol": symbol, "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
+                ),
+                row=1,
+                col=2,
+            )
     figure.add_vline(x=LEAST_LENGTH, row=1, col=2, line=style.FLOOR_LINE)
     low, high = _folded(min(0.0, *(e.gain for e in shown))), _folded(max(3.0, *(e.gain for e in shown)))
     room = 0.04 * (high - low)
@@ -97,9 +108,9 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
         alt=f"Gain in log evidence of each candidate by itself, and what the runs could show of it. {best}.",
         caption=(
             "Left: how much better each candidate, by itself, explains the fit runs than the twin's "
-            "constants and noise do (its shape averaged over its range; the scale is linear near 0, logarithmic "
-            "beyond). A candidate that is not named can gain too: it resembles what is. Right: the length, "
-            "in standard deviations of the noise, that its usual size would have in these runs once the "
+            "constants and noise do (its shape averaged over its range; the scale is linear near 0, "
+            "logarithmic beyond). A candidate that is not named can gain too: it resembles what is. Right: the "
+            "length, in standard deviations of the noise, that its usual size would have in these runs once the "
             f"constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs could not show it. "
             "One that is far larger than usual can be named all the same."
         ),

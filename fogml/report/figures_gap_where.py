@@ -157,7 +157,10 @@ def by_temperature(bins: Sequence[TemperatureExcess]) -> Drawing:
                     y=[b.excess_rms for b in rows],
                     width=[0.9 * (b.to_degc - b.from_degc) for b in rows],
                     name=words,
-                    marker={"color": colour, "pattern": {"shape": pattern, "fgcolor": "white"}},
+                    marker={
+                        "color": colour,
+                        "pattern": {"shape": pattern, "fillmode": "overlay", "fgcolor": "white"},
+                    },
                 )
             )
     figure.update_xaxes(title_text="T [°C]")

@@ -20,9 +20,10 @@ from fogml.report.gap_words import (
     verdict_words,
 )
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.words import MISSING, averages, duration, listed, number, plural
+from fogml.report.words import MISSING, duration, listed, number, plural
 
 MOST_RUNS_DRAWN = 8
+_FAR_UNDER_FLOOR = 0.6
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,8 @@ def gap_page(found: Diagnosis) -> str:
         warnings=_warnings(found, names),
         causes=gap_tables.causes_table(found.found, names) if found.found else None,
         classes=gap_tables.classes_table(found.found, names),
-        how_far=gap_tables.how_far_table(found.how_far) if found.how_far else None,
+        how_far=gap_tables.how_far_table(found) if found.how_far else None,
+        how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],
         runs=drawn,
         not_drawn=[s.run for s in found.series if s.run not in {d.name for d in drawn}],
         against_temperature=figures_gap.against_temperature(found) if _fit_series(found) else None,
@@ -80,7 +82,7 @@ def gap_page(found: Diagnosis) -> str:
         candidates=gap_tables.evidence_table(found),
         undetectable=[title_of(id, names) for id in found.undetectable],
         by_run=[figures_gap_evidence.amplitude_by_run(f, names) for f in found.found if f.by_run],
-        inconsistent=[title_of(f.effect, names) for f in found.found if not f.consistent],
+        agreement=_agreement(found, names),
         separating=_separating(found, names),
         constants=figures_gap_evidence.constants_moved(found.constants) if found.constants else None,
         constants_table=gap_tables.constants_table(found),
@@ -121,19 +123,13 @@ def _kicker(found: Diagnosis) -> str:
 
 
 def _tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
-    kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "missed"}
+    kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "words missed"}
     tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), kind.get(found.verdict, ""))]
-    tiles += [_cause_tile(found, names), _confidence_tile(found)]
+    tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
     unknown = probability_words(found.unknown.probability)
     if found.verdict != "unknown":
         tiles.append(Tile("Something unknown", unknown, "", "probability that no candidate explains all"))
     tiles.append(_closed_tile(found))
-    if found.how_far:
-        item = hardest(found.how_far)
-        left = item.after if found.named else item.recalibrated
-        tiles.append(
-            Tile("Left", number(left), "deg/h", f"floor {number(item.floor)}, {averages(item.averaging_s)}")
-        )
     return tiles
 
 
@@ -150,17 +146,19 @@ def _verdict_note(found: Diagnosis) -> str:
 def _cause_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
     named = found.named
     if not named:
-        return Tile("Cause", "none named", "", found.unknown.looks_like and f"it {found.unknown.looks_like}")
+        looks = found.unknown.looks_like
+        note = f"what is left {looks}" if looks else "nothing stands out of the noise"
+        return Tile("Cause", "none named", "", note, "wide")
     title = title_of(named[0].effect, names)
     if len(named) > 1:
         value = plural(len(named), "effect")
-        return Tile("Cause", value, "", "; ".join(cause_words(f, names) for f in named))
+        return Tile("Cause", value, "", "; ".join(cause_words(f, names) for f in named), "wide")
     if len(named[0].members) > 1:
-        return Tile("Cause", f"one of {len(named[0].members)}", "", cause_words(named[0], names))
-    return Tile("Cause", "one effect", "", title)
+        return Tile("Cause", f"1 of {len(named[0].members)}", "", cause_words(named[0], names), "wide")
+    return Tile("Cause", "1 effect", "", title, "wide")
 
 
-def _confidence_tile(found: Diagnosis) -> Tile:
+def _confidence_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
     if found.named:
         least = min(f.probability for f in found.named)
         note = "that it acts" if len(found.named) == 1 else "the least certain of those named"
@@ -171,14 +169,11 @@ def _confidence_tile(found: Diagnosis) -> Tile:
         return Tile(
             "Confidence", probability_words(found.unknown.probability), "", "that something unknown acts"
         )
-    most = max((f.probability for f in found.found), default=0.0)
-    note = "that something acts unseen"
-    return Tile(
-        "Likeliest effect",
-        probability_words(most) if found.found else "none",
-        "",
-        note if found.found else "",
-    )
+    likeliest = max(found.evidence, key=lambda e: e.probability, default=None)
+    if likeliest is None or likeliest.probability < 0.01:
+        return Tile("Likeliest effect", "under 1 %", "", f"any of {plural(len(found.evidence), 'candidate')}")
+    title = title_of(likeliest.effect, names)
+    return Tile("Likeliest effect", probability_words(likeliest.probability), "", title)
 
 
 def _closed_tile(found: Diagnosis) -> Tile:
@@ -189,7 +184,7 @@ def _closed_tile(found: Diagnosis) -> Tile:
     if len(found.how_far) > 1:
         on = f"the least of {len(found.how_far)} held-out runs: {item.run}"
     if item.closed is None:
-        return Tile("Closed", "nothing to close", "", f"at the floor on {on}")
+        return Tile("Closed", MISSING, "", f"nothing to close: at the floor on {on}")
     if not found.named:
         return Tile("Closed", "0 %", "", f"nothing was added; {on}")
     interval = f"90 %: {interval_words(*item.closed_ci90)}; " if item.closed_ci90 else ""
@@ -206,6 +201,13 @@ def _warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
         )
     elif not found.how_far:
         told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
+    for item in found.how_far:
+        if item.recalibrated < _FAR_UNDER_FLOOR * item.floor:
+            told.append(
+                f"On {item.run} the recalibrated twin leaves {number(item.recalibrated)} deg/h where the noise "
+                f"model expects {number(item.floor)}: it overstates slow noise, and what is closed can't be "
+                "told by it. A longer static run with --noise tells the noise better."
+            )
     for run, reason in found.unusable:
         told.append(f"{run} was not used: {reason.removeprefix(f'{run}: ')}.")
     for f in found.named:
@@ -246,6 +248,16 @@ def _drawn(found: Diagnosis) -> list[RunSection]:
         for s in shown
         if len(s.time_s)
     ]
+
+
+def _agreement(found: Diagnosis, names: dict[str, str]) -> str:
+    """Whether the amplitudes of single runs agree."""
+    doubted = [title_of(f.effect, names) for f in found.found if not f.consistent]
+    if doubted:
+        return f"An effect of the gyro has one sign and size on every run. {listed(doubted)}: not so."
+    if any(len(f.by_run) > 1 for f in found.found):
+        return "An effect of the gyro has one sign and size on every run that can show it, and so it is here."
+    return "Only one run shows it by itself, so runs can't be compared."
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import combinations
 
-from fogml.gap.result import Diagnosis, Found, HowFar
+from fogml.gap.result import Diagnosis, Found
 from fogml.report.gap_words import (
     STATUS_WORDS,
     closed_words,
@@ -28,14 +28,14 @@ _NOISE = {
     "K": ("rate random walk", "deg/h/√h"),
 }
 _CONSTANTS = {
-    "e0": "scale factor error",
-    "k1": "its slope over temperature",
-    "k2": "its curvature over temperature",
+    "e0": "scale factor",
+    "k1": "scale factor, by T",
+    "k2": "scale factor, by T²",
     "b0": "bias",
-    "b1": "its slope over temperature",
-    "b2": "its curvature over temperature",
-    "g": "bias by gradient, T_in − T_out",
-    "m": "bias by change of temperature, ΔT",
+    "b1": "bias, by T",
+    "b2": "bias, by T²",
+    "g": "bias, by T_in − T_out",
+    "m": "bias, by ΔT",
 }
 
 
@@ -79,7 +79,7 @@ def _consistency(found: Found) -> str:
         return (
             f"agree in sign and size ({count} runs)" if found.consistent else f"do not agree ({count} runs)"
         )
-    return "one run alone can show it" if found.by_run else MISSING
+    return "one run alone can show it" if found.by_run else "no single run shows it"
 
 
 def classes_table(found: Sequence[Found], names: dict[str, str]) -> Table | None:
@@ -103,22 +103,10 @@ def classes_table(found: Sequence[Found], names: dict[str, str]) -> Table | None
     )
 
 
-def how_far_table(items: Sequence[HowFar]) -> Table:
+def how_far_table(found: Diagnosis) -> Table:
     """Rms on each held-out run and what is closed of the structural gap."""
-    rows = [
-        Row(
-            (
-                item.run,
-                *(number(v) for v in (item.before, item.recalibrated, item.after, item.floor)),
-                closed_words(item),
-                interval_words(*item.closed_ci90) if item.closed_ci90 else MISSING,
-                item.note,
-            )
-        )
-        for item in items
-    ]
-    noted = any(item.note for item in items)
-    columns: tuple[Column, ...] = (
+    named = bool(found.named)
+    columns: list[Column] = [
         ("Held out", "", "text"),
         ("Nominal", "deg/h", "figure"),
         ("Recalibrated", "deg/h", "figure"),
@@ -126,15 +114,25 @@ def how_far_table(items: Sequence[HowFar]) -> Table:
         ("Noise floor", "deg/h", "figure"),
         ("Closed", "", "figure"),
         ("90 % interval", "", "figure"),
-        ("Note", "", "text"),
-    )
-    if not noted:
-        columns, rows = columns[:-1], [Row(row.cells[:-1]) for row in rows]
+    ]
+    rows = []
+    for item in found.how_far:
+        cells = [
+            item.run,
+            *(number(v) for v in (item.before, item.recalibrated, item.after, item.floor)),
+            closed_words(item),
+            interval_words(*item.closed_ci90) if item.closed_ci90 else MISSING,
+        ]
+        rows.append(Row(tuple(cells if named else cells[:3] + cells[4:5])))
     return Table(
-        columns=columns,
+        columns=tuple(columns if named else columns[:3] + columns[4:5]),
         rows=tuple(rows),
-        caption=f"Rms of {averages(items[0].averaging_s)} of recorded less replayed. Closed: the part of "
-        "recalibrated² − floor² that goes; above 100 % or below 0 is chance or a misfit.",
+        caption=f"Rms of {averages(found.how_far[0].averaging_s)} of recorded less replayed."
+        + (
+            " Closed: the part of recalibrated² − floor² that goes; above 100 % or below 0 is chance or a misfit."
+            if named
+            else " Nothing was added, so nothing is closed beyond recalibrating."
+        ),
     )
 
 
@@ -155,7 +153,13 @@ def segments_table(found: Diagnosis) -> Table | None:
         ),
         rows=tuple(
             Row(
-                (s.run, f"{s.from_s:.0f}", f"{s.to_s:.0f}", duration(s.to_s - s.from_s), number(s.excess_rms))
+                (
+                    s.run,
+                    f"{max(s.from_s, 0.0):.0f}",
+                    f"{s.to_s:.0f}",
+                    duration(s.to_s - s.from_s),
+                    number(s.excess_rms),
+                )
             )
             for s in kept
         ),
@@ -198,9 +202,8 @@ def constants_table(found: Diagnosis) -> Table:
     rows = [
         Row(
             (
-                c.name,
-                _CONSTANTS.get(c.name, ""),
-                f"{number(c.prior_mean)} ± {number(c.prior_sd)}",
+                f"{c.name}: {_CONSTANTS[c.name]}" if c.name in _CONSTANTS else c.name,
+                f"{number(c.prior_mean)} ± {number(c.prior_sd, 2)}",
                 with_error(c.value, c.se),
                 unit_words(c.unit),
                 percent(1.0 - min(c.se / c.prior_sd, 1.0)) if c.prior_sd > 0.0 else MISSING,
@@ -211,9 +214,8 @@ def constants_table(found: Diagnosis) -> Table:
     return Table(
         columns=(
             ("Constant", "", "text"),
-            ("Of", "", "text"),
-            ("Prior", "± deviation", "figure"),
-            ("Fitted", "± standard error", "figure"),
+            ("Prior", "± sd", "figure"),
+            ("Fitted", "± se", "figure"),
             ("Unit", "", "text"),
             ("Learnt", "", "figure"),
         ),

@@ -58,6 +58,7 @@ def estimate_words(value: Estimate) -> str:
 
 def with_error(value: float, se: float) -> str:
     """A value with its standard error, both to the error's second figure; bare where there is none."""
+    value = 0.0 if abs(value) < 0.005 * se else value
     if not (math.isfinite(se) and se > 0.0):
         return number(value)
     places = 1 - math.floor(math.log10(se))
@@ -65,12 +66,15 @@ def with_error(value: float, se: float) -> str:
         return f"{number(value)} ± {number(se, 2)}"
     if places <= 0:
         return f"{value:.0f} ± {se:.0f}".replace("-", "−")
-    return f"{value:.{places}f} ± {se:.{places}f}".replace("-", "−")
+    told = f"{value:.{places}f}"
+    told = told.removeprefix("-") if float(told) == 0.0 else told
+    return f"{told} ± {se:.{places}f}".replace("-", "−")
 
 
 def interval_words(low: float, high: float) -> str:
     """An interval of shares in percent."""
-    return f"{100 * low:.0f} … {100 * high:.0f} %".replace("-", "−")
+    ends = [f"{100 * end:.0f}" for end in (low, high)]
+    return " … ".join("0" if end == "-0" else end for end in ends).replace("-", "−") + " %"
 
 
 def closed_words(item: HowFar) -> str:
@@ -114,10 +118,11 @@ def verdict_sentences(found: Diagnosis) -> list[str]:
     if found.verdict in ("explained", "ambiguous", "partly_explained"):
         alike = [f for f in found.named if len(f.members) > 1]
         if alike:
-            sentences.append(
-                f"{listed([cause_words(f, names) for f in alike], 2)} look alike in these runs: only "
+            sentences += [
+                f"{listed([title_of(m, names) for m in f.members], 5)} look alike in these runs: only "
                 "another run can tell which it is."
-            )
+                for f in alike
+            ]
     if found.verdict == "partly_explained":
         sentences.append(
             f"Beside, with probability {probability_words(found.unknown.probability)}, something acts that "
@@ -203,6 +208,6 @@ STATUS_WORDS = {
     "possible": "possible",
     "no_sign": "no sign of it",
     "undetectable": "these runs could not show it",
-    "in_constants": "same as the constants",
+    "in_constants": "no trace of its own in these runs",
 }
 """What became of a candidate."""
