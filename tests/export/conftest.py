@@ -17,7 +17,8 @@ from fogml.runs.run import Run
 
 RICH = (
     "T_in, dT_out[slope, 60 s], d(T_in-T_out)[exp, 120 s], diff(T_in)[slope, 40 s], "
-    "sign(dT_in[block, 32 s]), T_in^2*dT_out[slope, 60 s], 0.5*T_in+0.5*T_out, diff(T_out)[exp, 50 s], diff(T_in-T_out), dT_in[first]"
+    "sign(dT_in[block, 32 s]), T_in^2*dT_out[slope, 60 s], 0.5*T_in+0.5*T_out, diff(T_out)[exp, 50 s], "
+    "diff(T_in-T_out), dT_in[first]"
 )
 NAMES = ("none", "mean", "polynomial", "M2", "rich", "rbf", "rbf-patent", "joint", "joint-patent")
 
