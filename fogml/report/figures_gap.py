@@ -97,10 +97,10 @@ def run_in_time(series: RunSeries, segments: Sequence[GapSegment], named: bool) 
         figure.add_trace(trace, row=panels.index(panel) + 1, col=1)
 
     line("temperature", series.temperature_degc, "temperature", color=style.BLUE, width=1.6)
-    line("output", series.replayed_before, "replayed, nominal", color=style.GREY, width=1.6, dash="dot")
+    line("output", series.replayed_before, "nominal twin", color=style.GREY, width=1.6, dash="dot")
     line("output", series.recorded, "recorded", color=style.BEFORE, width=1.3)
     replayed = {"color": style.SKY_BLUE, "width": 2.0, "dash": "dashdot"}
-    line("output", series.replayed_recalibrated, "replayed, recalibrated", **replayed)
+    line("output", series.replayed_recalibrated, "recalibrated twin", **replayed)
     line("recalibrated", series.gap_recalibrated, "gap, recalibrated", color=style.BEFORE, width=1.3)
     if named:
         found = {"color": style.MODEL, "width": 2.0, "dash": "dash"}
@@ -142,17 +142,26 @@ def _rms(values: NDArray[np.float64]) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def _output_range(figure: go.Figure, series: RunSeries, row: int) -> bool:
-    """Scale the panel to what was recorded and fitted; whether the nominal replay runs off it."""
+def _output_range(figure: go.Figure, series: RunSeries, row: int) -> list[str]:
+    """Scale the panel to what was recorded and fitted; what runs off it, in words."""
     shown = np.concatenate([series.recorded, series.replayed_recalibrated, series.replayed_after])
     low, high = float(np.min(shown)), float(np.max(shown))
+    inner = [float(q) for q in np.quantile(shown, (0.1, 0.9))]
+    off = []
+    if high - low > 8.0 * (inner[1] - inner[0]) > 0.0:
+        # A scale factor's error in turns hides all else.
+        reach = 1.5 * (inner[1] - inner[0])
+        off.append(f"Peaks run off the panel, from {number(low)} to {number(high)} deg/h.")
+        low, high = max(inner[0] - reach, low), min(inner[1] + reach, high)
+    level = float(np.median(series.replayed_before))
+    if level < low or level > high:
+        if max(high, level) - min(low, level) <= 2.5 * (high - low):
+            low, high = min(low, level), max(high, level)
+        else:
+            off.append(f"The nominal replay, about {number(level)} deg/h, lies off the panel.")
     room = 0.08 * (high - low) or 1.0
-    every = np.concatenate([shown, series.replayed_before])
-    least, most = float(np.min(every)), float(np.max(every))
-    if most - least <= 2.5 * (high - low):
-        low, high = least, most
     figure.update_yaxes(range=[low - room, high + room], row=row, col=1)
-    return bool(least < low or most > high)
+    return off
 
 
 def _gap_range(series: RunSeries) -> tuple[float, float]:
@@ -174,7 +183,7 @@ def _mark_segments(figure: go.Figure, segments: Sequence[GapSegment], per_unit: 
             x=x,
             y=[height if value is not None else None for value in x],
             mode="lines",
-            name="segment over the floor",
+            name="over the floor",
             line={"color": style.VERMILION, "width": 7},
         ),
         row=3,
@@ -195,16 +204,14 @@ def _time_alt(series: RunSeries, segments: Sequence[GapSegment], named: bool) ->
 
 
 def _time_caption(
-    series: RunSeries, segments: Sequence[GapSegment], named: bool, off_panel: bool, tinted: list[str]
+    series: RunSeries, segments: Sequence[GapSegment], named: bool, off_panel: list[str], tinted: list[str]
 ) -> str:
     told = [
         f"{averages(series.averaging_s).capitalize()}. Error: gyro less reference rate, recorded and "
         "replayed; gap: recorded less replayed, before with the constants fitted"
         + (", after with what was found as well, on the same scale." if named else ".")
     ]
-    if off_panel:
-        level = float(np.mean(series.replayed_before))
-        told.append(f"The nominal replay, about {number(level)} deg/h, lies off the panel.")
+    told += off_panel
     told.append(f"Dashed: the noise floor of ± {number(series.floor)} deg/h.")
     if series.role == "fit":
         told.append(

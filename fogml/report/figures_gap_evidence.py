@@ -76,6 +76,7 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
                     y=[e.title for e in rows],
                     mode="markers",
                     name=words,
+                    showlegend=small,
                     marker={"symbol": symbol, "size": 9, "color": style.BLACK, "line": {"width": 1.8}},
                 ),
                 row=1,
@@ -109,9 +110,9 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
         caption=(
             "Left: how much better each candidate, by itself, explains the fit runs than the twin's "
             "constants and noise do (its shape averaged over its range; the scale is linear near 0, "
-            "logarithmic beyond). A candidate that is not named can gain too: it resembles what is. Right: the "
-            "length, in standard deviations of the noise, that its usual size would have in these runs once the "
-            f"constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs could not show it. "
+            "logarithmic beyond). A candidate that is not named can gain too: it resembles what is. Right: "
+            "the length, in standard deviations of the noise, that its usual size would have in these runs "
+            f"once the constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs could not show it. "
             "One that is far larger than usual can be named all the same."
         ),
     )

@@ -79,7 +79,8 @@ def by_regime(shares: Sequence[Share]) -> Drawing:
     return Drawing(
         figure,
         alt=f"Excess of the gap over the floor and share of its energy, by regime: {told}.",
-        caption="By regime, with the share of the structural gap's energy. Bars: 90 % intervals.",
+        caption="By regime, with the share of the structural gap's energy. Bars: 90 % intervals."
+        + ("" if any(s.significant for s in shares) else " No regime stands out: the shares mean little."),
         half=True,
     )
 

@@ -204,8 +204,8 @@ def _warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
     for item in found.how_far:
         if item.recalibrated < _FAR_UNDER_FLOOR * item.floor:
             told.append(
-                f"On {item.run} the recalibrated twin leaves {number(item.recalibrated)} deg/h where the noise "
-                f"model expects {number(item.floor)}: it overstates slow noise, and what is closed can't be "
+                f"On {item.run} the recalibrated twin leaves {number(item.recalibrated)} deg/h where the "
+                f"noise model expects {number(item.floor)}: it overstates slow noise, and what is closed can't be "
                 "told by it. A longer static run with --noise tells the noise better."
             )
     for run, reason in found.unusable:

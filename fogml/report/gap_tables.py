@@ -129,7 +129,8 @@ def how_far_table(found: Diagnosis) -> Table:
         rows=tuple(rows),
         caption=f"Rms of {averages(found.how_far[0].averaging_s)} of recorded less replayed."
         + (
-            " Closed: the part of recalibrated² − floor² that goes; above 100 % or below 0 is chance or a misfit."
+            " Closed: the part of recalibrated² − floor² that goes; above 100 % or below 0 is chance "
+            "or a misfit."
             if named
             else " Nothing was added, so nothing is closed beyond recalibrating."
         ),
