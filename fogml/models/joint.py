@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.signal import number_text
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
@@ -55,6 +56,8 @@ class JointModel(DriftModel):
         The patent's own six columns, without intercept and Earth rate.
     product
         With a column T*dT; not in the patent's form.
+    rate_window_s
+        Window of the temperature's rate or difference [s]; the patent's 2**n samples.
 
     Attributes
     ----------
@@ -67,9 +70,10 @@ class JointModel(DriftModel):
     form: ClassVar[str] = "joint"
     features_: Features
 
-    def __init__(self, patent: bool = False, product: bool = False) -> None:
+    def __init__(self, patent: bool = False, product: bool = False, rate_window_s: float = 64.0) -> None:
         self.patent = patent
         self.product = product
+        self.rate_window_s = rate_window_s
 
     @property
     def kind(self) -> str:  # type: ignore[override]
@@ -84,6 +88,8 @@ class JointModel(DriftModel):
         InputError
             If no training run turns, the runs don't belong together, or lack a temperature.
         """
+        if not self.rate_window_s > 0.0:
+            raise InputError(f"joint: the rate's window is {self.rate_window_s:g} s; it must be positive")
         if self.patent and self.product:
             raise InputError("joint-patent: the patent's form has six columns and none of T*dT; use joint")
         group = checked_runs(runs)
@@ -167,7 +173,12 @@ class JointModel(DriftModel):
         """The fitted model as JSON-ready values and arrays."""
         self._check_fitted()
         values, arrays = self.regressor_.to_saved()
-        own = {"patent": self.patent, "product": self.product, "gradient": self.gradient_}
+        own = {
+            "patent": self.patent,
+            "product": self.product,
+            "rate_window_s": float(self.rate_window_s),
+            "gradient": self.gradient_,
+        }
         return {**own, "regressor": values}, arrays
 
     @classmethod
@@ -175,7 +186,8 @@ class JointModel(DriftModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> JointModel:
         """The model that `to_saved` gave."""
-        model = cls(patent=bool(values["patent"]), product=bool(values["product"]))
+        window_s = float(values.get("rate_window_s", 64.0))
+        model = cls(bool(values["patent"]), bool(values["product"]), window_s)
         model.gradient_ = bool(values["gradient"])
         model.features_ = parse_features(model._feature_text())
         model.features_.set_box(card.box)
@@ -188,9 +200,10 @@ class JointModel(DriftModel):
         terms = ["T"]
         if self.gradient_:
             terms.append("T_in-T_out")
-        terms.append("diff(T)" if self.patent else "dT")
+        window = f"[block, {number_text(self.rate_window_s)} s]"
+        terms.append(("diff(T)" if self.patent else "dT") + window)
         if self.product:
-            terms.append("T*dT")
+            terms.append(f"T*dT{window}")
         return ", ".join(terms)
 
     def _rows(self, run: Run) -> RunRows:

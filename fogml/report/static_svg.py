@@ -11,13 +11,15 @@ from numpy.typing import NDArray
 
 FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
+_LEGEND, _LEGEND_COLUMNS = 15.0, 3
 
 
 @dataclass(frozen=True)
 class Curve:
     """A curve, a NaN in every gap.
 
-    ``x`` and ``y`` of shape (n,), the colour, and the SVG dash pattern (empty: solid).
+    ``x`` and ``y`` of shape (n,), the colour, and the SVG dash pattern (empty: solid). With a
+    ``label`` it stands in the legend; ``dots`` marks its points.
     """
 
     x: FloatArray
@@ -25,6 +27,8 @@ class Curve:
     colour: str
     dash: str = ""
     width: float = 1.1
+    label: str = ""
+    dots: bool = False
 
 
 def ticks(low: float, high: float, about: int = 5) -> list[float]:
@@ -39,9 +43,15 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
 
 
 def line_figure(
-    curves: Sequence[Curve], x_title: str, y_title: str, alt: str, width: int = 640, height: int = 190
+    curves: Sequence[Curve],
+    x_title: str,
+    y_title: str,
+    alt: str,
+    width: int = 640,
+    height: int = 190,
+    log: str = "",
 ) -> Markup:
-    """Curves on linear axes with ticks and titles, as an ``svg`` element.
+    """Curves on axes with ticks and titles, and a legend where curves have labels, as an ``svg`` element.
 
     Parameters
     ----------
@@ -53,25 +63,28 @@ def line_figure(
         What the figure shows.
     width, height
         Size of the view box; the element takes the width it is given.
+    log
+        Axes that are logarithmic: ``""``, ``"x"``, ``"y"`` or ``"xy"``.
     """
-    x_span, y_span = _span([c.x for c in curves], 0.0), _span([c.y for c in curves], 0.06)
+    scale_x, scale_y = (np.log10 if axis in log else np.asarray for axis in "xy")
+    x_span = _span([scale_x(c.x) for c in curves], 0.0)
+    y_span = _span([scale_y(c.y) for c in curves], 0.06)
+    top = _TOP + _LEGEND * (1 + (sum(bool(c.label) for c in curves) - 1) // _LEGEND_COLUMNS)
 
     def across(x: FloatArray | float) -> FloatArray:
-        return _LEFT + (np.asarray(x) - x_span[0]) / (x_span[1] - x_span[0]) * (width - _LEFT - _RIGHT)
+        return _LEFT + (scale_x(x) - x_span[0]) / (x_span[1] - x_span[0]) * (width - _LEFT - _RIGHT)
 
     def up(y: FloatArray | float) -> FloatArray:
         return (
-            height
-            - _BOTTOM
-            - (np.asarray(y) - y_span[0]) / (y_span[1] - y_span[0]) * (height - _TOP - _BOTTOM)
+            height - _BOTTOM - (scale_y(y) - y_span[0]) / (y_span[1] - y_span[0]) * (height - _BOTTOM - top)
         )
 
-    parts = []
-    for value in ticks(*x_span, about=8):
+    parts = [_legend([c for c in curves if c.label], width)]
+    for value in _ticks_of(x_span, "x" in log, about=8):
         x = f"{float(across(value)):.1f}"
-        parts.append(f'<path d="M{x},{_TOP}V{height - _BOTTOM}" stroke="#E4E7EB"/>')
+        parts.append(f'<path d="M{x},{top}V{height - _BOTTOM}" stroke="#E4E7EB"/>')
         parts.append(f'<text x="{x}" y="{height - _BOTTOM + 13}" text-anchor="middle">{_tick(value)}</text>')
-    for value in ticks(*y_span, about=4):
+    for value in _ticks_of(y_span, "y" in log, about=4):
         y = float(up(value))
         parts.append(f'<path d="M{_LEFT},{y:.1f}H{width - _RIGHT}" stroke="#E4E7EB"/>')
         parts.append(f'<text x="{_LEFT - 6}" y="{y + 3.5:.1f}" text-anchor="end">{_tick(value)}</text>')
@@ -82,13 +95,19 @@ def line_figure(
             f'<path d="{outline}" fill="none" stroke="{curve.colour}" stroke-width="{curve.width}"{dash} '
             'stroke-linejoin="round"/>'
         )
-    frame_width, frame_height = width - _LEFT - _RIGHT, height - _TOP - _BOTTOM
-    middle = _TOP + frame_height / 2
+        if curve.dots:
+            parts += [
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="2.4" fill="{curve.colour}"/>'
+                for x, y in zip(across(curve.x).tolist(), up(curve.y).tolist(), strict=True)
+                if x == x and y == y
+            ]
+    frame_width, frame_height = width - _LEFT - _RIGHT, height - top - _BOTTOM
+    middle = top + frame_height / 2
     return Markup(
         f'<svg role="img" aria-label="{escape(alt)}" viewBox="0 0 {width} {height}" '
         'xmlns="http://www.w3.org/2000/svg" font-size="10.5" fill="#1F2328">'
         + "".join(parts)
-        + f'<rect x="{_LEFT}" y="{_TOP}" width="{frame_width}" height="{frame_height}" '
+        + f'<rect x="{_LEFT}" y="{top}" width="{frame_width}" height="{frame_height}" '
         'fill="none" stroke="#9AA1AA"/>'
         + f'<text x="{_LEFT + frame_width / 2}" y="{height - 5}" text-anchor="middle">'
         + f"{escape(x_title)}</text>"
@@ -96,6 +115,29 @@ def line_figure(
         + f"{escape(y_title)}</text>"
         + "</svg>"
     )
+
+
+def _ticks_of(span: tuple[float, float], logarithmic: bool, about: int) -> list[float]:
+    """Ticks in the axis's own values: of a logarithmic one 1, 2 and 5 of each decade, decades where many."""
+    if not logarithmic:
+        return ticks(*span, about=about)
+    decades = range(int(np.floor(span[0])), int(np.ceil(span[1])) + 1)
+    steps = (1, 2, 5) if span[1] - span[0] < 2.5 else (1,)
+    values = [float(f"{step}e{decade}") for decade in decades for step in steps]
+    return [value for value in values if span[0] - 1e-9 <= np.log10(value) <= span[1] + 1e-9]
+
+
+def _legend(curves: Sequence[Curve], width: int) -> str:
+    """A stroke and the label of each curve, in rows above the frame."""
+    column = (width - _LEFT - _RIGHT) / _LEGEND_COLUMNS
+    parts = []
+    for place, curve in enumerate(curves):
+        x = _LEFT + place % _LEGEND_COLUMNS * column
+        y = _TOP + _LEGEND * (place // _LEGEND_COLUMNS) + 4.0
+        dash = f' stroke-dasharray="{curve.dash}"' if curve.dash else ""
+        parts.append(f'<path d="M{x:.1f},{y}h22" stroke="{curve.colour}" stroke-width="1.6"{dash}/>')
+        parts.append(f'<text x="{x + 27:.1f}" y="{y + 3.5}">{escape(curve.label)}</text>')
+    return "".join(parts)
 
 
 def _span(arrays: Sequence[FloatArray], margin: float) -> tuple[float, float]:
