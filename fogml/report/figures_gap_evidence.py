@@ -112,8 +112,8 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
             "constants and noise do (its shape averaged over its range; the scale is linear near 0, "
             "logarithmic beyond). A candidate that is not named can gain too: it resembles what is. Right: "
             "the length, in standard deviations of the noise, that its usual size would have in these runs "
-            f"once the constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs could not show it. "
-            "One that is far larger than usual can be named all the same."
+            f"once the constants are fitted; left of the dashed line at {LEAST_LENGTH:g} the runs "
+            "could not show it. One that is far larger than usual can be named all the same."
         ),
     )
 

@@ -6,24 +6,19 @@ from dataclasses import dataclass
 
 from fogml.gap.result import Diagnosis, RunSeries
 from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables
+from fogml.report.gap_tiles import headline_tiles, warnings
 from fogml.report.gap_words import (
-    cause_words,
-    closed_words,
-    hardest,
     headline,
     held_out_words,
-    interval_words,
-    probability_words,
     title_of,
     titles,
     verdict_sentences,
     verdict_words,
 )
-from fogml.report.page import Drawing, Tile, render
-from fogml.report.words import MISSING, duration, listed, number, plural
+from fogml.report.page import Drawing, render
+from fogml.report.words import duration, listed, number, plural
 
 MOST_RUNS_DRAWN = 8
-_FAR_UNDER_FLOOR = 0.6
 
 
 @dataclass(frozen=True)
@@ -58,9 +53,9 @@ def gap_page(found: Diagnosis) -> str:
         headline=headline(found),
         kicker=_kicker(found),
         verdict=verdict_sentences(found),
-        tiles=_tiles(found, names),
+        tiles=headline_tiles(found, names),
         strip=figures_gap.how_far_strip(found.how_far, bool(found.named)) if found.how_far else None,
-        warnings=_warnings(found, names),
+        warnings=warnings(found, names),
         causes=gap_tables.causes_table(found.found, names) if found.found else None,
         classes=gap_tables.classes_table(found.found, names),
         how_far=gap_tables.how_far_table(found) if found.how_far else None,
@@ -120,109 +115,6 @@ def _kicker(found: Diagnosis) -> str:
         f"Gap between the twin “{found.model}” and {_subject(found)}: "
         f"fitted on {plural(len(found.fit), 'run')}, {held}"
     )
-
-
-def _tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
-    kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "words missed"}
-    tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), kind.get(found.verdict, ""))]
-    tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
-    unknown = probability_words(found.unknown.probability)
-    if found.verdict != "unknown":
-        tiles.append(Tile("Something unknown", unknown, "", "probability that no candidate explains all"))
-    tiles.append(_closed_tile(found))
-    return tiles
-
-
-def _verdict_note(found: Diagnosis) -> str:
-    return {
-        "no_gap": "within the noise",
-        "explained": "each effect alone in its class",
-        "ambiguous": "a class of several",
-        "partly_explained": "something is left",
-        "unknown": "no candidate explains it",
-    }[found.verdict]
-
-
-def _cause_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
-    named = found.named
-    if not named:
-        looks = found.unknown.looks_like
-        note = f"what is left {looks}" if looks else "nothing stands out of the noise"
-        return Tile("Cause", "none named", "", note, "wide")
-    title = title_of(named[0].effect, names)
-    if len(named) > 1:
-        value = plural(len(named), "effect")
-        return Tile("Cause", value, "", "; ".join(cause_words(f, names) for f in named), "wide")
-    if len(named[0].members) > 1:
-        return Tile("Cause", f"1 of {len(named[0].members)}", "", cause_words(named[0], names), "wide")
-    return Tile("Cause", "1 effect", "", title, "wide")
-
-
-def _confidence_tile(found: Diagnosis, names: dict[str, str]) -> Tile:
-    if found.named:
-        least = min(f.probability for f in found.named)
-        note = "that it acts" if len(found.named) == 1 else "the least certain of those named"
-        if any(len(f.members) > 1 for f in found.named) and len(found.named) == 1:
-            note = "that one of them acts"
-        return Tile("Confidence", probability_words(least), "", note)
-    if found.verdict == "unknown":
-        return Tile(
-            "Confidence", probability_words(found.unknown.probability), "", "that something unknown acts"
-        )
-    likeliest = max(found.evidence, key=lambda e: e.probability, default=None)
-    if likeliest is None or likeliest.probability < 0.01:
-        return Tile("Likeliest effect", "under 1 %", "", f"any of {plural(len(found.evidence), 'candidate')}")
-    title = title_of(likeliest.effect, names)
-    return Tile("Likeliest effect", probability_words(likeliest.probability), "", title)
-
-
-def _closed_tile(found: Diagnosis) -> Tile:
-    if not found.how_far:
-        return Tile("Closed", MISSING, "", "nothing was held out")
-    item = hardest(found.how_far)
-    on = f"{item.run}, kept-back part" if found.held_out_is_part else item.run
-    if len(found.how_far) > 1:
-        on = f"the least of {len(found.how_far)} held-out runs: {item.run}"
-    if item.closed is None:
-        return Tile("Closed", MISSING, "", f"nothing to close: at the floor on {on}")
-    if not found.named:
-        return Tile("Closed", "0 %", "", f"nothing was added; {on}")
-    interval = f"90 %: {interval_words(*item.closed_ci90)}; " if item.closed_ci90 else ""
-    return Tile("Closed", closed_words(item), "", f"{interval}{on}")
-
-
-def _warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
-    told = []
-    if found.held_out_is_part:
-        run = found.held_out[0] if found.held_out else "the last run"
-        told.append(
-            f"No run was held out. The last stretch of {run} was kept back for the figures: it shares "
-            "power-on and conditions with what was fitted, so they flatter. Hold out a run of its own."
-        )
-    elif not found.how_far:
-        told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
-    for item in found.how_far:
-        if item.recalibrated < _FAR_UNDER_FLOOR * item.floor:
-            told.append(
-                f"On {item.run} the recalibrated twin leaves {number(item.recalibrated)} deg/h where the "
-                f"noise model expects {number(item.floor)}: it overstates slow noise, and what is closed can't be "
-                "told by it. A longer static run with --noise tells the noise better."
-            )
-    for run, reason in found.unusable:
-        told.append(f"{run} was not used: {reason.removeprefix(f'{run}: ')}.")
-    for f in found.named:
-        if not f.consistent:
-            told.append(
-                f"{title_of(f.effect, names)} does not show with the same sign and size on every run that "
-                "can show it: doubt it."
-            )
-    if found.noise.white is False:
-        told.append(
-            "The noise check fails on held-out data: intervals and probabilities may be too sure. "
-            + "; ".join(found.noise.failed[:2]).capitalize()
-            + "."
-        )
-    return told
 
 
 def _fit_series(found: Diagnosis) -> list[RunSeries]:
