@@ -127,7 +127,7 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
             ): task
             for task in tasks
         }
-        for future in completed_on(list(futures), raise_errors=False):
+        for future in completed_on(list(futures), loop=client.loop, raise_errors=False):
             task = futures[future]
             try:
                 outcome = future.result()

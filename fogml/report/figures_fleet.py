@@ -117,8 +117,6 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     for place, name in enumerate(names):
         row, column = place // _COLUMNS + 1, place % _COLUMNS + 1
         mean, std = found["mean"][place], found["std"][place]
-        for end in (mean - 2 * std, mean + 2 * std):
-            figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
         figure.add_trace(
             go.Scatter(
                 x=labels,
@@ -131,6 +129,8 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
             row=row,
             col=column,
         )
+        for end in (mean - 2 * std, mean + 2 * std):
+            figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
         title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"
         figure.update_yaxes(title_text=title, title_font_size=12, tickformat=".3~g", row=row, col=column)
     _serials(figure, labels)

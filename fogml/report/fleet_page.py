@@ -36,7 +36,7 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet") -> str:
         constants=constants(fleet) if "constants" in fleet else None,
         trends=_trends(fleet) if "constants" in fleet else None,
         outliers=[(item["unit"], item["why"]) for item in fleet["outliers"]],
-        again=[(item["unit"], item["why"]) for item in fleet["again"]],
+        again=[(f"{item['unit']} ({item['job']})", item["why"]) for item in fleet["again"]],
         table=_table(order),
     )
 

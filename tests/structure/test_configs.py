@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from fogml.cli.sweep_job import SweepSettings
 from fogml.cli.train_job import TrainSettings
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
@@ -22,3 +23,12 @@ def test_model_configuration(path: Path) -> None:
     check_limits(settings.limits)
     if settings.features is not None:
         assert parse_features(settings.features).names()
+
+
+SWEEPS = sorted((Path(__file__).parents[2] / "configs" / "sweeps").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
+def test_sweep_configuration(path: Path) -> None:
+    settings = SweepSettings.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    settings.plan([]).check()

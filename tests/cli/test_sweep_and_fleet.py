@@ -1,0 +1,161 @@
+"""The commands sweep and fleet: what they write, how they go on, and what they refuse."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+from tests.fleet.units import write_fleet, write_run
+
+pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
+
+SPACE = {
+    "features": {"static": ["T", "T^1..2"], "rate": ["", "dT[block, {window} s]"]},
+    "window": [16, 32],
+    "models": {"polynomial": {"ridge": [0.0, 1e-6]}},
+}
+
+
+@pytest.fixture
+def sweep_config(tmp_path):
+    for seed, name in enumerate(("a", "b", "c")):
+        write_run(tmp_path / f"{name}.csv", "FOG-1", seed, slope=0.05, cycles=1.0 + 0.3 * seed, rows=600)
+    values = {
+        "schema": "fogml.sweep/1",
+        "name": "mine",
+        "runs": ["a.csv", "b.csv"],
+        "test": ["c.csv"],
+        "space": SPACE,
+        "objectives": ["rms", "bytes", "operations"],
+        "trials": 6,
+        "out": str(tmp_path / "out"),
+    }
+    path = tmp_path / "mine.yaml"
+    path.write_text(yaml.safe_dump(values))
+    return path
+
+
+def test_a_sweep_writes_its_winner_as_a_configuration_of_train(invoke_json, sweep_config, tmp_path):
+    values = invoke_json("sweep", sweep_config)
+    written = {path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith(".")}
+    assert written == {"best.yaml", "config.yaml", "study.journal", "sweep.html", "sweep.json"}
+    assert values == json.loads((tmp_path / "out" / "sweep.json").read_text())
+    assert values["schema"] == "fogml.study/1"
+    assert values["counts"]["complete"] + values["counts"]["pruned"] == 6
+    assert "dT" in values["winner"]["features"]
+    report = invoke_json("train", "--config", tmp_path / "out" / "best.yaml", "--out", tmp_path / "best")
+    assert report["test"] == values["winner"]["judged"]["test"]
+    again = invoke_json("sweep", tmp_path / "out" / "config.yaml")
+    assert again == values
+    more = invoke_json("sweep", sweep_config, "--trials", 8)
+    assert [trial["rms"] for trial in more["trials"]][:6] == [trial["rms"] for trial in values["trials"]]
+    page = (tmp_path / "out" / "sweep.html").read_text()
+    assert "fogml train" in page
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"objectives": ["bytes"]}, "rms is missing"),
+        ({"objectives": "rms, speed"}, "objectives rms, speed"),
+        ({"space": {**SPACE, "models": {"polynomial": {"rigde": [1]}}}}, "no parameter 'rigde'"),
+        ({"space": {**SPACE, "models": ["auto"]}}, "leaves nothing to choose"),
+        ({"space": {**SPACE, "features": ["T, q"]}}, "known: temperatures"),
+        ({"space": {**SPACE, "features": ["T_in"]}}, "T_in"),
+        ({"space": {**SPACE, "window": {"low": 5, "high": 1}}}, "low 5 must be below high 1"),
+        ({"space": {"models": ["rbf"]}}, "features"),
+        ({"trials": 0}, "at least 1"),
+        ({"fold_count": 3}, "3 folds"),
+        ({"sampler": "magic"}, "sampler 'magic'"),
+        ({"workers": 0}, "workers 0"),
+        ({"runs": []}, "no training run"),
+        ({"schema": "fogml.sweep/9"}, "fogml.sweep/1"),
+        ({"storage": "postgresql://127.0.0.1:9/x"}, "does not answer"),
+    ],
+)
+def test_bad_sweeps(invoke, sweep_config, tmp_path, change, message):
+    sweep_config.write_text(yaml.safe_dump({**yaml.safe_load(sweep_config.read_text()), **change}))
+    result = invoke("sweep", sweep_config, status=2)
+    assert message in result.stderr.splitlines()[-1]
+    assert not (tmp_path / "out" / "sweep.json").exists()
+
+
+def test_a_study_of_another_space_is_refused(invoke, sweep_config):
+    invoke("sweep", sweep_config, "--trials", 2, "--quiet")
+    values = yaml.safe_load(sweep_config.read_text())
+    values["space"] = {**SPACE, "window": [16, 64]}
+    sweep_config.write_text(yaml.safe_dump(values))
+    result = invoke("sweep", sweep_config, status=2)
+    assert "another search space" in result.stderr
+
+
+def test_a_fleet_and_the_next_unit_drawn_to_it(invoke, invoke_json, tmp_path):
+    manifest = write_fleet(tmp_path, 4)
+    lines = manifest.read_text().splitlines()
+    manifest.write_text("\n".join([*lines, "FOG-000,compare,0a.csv,0b.csv,x", "WRONG,train,1a.csv,1b.csv,x"]))
+    arguments = ("fleet", manifest, "--model", "polynomial", "--averaging", 40, "--out", tmp_path / "out")
+    values = invoke_json(*arguments, status=1)
+    states = {(unit["unit"], unit["job"]): unit for unit in values["units"]}
+    assert states[("WRONG", "train")]["status"] == "failed"
+    assert "the manifest names 'WRONG'" in states[("WRONG", "train")]["reason"]
+    done = [unit for unit in values["units"] if unit["status"] == "done"]
+    assert len(done) == 5
+    for unit in done:
+        assert unit["after"] < 0.1 * unit["before"]
+        name = "compare.json" if unit["job"] == "compare" else "report.json"
+        assert (tmp_path / "out" / unit["folder"] / name).is_file()
+    assert {path.name for path in (tmp_path / "out").iterdir()} >= {"fleet.json", "fleet.html", "fleet.xlsx"}
+    report = json.loads((tmp_path / "out" / done[0]["folder"] / "report.json").read_text())
+    assert done[0]["after"] == report["test"][0]["after"]["rms"]
+    before = (tmp_path / "out" / done[0]["folder"] / "report.json").stat().st_mtime_ns
+    assert invoke_json(*arguments, status=1) == values
+    assert (tmp_path / "out" / done[0]["folder"] / "report.json").stat().st_mtime_ns == before
+    one = "\n".join(lines[:2]) + "\n"
+    (tmp_path / "next.csv").write_text(one)
+    drawn = invoke_json(
+        "fleet", tmp_path / "next.csv", "--prior", tmp_path / "out" / "fleet.json", "--out", tmp_path / "next"
+    )
+    assert drawn["units"][0]["model"] == "shared"
+
+
+def test_networks_in_batches_are_those_of_train(invoke_json, tmp_path):
+    manifest = write_fleet(tmp_path, 2)
+    model = ("--model", "rbf", "--features", "T, dT", "--set", "centres=4", "--set", "average_rows=200")
+    shared = ("--averaging", 40)
+    values = invoke_json("fleet", manifest, *model, *shared, "--device", "cpu", "--out", tmp_path / "out")
+    for number, unit in enumerate(values["units"]):
+        runs = (tmp_path / f"{number}a.csv", "--test", tmp_path / f"{number}b.csv")
+        report = invoke_json("train", *runs, *model, *shared, "--out", tmp_path / f"one-{number}")
+        assert unit["after"] == pytest.approx(report["test"][0]["after"]["rms"], abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--cluster", "tcp://127.0.0.1:9"), "does not answer"),
+        (("--device", "cuda:99", "--model", "rbf"), "--device cuda:99: is not there"),
+        (("--device", "cpu", "--model", "auto"), "--model rbf"),
+        (("--prior", "nothing.json"), "no such file"),
+        (("--workers", 0), "workers 0"),
+        (("--model", "nothing"), "model 'nothing' is not known"),
+        (("--form", "T, q"), "known: temperatures"),
+    ],
+)
+def test_bad_fleets(invoke, tmp_path, monkeypatch, arguments, message):
+    monkeypatch.setattr("fogml.fleet.engines._ANSWER_S", 1)
+    manifest = write_fleet(tmp_path, 1)
+    result = invoke("fleet", manifest, "--out", tmp_path / "out", *arguments, status=2)
+    assert message in result.stderr.splitlines()[-1]
+    assert not (tmp_path / "out" / "fleet.json").exists()
+
+
+def test_a_manifest_with_a_missing_file(invoke, tmp_path):
+    path = tmp_path / "m.csv"
+    path.write_text("unit,job,train,test,axis\nF-1,train,a.csv,b.csv,x\n")
+    result = invoke("fleet", path, "--out", tmp_path / "out", status=2)
+    assert result.stderr == (
+        "fogml: m.csv: row 2: column 'train': a.csv: no such file, here or beside the manifest\n"
+    )
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,83 @@
+"""Manifests: CSV and YAML say the same; the first fault is told with its place."""
+
+from __future__ import annotations
+
+import pytest
+import yaml
+
+from fogml.errors import InputError
+from fogml.fleet.manifest import read_manifest
+
+HEAD = "unit,job,train,test,axis\n"
+
+
+@pytest.fixture
+def folder(tmp_path):
+    for name in ("a.csv", "b.csv", "c.csv"):
+        (tmp_path / name).write_text("")
+    return tmp_path
+
+
+def manifest(folder, text, name="m.csv"):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def test_csv_and_yaml_say_the_same(folder):
+    by_row = read_manifest(
+        manifest(folder, "# fleet\n" + HEAD + "F-1, train, a.csv;b.csv , c.csv, x\nF-2,diagnose,a.csv,,\n")
+    )
+    rows = [
+        {"unit": "F-1", "train": ["a.csv", "b.csv"], "test": "c.csv", "axis": "x"},
+        {"unit": "F-2", "job": "diagnose", "train": "a.csv"},
+    ]
+    for values in (rows, {"schema": "fogml.manifest/1", "units": rows}):
+        assert read_manifest(manifest(folder, yaml.safe_dump(values), "m.yaml")) == by_row
+    first, second = by_row
+    assert first.train == (str(folder / "a.csv"), str(folder / "b.csv"))
+    assert first.label == "F-1 x"
+    assert second.test == ()
+    assert first.folder != second.folder
+
+
+def test_folders_are_safe_and_unlike_each_other(folder):
+    lines = "".join(f'"{name}",train,a.csv,b.csv,\n' for name in ("a/b", "a:b", "..", "A_B", "../../etc"))
+    units = read_manifest(manifest(folder, HEAD + lines))
+    names = [unit.folder.lower() for unit in units]
+    assert len(set(names)) == len(names)
+    assert not any("/" in name or name.startswith(".") for name in names)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (HEAD + "F-1,train,a.csv,missing.csv,x\n", "row 2: column 'test': missing.csv: no such file"),
+        (HEAD + "F-1,trian,a.csv,b.csv,x\n", "'trian'; train, compare, diagnose"),
+        (HEAD + ",train,a.csv,b.csv,x\n", "row 2: column 'unit' is empty"),
+        (HEAD + "F-1,train,a.csv,,x\n", "column 'test' names no run"),
+        (HEAD + "F-1,train,,b.csv,x\n", "column 'train' names no run"),
+        (HEAD + "F-1,train,a.csv,b.csv,x,more\n", "more cells than the header"),
+        (
+            HEAD + "F-1,train,a.csv,b.csv,x\nF-1,train,c.csv,b.csv,x\n",
+            "unit F-1 axis x has the job 'train' 2",
+        ),
+        (HEAD, "holds no unit"),
+        ("unit,job,trian\n", "unknown column 'trian'; did you mean 'train'"),
+        ("unit,job\n", "column 'train' is missing"),
+        (HEAD + "F-1,train,shipped:nothing,b.csv,x\n", "no such recording ships"),
+    ],
+)
+def test_faults(folder, text, message):
+    with pytest.raises(InputError) as told:
+        read_manifest(manifest(folder, text))
+    assert message in str(told.value)
+    assert str(told.value).startswith("m.csv: ")
+
+
+@pytest.mark.parametrize("text", ["a: 1\n", "[1, 2]\n", "schema: fogml.other/1\nunits: []\n"])
+def test_yaml_that_is_no_manifest(folder, text):
+    with pytest.raises(InputError, match=r"m\.yaml"):
+        read_manifest(manifest(folder, text, "m.yaml"))
+    with pytest.raises(InputError, match="no such file"):
+        read_manifest(folder / "nothing.csv")

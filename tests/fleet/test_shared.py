@@ -1,0 +1,129 @@
+"""Shared constants: what a fleet tells of the next unit, and when it tells nothing."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.fleet.shared import UnitConstants, fleet_constants, shared_model
+from fogml.models.linear import LinearRegressor
+from fogml.models.names import make_model
+from fogml.models.prior import Prior, PriorRegressor, posterior
+from fogml.models.saved import load_model, save_model
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+
+FORM = "T^1..2, dT"
+MEAN, STD = np.array([1.0, 0.05, 4e-4, 0.5]), np.array([0.3, 0.01, 5e-5, 0.05])
+
+
+def unit_run(seed: int, constants: np.ndarray, *, hours: float = 6.0, phase: float = 0.0) -> Run:
+    rng = np.random.default_rng(seed)
+    time = 10.0 * np.arange(round(hours * 360))
+    temperature = 20.0 + 35.0 * np.sin(2 * np.pi * time / (6.0 * 3600) + phase)
+    rate = np.gradient(temperature, time) * 60.0
+    u = temperature - 20.0
+    drift = constants[0] + constants[1] * u + constants[2] * u**2 + constants[3] * rate
+    columns = {"time": time, "gyro": drift + 0.05 * rng.normal(size=len(time)), "T": temperature}
+    return Run("r.csv", columns, Facts(unit="u", axis="x"))
+
+
+def draw(seed: int, far: float = 1.0) -> np.ndarray:
+    return MEAN + far * STD * np.random.default_rng([seed, 3]).normal(size=4)
+
+
+@pytest.fixture(scope="module")
+def fleet():
+    return fleet_constants([UnitConstants.of([unit_run(s, draw(s))], FORM) for s in range(24)])
+
+
+def test_the_fleets_spread_is_found(fleet):
+    truth = np.array([draw(s) for s in range(24)])
+    # The coefficient of the rate is the same in any centring of T.
+    own = fleet.values[:, -1] / fleet.prior.scale[-1]
+    np.testing.assert_allclose(own, truth[:, -1], atol=0.02)
+    assert fleet.prior.mean[-1] / fleet.prior.scale[-1] == pytest.approx(truth[:, -1].mean(), abs=0.02)
+    std = np.sqrt(fleet.prior.covariance[-1, -1]) / fleet.prior.scale[-1]
+    assert 0.6 * truth[:, -1].std() < std < 1.5 * truth[:, -1].std()
+
+
+def test_condensed_rows_tell_what_the_rows_tell():
+    run = unit_run(1, MEAN)
+    constants = UnitConstants.of([run], FORM)
+    again = UnitConstants.from_dict(constants.as_dict())
+    information, image = again.in_columns(again.shift, again.scale)
+    solution = np.linalg.solve(information, image)
+    model = make_model("polynomial", FORM, 0, {"ridge": 0.0}).fit(run)
+    np.testing.assert_allclose(solution[1:] / again.scale, model.regressor_.coef_, rtol=1e-6)
+
+
+def test_the_posterior_is_the_textbooks_for_one_spread():
+    rng = np.random.default_rng(0)
+    Z, y = rng.normal(size=(20, 3)), rng.normal(size=20)
+    covariance = np.diag([1.0, 0.5, 2.0])
+    prior = Prior(np.array([0.1, -0.2, 0.3]), covariance, np.zeros(2), np.ones(2))
+    mean, spread, _ = posterior(Z.T @ Z, Z.T @ y, prior, [1.0])
+    # Adding rows that stand for the prior to a plain least-squares problem.
+    rows = np.vstack([Z, np.diag(1 / np.sqrt(np.diag(covariance)))])
+    target = np.append(y, prior.mean / np.sqrt(np.diag(covariance)))
+    np.testing.assert_allclose(mean, np.linalg.lstsq(rows, target)[0], rtol=1e-10)
+    np.testing.assert_allclose(spread, np.linalg.inv(rows.T @ rows), rtol=1e-10)
+
+
+def test_a_unit_like_its_fleet_needs_a_shorter_run(fleet):
+    gains = []
+    for seed in range(100, 110):
+        constants = draw(seed)
+        short, other = unit_run(seed, constants, hours=2.0), unit_run(seed + 1, constants, phase=2.0)
+        errors = [
+            np.sqrt(np.mean((model.fit(short).predict(other) - other.gyro) ** 2))
+            for model in (shared_model(fleet), make_model("polynomial", FORM))
+        ]
+        gains.append(errors[0] / errors[1])
+    assert np.median(gains) < 0.6
+    assert max(gains) < 1.05
+
+
+def test_an_odd_unit_is_left_to_its_own_run(fleet):
+    odd = unit_run(200, draw(200, far=20.0))
+    model = shared_model(fleet).fit(odd)
+    plain = LinearRegressor().fit(*_rows(odd))
+    assert model.regressor_.spread_ > 16.0
+    assert any("odd" in note for note in model.card_.notes)
+    np.testing.assert_allclose(model.regressor_.coef_, plain.coef_, rtol=2e-2)
+
+
+def _rows(run):
+    from fogml.features.parse import parse_features
+    from fogml.models.table import training_table
+
+    table = training_table([run], parse_features(FORM))
+    return table.X, table.y
+
+
+def test_too_short_a_run_is_not_carried_beyond_itself(fleet):
+    model = shared_model(fleet).fit(unit_run(300, draw(300), hours=0.3))
+    assert any("cover" in note for note in model.card_.notes)
+    low, high = model.features_.box["T"]
+    assert high - low < 0.25 * (fleet.box["T"][1] - fleet.box["T"][0])
+
+
+def test_a_shared_model_is_saved_and_loaded(fleet, tmp_path):
+    model = shared_model(fleet).fit(unit_run(400, draw(400), hours=2.0))
+    save_model(model, tmp_path / "model")
+    loaded = load_model(tmp_path / "model")
+    run = unit_run(401, draw(400), phase=1.0)
+    np.testing.assert_array_equal(loaded.predict(run), model.predict(run))
+    assert loaded.card_.box["T"] == pytest.approx(model.card_.box["T"])
+
+
+def test_faults(fleet):
+    with pytest.raises(InputError, match="at least 3"):
+        fleet_constants([])
+    with pytest.raises(InputError, match="are not understood"):
+        shared_model({"features": FORM})
+    with pytest.raises(InputError, match="prior is not understood"):
+        shared_model({"features": FORM, "prior": {"mean": [1.0]}, "box": {}})
+    with pytest.raises(InputError, match="columns"):
+        PriorRegressor(fleet.prior.as_dict()).fit(np.ones((5, 1)), np.ones(5))
