@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from fogml.gap.dictionary import Group
 from fogml.gap.model import Candidate, Constant
 from fogml.gap.observation import Observation
+from fogml.gap.priors import plausible_lengths
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.shapes import Node, grid
 from fogml.runs.run import FloatArray
@@ -46,8 +47,9 @@ class NodeColumns:
         Amplitude that gives a whitened length of 1 beside the constants, in the card's unit.
     usual
         Whitened length at the usual size.
-    log_weight
-        Logarithm of the node's prior weight among its candidate's.
+    log_weights
+        Logarithm of the prior weight of the node among its candidate's at each of
+        `fogml.gap.priors.LENGTHS`.
     sign
         +1 where the first column is the response and the amplitude can't be negative, else 0.
     """
@@ -57,7 +59,7 @@ class NodeColumns:
     columns: tuple[int, ...]
     size: float
     usual: float
-    log_weight: float
+    log_weights: FloatArray
     sign: int
 
 
@@ -157,10 +159,10 @@ def build_basis(
         if found is None:
             within.append(id)
             continue
-        for node, columns, size, usual, log_weight, sign in found:
+        for node, columns, size, usual, log_weights, sign in found:
             width = columns.shape[1]
             nodes.append(
-                NodeColumns(id, node, tuple(range(first, first + width)), size, usual, log_weight, sign)
+                NodeColumns(id, node, tuple(range(first, first + width)), size, usual, log_weights, sign)
             )
             blocks.append(columns)
             first += width
@@ -243,7 +245,7 @@ def _candidate_columns(
     solve: _Projector,
     search: _Search,
     runs: Sequence[slice],
-) -> list[tuple[Node, FloatArray, float, float, float, int]] | None:
+) -> list[tuple[Node, FloatArray, float, float, FloatArray, int]] | None:
     widest = max(observations, key=lambda o: float(np.ptp(o.temperature)))
     nodes = grid(candidate, grade, lambda shape: widest.model.response(candidate.id, shape, values), spans)
     apart = bool(getattr(candidate, "drawn_per_run", False)) and len(observations) > 1
@@ -271,11 +273,12 @@ def _candidate_columns(
         if raw == 0.0 or flat <= LEAST_SHARE**2 * raw:
             continue
         basis, length = _node_basis(part, solve.left(part), count, LARGEST_RANK * (len(runs) if apart else 1))
+        weights = plausible_lengths(candidate, 1.0 / length) - np.log(len(nodes))
         sign = int(basis.shape[1] == 1 and not candidate.amplitude.signed and low >= 0.0)
         if sign and basis[:, 0] @ part[:, 0] < 0.0:
             basis = -basis
         found.append(
-            (nodes[i], basis, 1.0 / length, abs(usual_amplitude) * length, -np.log(len(nodes)), sign)
+            (nodes[i], basis, 1.0 / length, abs(usual_amplitude) * length, weights, sign)
         )
     return found or None
 

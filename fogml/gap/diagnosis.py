@@ -14,6 +14,7 @@ from fogml.gap.describe import describe_unknown
 from fogml.gap.dictionary import Group, unknown_groups
 from fogml.gap.evidence import Field
 from fogml.gap.fitting import Fit, fit_model
+from fogml.gap.starting import starting_values
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, EffectValue, GyroModel
 from fogml.gap.noise import Noise, noise_of, prior_of
@@ -21,7 +22,7 @@ from fogml.gap.observation import Observation, Unusable, observe
 from fogml.gap.reports import candidate_evidence, constant_fits, noise_report, run_series, with_run_amplitudes
 from fogml.gap.result import Diagnosis, Estimate, Found, HowFar, Unknown, Verdict
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.search import Explanation, Search
+from fogml.gap.search import Search
 from fogml.gap.structure import gaps_on_runs, stage_energies
 from fogml.gap.where import where
 from fogml.runs.run import Run
@@ -217,7 +218,14 @@ def _found(
 ) -> tuple[tuple[Found, ...], Fit]:
     """Effects with numbers, and the fit with those that are named."""
     named = [r for r in ranking.effects if r.probability >= 0.5 and r.chosen.candidate in ranking.best.ids]
-    starts = [_start(r, basis, candidates, ranking.best) for r in named]
+    starts = starting_values(
+        p.fit,
+        p.whiteners,
+        p.model.constants,
+        p.recalibrated.constants,
+        [(r.chosen.candidate, basis.nodes[r.chosen.node].node.shape) for r in named],
+        candidates,
+    )
     fit = p.recalibrated
     if starts:
         fit = fit_model(
@@ -228,7 +236,7 @@ def _found(
     found = []
     for r in ranking.effects:
         id, declared = r.chosen.candidate, candidates[r.chosen.candidate]
-        value = fitted.get(id) or _start(r, basis, candidates, ranking.best)
+        value = fitted.get(id) or _rough(r, basis, candidates)
         se = float(errors.get(f"{id}.amplitude", abs(value.amplitude)))
         found.append(
             Found(
@@ -247,10 +255,8 @@ def _found(
     return tuple(found), fit
 
 
-def _start(
-    ranked: Ranked, basis: Basis, candidates: Mapping[str, Candidate], best: Explanation
-) -> EffectValue:
-    """Where the fit of an effect starts: its best node, and the size that goes with its length."""
+def _rough(ranked: Ranked, basis: Basis, candidates: Mapping[str, Candidate]) -> EffectValue:
+    """An effect that is not fitted: its best node, and the size that goes with its length."""
     node = basis.nodes[ranked.chosen.node]
     declared = candidates[ranked.chosen.candidate]
     amplitude = ranked.chosen.length * node.size

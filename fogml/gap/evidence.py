@@ -18,11 +18,8 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr, logsumexp
 
 from fogml.gap.basis import Basis, NodeColumns
+from fogml.gap.priors import LENGTHS
 from fogml.runs.run import FloatArray
-
-LENGTHS = np.array([5.0, 15.0, 45.0, 135.0, 400.0, 1200.0])
-"""Whitened lengths that the prior of an amplitude is a mixture over."""
-LENGTH_WEIGHTS = np.array([0.25, 0.25, 0.2, 0.15, 0.1, 0.05])
 
 
 @dataclass(frozen=True)
@@ -74,7 +71,7 @@ class Field:
         self._blocks = extended[self._index[:, :, None], self._index[:, None, :]]
         self._fits = extended[self._index, 0]
         self.signs = np.array([n.sign for n in basis.nodes])
-        self.log_weights = np.array([n.log_weight for n in basis.nodes])
+        self.log_weights = np.array([n.log_weights for n in basis.nodes])
 
     def condition(self, terms: Sequence[Term]) -> Conditioned:
         """The field with terms integrated out as well."""
@@ -130,12 +127,14 @@ class Conditioned:
         squares = LENGTHS[None, :, None] ** 2
         wider = 1.0 + squares * sizes[:, None, :]
         gains = 0.5 * (squares * along[:, None, :] ** 2 / wider - np.log(wider)).sum(axis=2)
+        # The half of the prior of the wrong sign is cut away.
+        self.sign_gains = np.zeros_like(gains)
         one = field.signs > 0
         if one.any():
             fit, size = fits[one, 0][:, None], np.maximum(blocks[one, 0, 0], 0.0)[:, None]
             z = LENGTHS * fit / np.sqrt(1.0 + LENGTHS**2 * size)
-            gains[one] += log_ndtr(z) + np.log(2.0)
-        return np.asarray(gains + np.log(LENGTH_WEIGHTS) + field.log_weights[:, None])
+            self.sign_gains[one] = log_ndtr(z) + np.log(2.0)
+        return np.asarray(gains + self.sign_gains + field.log_weights)
 
 
 def by_candidate(nodes: Sequence[NodeColumns]) -> dict[str, NDArray[np.intp]]:
@@ -144,24 +143,3 @@ def by_candidate(nodes: Sequence[NodeColumns]) -> dict[str, NDArray[np.intp]]:
     for i, node in enumerate(nodes):
         places.setdefault(node.candidate, []).append(i)
     return {id: np.array(found) for id, found in places.items()}
-
-
-def group_terms(basis: Basis, groups: Sequence[str]) -> list[tuple[str, Term]]:
-    """The unknown as each of its groups at each length."""
-    return [
-        (name, Term(tuple(int(c) for c in basis.groups[name]), float(length)))
-        for name in groups
-        for length in LENGTHS
-    ]
-
-
-__all__ = [
-    "LENGTHS",
-    "LENGTH_WEIGHTS",
-    "Conditioned",
-    "Field",
-    "Term",
-    "by_candidate",
-    "group_terms",
-    "logsumexp",
-]

@@ -117,6 +117,10 @@ class GyroModel(Protocol):
         """Whose ranges are the usual sizes of candidates: ``tactical`` or ``navigation``."""
 
     @property
+    def memory_s(self) -> float:
+        """How far back a replay looks [s]: that much after a start or a gap it can't know."""
+
+    @property
     def constants(self) -> tuple[Constant, ...]:
         """The constants, shared by all runs of a unit, with their priors."""
 

@@ -15,6 +15,7 @@ from fogml.runs.run import FloatArray, Run
 
 LARGEST_ROWS = 8192
 """A run with more samples is averaged over blocks of neighbours down to about this many rows."""
+FEWEST_ROWS = 32
 SHORTEST_S = 600.0
 """A run must last this long to say anything about temperature effects [s]."""
 
@@ -35,14 +36,16 @@ class Observation:
         The model with the run's inputs.
     width
         Samples of a block.
-    starts
-        First sample of each block, shape (m,); blocks don't reach over gaps.
+    starts, stops
+        First sample of each block and the one after its last, shape (m,); blocks don't reach over
+        gaps, nor into what the model's memory hides after one.
     """
 
     run: Run
     model: ModelOnRun
     width: int
     starts: NDArray[np.intp]
+    stops: NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.starts)
@@ -50,13 +53,16 @@ class Observation:
     def averaged(self, values: FloatArray) -> FloatArray:
         """Block means of a series over the samples, shape (n,) to (m,)."""
         if self.width == 1:
-            return values
-        return np.asarray(np.add.reduceat(values, self.starts) / self.counts)
+            return np.asarray(values[self.starts])
+        edges = np.column_stack([self.starts, self.stops]).ravel()
+        # `reduceat` knows no end of the last block unless one follows.
+        padded = np.append(values, 0.0)
+        return np.asarray(np.add.reduceat(padded, edges)[::2] / self.counts)
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:
         """Samples in each block, shape (m,)."""
-        return np.diff(self.starts, append=len(self.run))
+        return self.stops - self.starts
 
     @cached_property
     def time(self) -> FloatArray:
@@ -107,12 +113,25 @@ def observe(run: Run, model: GyroModel, *, largest_rows: int = LARGEST_ROWS) -> 
     if run.span_s < SHORTEST_S:
         raise Unusable(f"{run.name}: lasts {run.span_s:.0f} s; a diagnosis needs at least {SHORTEST_S:.0f} s")
     width = max(1, -(-len(run) // largest_rows))
-    starts = np.concatenate([np.arange(part.start, part.stop, width) for part in run.stretches])
+    starts, stops = _blocks(run, width, model.memory_s)
+    if len(starts) < FEWEST_ROWS:
+        raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
     try:
         on_run = model.on(run)
     except InputError as error:
         raise Unusable(str(error)) from None
-    return Observation(run, on_run, width, starts)
+    return Observation(run, on_run, width, starts, stops)
+
+
+def _blocks(run: Run, width: int, memory_s: float) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Blocks of each stretch from where the model's memory reaches no further back than its start."""
+    starts, stops = [], []
+    for part in run.stretches:
+        first = part.start + int(np.searchsorted(run.time[part], run.time[part.start] + memory_s))
+        begins = np.arange(first, part.stop, width)
+        starts.append(begins)
+        stops.append(np.minimum(begins + width, part.stop))
+    return np.concatenate(starts), np.concatenate(stops)
 
 
 def _usable(run: Run) -> NDArray[np.bool_]:

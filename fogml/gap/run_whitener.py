@@ -11,6 +11,9 @@ from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
 
+LONGEST_RUNS = 30.0
+"""Flicker goes on to this many run lengths: a week or so."""
+
 
 class RunWhitener:
     """Whitens series over the rows of a run.
@@ -29,7 +32,9 @@ class RunWhitener:
     """
 
     def __init__(self, noise: NoiseModel, o: Observation, constants: Mapping[str, float]) -> None:
-        self._whitener = Whitener(noise, o.time, o.row_s)
+        # Flicker slower than a run sets runs of a unit apart by a constant.
+        ladder = noise.ladder(o.row_s, LONGEST_RUNS * (float(o.time[-1] - o.time[0]) + o.row_s))
+        self._whitener = Whitener(noise, o.time, o.row_s, ladder)
         reading = np.sqrt(o.averaged(o.model.reading_noise(constants) ** 2) / o.width)
         self.weights: FloatArray = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
 

@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from scipy.special import logsumexp
 
-from fogml.gap.evidence import LENGTH_WEIGHTS, LENGTHS, Conditioned, Field, Term, by_candidate
+from fogml.gap.evidence import Conditioned, Field, Term, by_candidate
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
 
 MOST_EFFECTS = 4
 SIZES = (0.35, 0.4, 0.15, 0.07, 0.03)
@@ -138,10 +139,11 @@ class Search:
             averaged = 0.0
             for i, chosen in enumerate(effects):
                 others = effects[:i] + effects[i + 1 :]
-                gains = self.field_.condition(self._terms(others, group)).node_gains()
+                held = self.field_.condition(self._terms(others, group))
+                gains = held.node_gains()
                 effects[i] = self._best(chosen.candidate, gains)
                 own = gains[self.places[chosen.candidate]]
-                averaged += float(logsumexp(own) - own.max()) + self._weight(effects[i])
+                averaged += float(logsumexp(own) - own.max()) + self._weight(effects[i], held)
             if unknown:
                 group, gain = self._best_group(effects)
                 averaged_unknown = gain
@@ -163,11 +165,11 @@ class Search:
         row, column = np.unravel_index(int(np.argmax(gains[nodes])), gains[nodes].shape)
         return Chosen(id, int(nodes[row]), float(LENGTHS[column]))
 
-    def _weight(self, chosen: Chosen) -> float:
-        """Logarithm of the prior weight of a node and a length, and of a sign that is known."""
+    def _weight(self, chosen: Chosen, held: Conditioned) -> float:
+        """Logarithm of the prior weight of a node and a length, what its sign gains included."""
         node = self.field_.basis.nodes[chosen.node]
         place = int(np.flatnonzero(chosen.length == LENGTHS)[0])
-        return node.log_weight + math.log(LENGTH_WEIGHTS[place]) + (math.log(2.0) if node.sign else 0.0)
+        return float(node.log_weights[place] + held.sign_gains[chosen.node, place])
 
     def _best_group(self, effects: Sequence[Chosen]) -> tuple[tuple[str, float], float]:
         """The best group of the unknown and length beside a set, and what averaging adds to its evidence."""

@@ -24,6 +24,8 @@ NODES = {1: 9, 2: 5, 3: 4}
 CYCLES_BETWEEN_NODES = 0.3
 """A line's frequency is known to this many cycles over the longest run."""
 MOST_LINES = 1500
+PLACE_DEGC = 4.0
+"""Spacing of places on the temperature scale [degC]."""
 
 
 @dataclass(frozen=True)
@@ -95,6 +97,9 @@ def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]
     low, high = quantity.range(grade)  # type: ignore[arg-type]
     if _is_line(quantity):
         return _lines(quantity, low, high, spans)
+    if quantity.unit == "degC" and "temperature" in quantity.name:
+        # A place on the temperature scale is told to a fraction of what happens there.
+        return [float(x) for x in np.arange(low, high + 1e-9, PLACE_DEGC)]
     if low > 0.0 and high / low > 3.0:
         return [float(x) for x in np.geomspace(low, high, count)]
     return [float(x) for x in np.linspace(low, high, count)]

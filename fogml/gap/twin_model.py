@@ -14,7 +14,7 @@ from fogml.gap.noise_effects import Line, noise_response
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.inputs import STAND_INS, Inputs
-from fogml.twin.nominal import NAMES, UNITS, NominalConstants, nominal_columns, temperature_slopes
+from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, UNITS, NominalConstants, nominal_columns, temperature_slopes
 from fogml.twin.plant.estimate import estimate_nodes
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import Replayer, inputs_of_run
@@ -30,6 +30,8 @@ class TwinModel:
     twin
         The twin to start from; effects that are on in it are part of it and no candidates.
     """
+
+    memory_s = 2.0 * DELTA_WINDOW_S
 
     def __init__(self, twin: Twin) -> None:
         self.twin = twin

@@ -1,0 +1,33 @@
+"""What is thought of an effect before the runs: how large it may be, and what shapes are likely.
+
+Amplitudes are normal with one of several standard deviations, stated as whitened lengths beside the
+constants, so that evidence does not hang on a scale that nobody knows. A length that would take an
+amplitude far outside of the card's ranges, of any grade, weighs less.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fogml.gap.model import Candidate
+from fogml.runs.run import FloatArray
+
+LENGTHS = np.array([5.0, 10.0, 20.0, 40.0, 100.0, 300.0, 1000.0])
+"""Whitened lengths that the prior of an amplitude is a mixture over."""
+LENGTH_WEIGHTS = np.array([0.2, 0.2, 0.2, 0.15, 0.12, 0.08, 0.05])
+FURTHER_DECADES = 0.6
+"""Standard deviation of the size of an amplitude outside its ranges, in decades."""
+
+
+def plausible_lengths(candidate: Candidate, size: float) -> FloatArray:
+    """Logarithm of the weight of each of `LENGTHS`, shape (lengths,).
+
+    `size` is the amplitude that has a whitened length of 1, in the card's unit.
+    """
+    quantity = candidate.amplitude
+    low = min(quantity.tactical[0], quantity.navigation[0])
+    high = max(quantity.tactical[1], quantity.navigation[1])
+    low = low if low > 0.0 else 1e-3 * high
+    decades = np.log10(LENGTHS * size)
+    outside = np.maximum(np.maximum(decades - np.log10(high), np.log10(low) - decades), 0.0)
+    return np.log(LENGTH_WEIGHTS) - 0.5 * (outside / FURTHER_DECADES) ** 2

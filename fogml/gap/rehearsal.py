@@ -1,0 +1,154 @@
+"""A programme rehearsed: what a run of it would show of each effect, whitened as a diagnosis would."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.gap.model import Candidate, Constant
+from fogml.gap.observation import Observation, observe
+from fogml.gap.programme_family import Design, Family
+from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.twin_model import TwinModel
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.plant.power import SelfHeating
+from fogml.twin.registry import effect
+from fogml.twin.set_up import Sensors
+from fogml.twin.simulate import DEFAULT_FACTS
+from fogml.twin.twin import Twin
+
+COARSE_S, FINE_S = 60.0, 10.0
+"""Sample interval of a search and of the figures that are told [s]."""
+LEAST_ROWS = 256
+"""A short programme is sampled finer, down to about as many rows."""
+USUAL_POWER_W = {"tactical": 3.0, "navigation": 8.0}
+"""Heat of the electronics where the twin states none."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Who rehearses: the twin made ready, its noise and constants.
+
+    Attributes
+    ----------
+    model
+        The twin with exact sensors, as a model that can be diagnosed.
+    noise
+        Of the gyro.
+    values
+        Constants at which effects that act on inputs are taken.
+    facts
+        Of the set-up; the mounting is the design's where that states one.
+    columns
+        What a run records; what `fogml simulate` does if None.
+    assumed
+        What was assumed of the twin, in words.
+    """
+
+    model: TwinModel
+    noise: NoiseModel
+    values: Mapping[str, float]
+    facts: Facts
+    columns: tuple[str, ...] | None
+    assumed: tuple[str, ...]
+
+    def candidate(self, id: str) -> Candidate:
+        """An effect as a diagnosis would offer it.
+
+        Raises
+        ------
+        InputError
+            If there is none of this id.
+        """
+        declared: Candidate = effect(id)
+        return self.model.candidates().get(id, declared)
+
+
+def stage(
+    twin: Twin,
+    noise: NoiseModel,
+    values: Mapping[str, float],
+    *,
+    facts: Facts | None = None,
+    columns: Sequence[str] | None = None,
+) -> Stage:
+    """The twin made ready.
+
+    Sensors are exact: their noise must not make responses look unlike each other. A twin that states no heat of
+    its electronics gets the usual one, or power steps would warm nothing.
+    """
+    assumed = []
+    heating = twin.plant.heating
+    plant = twin.plant
+    if heating.steady_w == 0.0 and heating.initial_w == 0.0:
+        watts = USUAL_POWER_W[twin.grade]
+        plant = replace(plant, heating=SelfHeating(watts, watts, heating.time_constant_s, heating.node))
+        assumed.append(
+            f"the electronics turn {watts:g} W into heat while on; twin {twin.name} states no heat of its own"
+        )
+    ready = replace(twin, sensors=Sensors(), plant=plant)
+    return Stage(
+        TwinModel(ready),
+        noise,
+        dict(values),
+        DEFAULT_FACTS if facts is None else facts,
+        None if columns is None else tuple(columns),
+        tuple(assumed),
+    )
+
+
+class Rehearsal:
+    """A run of a design as a diagnosis would see it.
+
+    Parameters
+    ----------
+    on
+        Who rehearses.
+    family, design
+        What is rehearsed.
+    sample_s
+        Sample interval [s]; less where the programme is short.
+
+    Attributes
+    ----------
+    observation
+        The run.
+    fixed
+        Whitened columns of the constants, each scaled by its prior's standard deviation, shape (m, c).
+    """
+
+    def __init__(self, on: Stage, family: Family, design: Design, sample_s: float = COARSE_S) -> None:
+        self.stage = on
+        mounting = design.mounting or on.facts.input_axis
+        facts = on.facts.model_copy(update={"input_axis": mounting})
+        programme = family.programme(design)
+        sample_s = min(sample_s, max(math.floor(programme.total_s / LEAST_ROWS), 1.0))
+        simulated = on.model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns)
+        self.observation: Observation = observe(simulated.run, on.model)
+        self._whitener = RunWhitener(on.noise, self.observation, on.values)
+        self.fixed = self._whitener.whiten(constant_columns(self.observation, on.model.constants))
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        o = self.observation
+        columns = [o.averaged(o.model.response(id, shape, self.stage.values)) for shape in shapes]
+        return self._whitener.whiten(np.column_stack(columns))
+
+    def beside(self, columns: FloatArray) -> FloatArray:
+        """Inner products of whitened columns beside the constants, their priors known, shape (k, k)."""
+        cross = self.fixed.T @ columns
+        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
+        return np.asarray(columns.T @ columns - cross.T @ np.linalg.solve(inner, cross))
+
+
+def constant_columns(o: Observation, constants: Sequence[Constant]) -> FloatArray:
+    """Responses to one prior standard deviation of each constant [deg/h], shape (m, c)."""
+    held = o.model.columns()
+    return np.column_stack(
+        [c.sd * o.averaged(held[c.name]) if c.name in held else np.zeros(len(o)) for c in constants]
+    )
