@@ -1,0 +1,263 @@
+"""``fogml diagnose``: what it writes, that its twin replays to its figures, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from typer.testing import CliRunner
+
+from fogml.cli.main import app
+from fogml.runs.reading import read_run
+from fogml.runs.run import Run
+from fogml.runs.writing import write_run
+from fogml.twin.programme import load_programme
+from fogml.twin.simulate import simulate
+from fogml.twin.twin_file import load_twin
+from tests.report.pages import Page
+
+RAMP = "1 degC/min"
+PROGRAMMES = {
+    "a": (25, 55, -10, 25),
+    "b": (25, 0, 50, 20),
+    "c": (25, 45, 5, 30),
+}
+HYSTERESIS = 0.3
+
+
+def steps(levels: tuple[int, ...]) -> list[str]:
+    """Soaks at the given temperatures [degC] with ramps between."""
+    told = [f"soak at {levels[0]} degC for 30 min"]
+    for level in levels[1:]:
+        told += [f"ramp to {level} degC at {RAMP}", f"soak at {level} degC for 40 min"]
+    return told
+
+
+@pytest.fixture(scope="module")
+def runs(tmp_path_factory) -> dict[str, Path]:
+    """Three runs of one synthetic unit with hysteresis of the bias, at 0.1 Hz."""
+    twin = load_twin("nominal").with_nominal(b0=2.0, b1=0.02, e0=100.0, m=0.5)
+    twin = twin.with_effect("thermal_hysteresis", HYSTERESIS, half_width=8.0)
+    folder = tmp_path_factory.mktemp("runs")
+    paths = {}
+    for seed, (name, levels) in enumerate(PROGRAMMES.items(), start=1):
+        made = simulate(
+            load_programme(steps(levels)), twin, sample_s=10.0, seed=seed, columns=["T_in", "T_out", "rate"]
+        )
+        paths[name] = folder / f"{name}.csv"
+        write_run(made.run, paths[name])
+    return paths
+
+
+@pytest.fixture(scope="module")
+def diagnosed(runs, tmp_path_factory) -> Path:
+    """The folder that a diagnosis of the three wrote."""
+    out = tmp_path_factory.mktemp("diagnosis") / "out"
+    result = CliRunner().invoke(
+        app,
+        ["diagnose", str(runs["a"]), str(runs["b"]), "--held-out", str(runs["c"]), "--out", str(out)],
+        catch_exceptions=False,
+    )
+    assert result.exit_code == 0, result.stderr
+    assert "Verdict: explained" in result.stdout
+    return out
+
+
+@pytest.fixture(scope="module")
+def gap(diagnosed) -> dict:
+    return json.loads((diagnosed / "gap.json").read_text())
+
+
+def test_what_is_written(diagnosed):
+    written = sorted(path.name for path in diagnosed.iterdir())
+    assert written == ["config.yaml", "gap.html", "gap.json", "twin.yaml"]
+    assert "<h1>Explained" in (diagnosed / "gap.html").read_text(encoding="utf-8")
+
+
+def test_gap_json_holds_every_key(gap):
+    assert gap["schema"] == "fogml.gap/1"
+    assert (gap["runs"]["fit"], gap["runs"]["held_out"], gap["runs"]["noise"]) == (
+        ["a.csv", "b.csv"],
+        ["c.csv"],
+        None,
+    )
+    assert set(gap) >= {"verdict", "which", "unknown", "where", "how_far", "undetectable", "separating_run"}
+    assert set(gap["unknown"]) >= {"probability", "looks_like"}
+    keys = {
+        "stage": {"name", "share"},
+        "regime": {"name", "excess_rms", "unit", "share"},
+        "temperature": {"from", "to", "excess_rms", "unit"},
+        "timescale": {"tau_s", "excess"},
+        "segments": {"run", "from_s", "to_s", "excess_rms", "unit"},
+    }
+    assert set(gap["where"]) == set(keys)
+    for name, wanted in keys.items():
+        assert gap["where"][name], name
+        assert all(set(item) >= wanted for item in gap["where"][name]), name
+    for name in ("stage", "regime"):
+        assert math.isclose(sum(item["share"] for item in gap["where"][name]), 1.0)
+    (far,) = gap["how_far"]
+    wanted = {
+        "run",
+        "averaging_s",
+        "unit",
+        "before",
+        "recalibrated",
+        "after",
+        "floor",
+        "closed",
+        "closed_ci90",
+    }
+    assert set(far) >= wanted and far["run"] == "c.csv" and len(far["closed_ci90"]) == 2
+
+
+def test_the_effect_is_named_with_its_size(gap):
+    assert gap["verdict"] == "explained"
+    found = gap["which"][0]
+    assert set(found) >= {"effect", "class", "probability", "amplitude", "parameters"}
+    assert found["effect"] == "thermal_hysteresis" and found["class"] == ["thermal_hysteresis"]
+    assert found["probability"] >= 0.5 > gap["unknown"]["probability"]
+    amplitude = found["amplitude"]
+    assert amplitude["unit"] == "deg/h"
+    assert abs(amplitude["value"] - HYSTERESIS) < 4.0 * amplitude["se"] < 0.2
+    assert set(found["parameters"]["half_width"]) == {"value", "se", "unit"}
+
+
+def test_segments_lie_within_their_run(gap, runs):
+    for segment in gap["where"]["segments"]:
+        end = read_run(runs[segment["run"][0]]).span_s
+        assert segment["run"] in gap["runs"]["fit"]
+        assert segment["from_s"] >= -10.0 and segment["to_s"] <= end + 10.0
+        assert segment["to_s"] - segment["from_s"] >= 600.0
+
+
+def test_the_written_twin_replays_to_the_figures_after(diagnosed, gap, runs, tmp_path, invoke):
+    out = tmp_path / "replayed.parquet"
+    invoke("replay", diagnosed / "twin.yaml", runs["c"], "-o", out)
+    recorded = read_run(runs["c"])
+    left = recorded.gyro_deg_h - read_run(out).columns["replayed"]
+    # The nominal model's change of temperature reaches back over the last 128 s.
+    left = left[recorded.time - recorded.time[0] >= 128.0]
+    (far,) = gap["how_far"]
+    width = round(far["averaging_s"] / 10.0)
+    averages = left[: len(left) // width * width].reshape(-1, width).mean(axis=1)
+    assert np.sqrt(np.mean(averages**2)) == pytest.approx(far["after"], rel=1e-6)
+    assert far["after"] < 0.7 * far["recalibrated"]
+
+
+def test_the_written_settings_repeat_the_diagnosis(diagnosed, tmp_path, invoke):
+    settings = yaml.safe_load((diagnosed / "config.yaml").read_text())
+    assert settings["twin"] == "nominal" and len(settings["runs"]) == 2
+    out = tmp_path / "again"
+    invoke("diagnose", "--config", diagnosed / "config.yaml", "--out", out)
+    assert (out / "gap.json").read_bytes() == (diagnosed / "gap.json").read_bytes()
+
+
+def test_the_page_tells_the_figures_of_the_json(diagnosed, gap):
+    page = Page((diagnosed / "gap.html").read_text(encoding="utf-8"))
+    (far,) = gap["how_far"]
+    assert f"{100 * far['closed']:.0f} %" in page.text
+    assert "synthetic" in page.text and "Thermal hysteresis of the bias" in page.text
+
+
+def test_without_an_effect_it_is_not_named_and_nothing_held_out_is_said(runs, tmp_path, invoke_json):
+    out = tmp_path / "out"
+    gap = invoke_json("diagnose", runs["a"], runs["b"], "--without", "thermal_hysteresis", "--out", out)
+    assert gap["runs"]["held_out_is_part_of_last_run"] is True
+    assert all("thermal_hysteresis" not in found["class"] for found in gap["which"])
+    assert "No run was held out" in (out / "gap.html").read_text(encoding="utf-8")
+
+
+def rewritten(path: Path, folder: Path, name: str, **changes) -> Path:
+    """A run under another name, with columns or facts changed."""
+    run = read_run(path)
+    facts = run.facts.model_copy(update=changes.pop("facts", {}))
+    rows = changes.pop("rows", slice(None))
+    columns = {key: values[rows] for key, values in ({**run.columns} | changes).items()}
+    target = folder / name
+    write_run(Run.from_columns(name, facts, **columns), target)
+    return target
+
+
+def refused(invoke, tmp_path: Path, *arguments: object) -> str:
+    """The one message of a refusal that writes nothing."""
+    out = tmp_path / "refused"
+    result = invoke("diagnose", *arguments, "--out", out, status=2)
+    assert not out.exists() and result.stdout == ""
+    assert len(result.stderr.strip().splitlines()) <= 4 and "Traceback" not in result.stderr
+    return " ".join(result.stderr.split())
+
+
+def test_a_held_out_run_that_is_a_fit_run(runs, tmp_path, invoke):
+    told = refused(invoke, tmp_path, runs["a"], runs["c"], "--held-out", runs["c"])
+    assert "c.csv" in told and "held out" in told
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(runs["c"].read_bytes())
+    told = refused(invoke, tmp_path, runs["a"], runs["c"], "--held-out", copy)
+    assert "copy.csv" in told and "c.csv" in told
+
+
+def test_runs_of_different_units(runs, tmp_path, invoke):
+    other = rewritten(runs["b"], tmp_path, "other.csv", facts={"unit": "FOG-2"})
+    told = refused(invoke, tmp_path, runs["a"], other, "--held-out", runs["c"])
+    assert "different units" in told and "FOG-2" in told and "other.csv" in told
+
+
+def test_no_temperature_that_moves(runs, tmp_path, invoke):
+    flat = np.full(len(read_run(runs["a"])), 25.0)
+    still = rewritten(runs["a"], tmp_path, "still.csv", T_in=flat, T_out=flat)
+    told = refused(invoke, tmp_path, still, "--held-out", runs["c"])
+    assert "still.csv" in told and "temperature moves by 0" in told
+
+
+def test_a_twin_with_an_unknown_effect(runs, tmp_path, invoke):
+    twin = tmp_path / "own.yaml"
+    twin.write_text("schema: fogml.twin/1\nname: own\neffects:\n  thermal_hysteresys: {amplitude: 0.1}\n")
+    told = refused(invoke, tmp_path, runs["a"], "--held-out", runs["c"], "--twin", twin)
+    assert "own.yaml" in told and "thermal_hysteresys" in told and "did you mean" in told
+
+
+def test_a_run_that_is_too_short(runs, tmp_path, invoke):
+    short = rewritten(runs["a"], tmp_path, "short.csv", rows=slice(0, 55))
+    told = refused(invoke, tmp_path, short, "--held-out", runs["c"])
+    assert "short.csv" in told and "at least 600 s" in told
+
+
+@pytest.mark.parametrize("column", ["gyro", "T_in"])
+def test_a_column_without_a_number(runs, tmp_path, invoke, column):
+    lines = runs["a"].read_text().splitlines()
+    place = [cell.split(" ")[0] for cell in lines[0].split(",")].index(column)
+    rows = [line.split(",") for line in lines[1:]]
+    empty = tmp_path / "empty.csv"
+    body = [",".join([*row[:place], "nan", *row[place + 1 :]]) for row in rows]
+    empty.write_text("\n".join([lines[0], *body]) + "\n")
+    told = refused(invoke, tmp_path, empty, "--held-out", runs["c"])
+    assert "empty.csv" in told and column in told
+
+
+def test_an_unknown_candidate_to_leave_out(runs, tmp_path, invoke):
+    told = refused(invoke, tmp_path, runs["a"], "--held-out", runs["c"], "--without", "hysteresis")
+    assert "--without hysteresis" in told and "fogml effects" in told
+
+
+def test_no_run_at_all(tmp_path, invoke):
+    assert "no run is given" in refused(invoke, tmp_path)
+
+
+def test_a_run_that_cannot_be_used_is_told_where_others_can(runs, tmp_path, invoke_json):
+    short = rewritten(runs["a"], tmp_path, "short.csv", rows=slice(0, 55))
+    bare = tmp_path / "bare.csv"
+    run = read_run(runs["b"])
+    write_run(Run.from_columns("bare.csv", run.facts, time=run.time, gyro=run.gyro), bare)
+    out = tmp_path / "out"
+    gap = invoke_json("diagnose", runs["a"], short, bare, "--held-out", runs["c"], "--out", out)
+    assert gap["runs"]["fit"] == ["a.csv"]
+    reasons = {item["run"]: item["reason"] for item in gap["runs"]["unusable"]}
+    assert set(reasons) == {"short.csv", "bare.csv"}
+    assert "600 s" in reasons["short.csv"] and "temperature" in reasons["bare.csv"]
+    page = Page((out / "gap.html").read_text(encoding="utf-8")).text
+    assert "short.csv was not used" in page
