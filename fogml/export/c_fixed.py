@@ -8,7 +8,7 @@ in 32 bits, ``q15`` in 16 bits and takes temperatures in 16.
 
 from __future__ import annotations
 
-from math import factorial, floor, frexp, log, log2
+from math import factorial, floor, log, log2
 from typing import Any
 
 import numpy as np
@@ -16,22 +16,24 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.export.c_float import array
+from fogml.export.fixed_scales import (
+    OUTPUT_BITS,
+    VALUE_BITS,
+    Scales,
+    common_bits,
+    fitting_bits,
+    product_range,
+)
 from fogml.export.layout import Layout
 from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-OUTPUT_BITS = 12
-"""Outputs are multiples of 2**-12 deg/h."""
 EXP_ERROR = 3e-8
 """Greatest absolute error of the generated exponential, its argument's rounding included."""
-_VALUE_BITS = 30
-_SUM_BITS = 60
-_MOST_DRIFT_BITS = 36
 _HELD_BITS = 20
 _SIGNAL_SHIFT = 24
-_TEMPERATURE_MARGIN = 1.1
 
 
 def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
@@ -44,7 +46,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     """
     from fogml.export.c_source import units_of
 
-    scales = _Scales(plan, dtype)
+    scales = Scales(plan, dtype)
     bits = scales.temperature_bits
     fixed = {
         "temperature_unit": f"{2.0**-bits!r}",
@@ -101,82 +103,6 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     }
 
 
-class _Scales:
-    """Bits behind the binary point of every value, so that each fits 2**30."""
-
-    def __init__(self, plan: Plan, dtype: str) -> None:
-        self.plan = plan
-        self.stored_bits = 14 if dtype == "q15" else 30
-        limits = plan.limits
-        low, high = limits.low - limits.margin, limits.high + limits.margin
-        self.atoms = np.array([_bits(max(abs(a), abs(b))) for a, b in zip(low, high)], dtype=np.int64)
-        ranges: list[tuple[float, float]] = []
-        for step in plan.steps:
-            span = (1.0, 1.0) if step.column is None else ranges[step.column]
-            for atom in step.atoms:
-                span = _product(span, (float(low[atom]), float(high[atom])))
-            ranges.append(span)
-        self.most = np.array([max(abs(a), abs(b)) for a, b in ranges])
-        self.columns = np.array([_bits(value) for value in self.most], dtype=np.int64)
-        self.temperature_bits = 22 if dtype == "q31" else _sixteen_bits(plan)
-        self.gyro_bits = 0 if plan.form == "joint" and plan.gyro_unit == "count" else OUTPUT_BITS
-        arrays = plan.arrays
-        linear = arrays.get("linear", np.empty(0))
-        self.linear, self.linear_bits = _mantissas(linear, self.stored_bits)
-        total = abs(float(arrays["constant"][0])) + float(np.abs(linear) @ self.most) if len(linear) else 1.0
-        total = max(total, abs(float(arrays["constant"][0])))
-        drift = [_MOST_DRIFT_BITS]
-        if len(linear):
-            drift.append(int((self.linear_bits + self.columns).min()))
-        self.weight_bits = 0
-        if plan.centres:
-            slope = 1.0 + (2048.0 if plan.edge_columns else 0.0)
-            total += float(np.abs(arrays["weights"]).sum()) * min(slope, 64.0)
-            self.weight_bits = _common_bits(arrays["weights"], self.stored_bits)
-            drift.append(self.weight_bits + 30 - self.stored_bits)
-        if plan.form == "joint":
-            self.scale_bits = _common_bits(arrays["scale"][:1] * 1.25, _VALUE_BITS)
-            drift.append(self.scale_bits + self.gyro_bits)
-            total += float(abs(arrays["scale"][0])) * 2.0**31 / 2.0**self.gyro_bits
-        self.drift = min([*drift, floor(_SUM_BITS - log2(max(total, 1e-6)))])
-        if self.drift < OUTPUT_BITS:
-            raise InputError(
-                "export: the model's terms are so large, and cancel so finely, that fixed point cannot hold "
-                f"them ({dtype}); use float32, or train with lower powers"
-            )
-
-
-def _bits(most: float) -> int:
-    """Most bits behind the point with which numbers up to `most` stay below 2**30."""
-    return min(_VALUE_BITS, _VALUE_BITS - frexp(max(most, 1e-12))[1])
-
-
-def _common_bits(values: FloatArray, stored: int) -> int:
-    """Bits behind the point with which all values fit `stored` bits."""
-    most = float(np.max(np.abs(values), initial=0.0))
-    return stored - frexp(most)[1] if most > 0.0 else stored
-
-
-def _mantissas(values: FloatArray, stored: int) -> tuple[IntArray, IntArray]:
-    """Each value as a whole number of `stored` bits, and its own bits behind the point."""
-    bits = np.array([_common_bits(np.array([v]), stored) if v else stored for v in values], dtype=np.int64)
-    return np.round(values * 2.0**bits).astype(np.int64), bits
-
-
-def _product(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
-    corners = [x * y for x in a for y in b]
-    return min(corners), max(corners)
-
-
-def _sixteen_bits(plan: Plan) -> int:
-    """Bits behind the point of 16-bit temperatures: the trained ones fit with a tenth to spare."""
-    most = 100.0
-    for i, atom in enumerate(plan.atoms):
-        if atom.operator == "value" and atom.signal.is_sensor:
-            most = max(most, abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
-    return floor(log2(32767.0 / (most * _TEMPERATURE_MARGIN)))
-
-
 def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
     shift = _HELD_BITS - bits + _SIGNAL_SHIFT
     factors = [
@@ -191,7 +117,7 @@ def _divide_bits(unit_ticks: float, step_bits: int = _HELD_BITS) -> int:
     return max(0, floor(log2(unit_ticks)) + 26 - step_bits)
 
 
-def _operator_bits(windows: Layout, plan: Plan, scales: _Scales) -> list[int]:
+def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:
     """Bits behind the point of each operator's value: those of the atom that it makes."""
     bits = [_HELD_BITS] * len(windows.operators)
     for i, place in enumerate(windows.of_atom):
@@ -200,7 +126,7 @@ def _operator_bits(windows: Layout, plan: Plan, scales: _Scales) -> list[int]:
     return bits
 
 
-def _evaluations(plan: Plan, windows: Layout, scales: _Scales) -> dict[int, str]:
+def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
     found: dict[int, str] = {}
     bits = _operator_bits(windows, plan, scales)
     for place, (i, operator) in enumerate(windows.of_method("block")):
@@ -239,7 +165,7 @@ def _exponential_arguments(windows: Layout) -> dict[int, str]:
     return found
 
 
-def _atom(i: int, plan: Plan, windows: Layout, scales: _Scales) -> str:
+def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     place, bits = windows.of_atom[i], int(scales.atoms[i])
     if place < 0:
         value = f"scaled(signal[{windows.signal_of_atom[i]}], {_HELD_BITS - bits})"
@@ -251,7 +177,7 @@ def _atom(i: int, plan: Plan, windows: Layout, scales: _Scales) -> str:
     return f"full ? (int32_t)clipped({value}, INT32_MAX) : 0"
 
 
-def _columns(plan: Plan, scales: _Scales) -> list[str]:
+def _columns(plan: Plan, scales: Scales) -> list[str]:
     """Feature columns with products taken two at a time, so that none leaves 64 bits."""
     found = []
     limits = plan.limits
@@ -266,8 +192,8 @@ def _columns(plan: Plan, scales: _Scales) -> list[str]:
             text, bits, span = f"f[{step.column}]", int(scales.columns[step.column]), (0.0, 0.0)
         for atom in factors:
             if step.column is None:
-                span = _product(span, (float(low[atom]), float(high[atom])))
-                into = _bits(max(abs(span[0]), abs(span[1])))
+                span = product_range(span, (float(low[atom]), float(high[atom])))
+                into = fitting_bits(max(abs(span[0]), abs(span[1])))
             else:
                 into = int(scales.columns[place])
             text = f"scaled({text} * a[{atom}], {bits + int(scales.atoms[atom]) - into})"
@@ -276,7 +202,7 @@ def _columns(plan: Plan, scales: _Scales) -> list[str]:
     return found
 
 
-def _constants(plan: Plan, windows: Layout, scales: _Scales, dtype: str) -> list[str]:
+def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[str]:
     lines = []
     if windows.operators:
         lines += [
@@ -324,12 +250,12 @@ def _constants(plan: Plan, windows: Layout, scales: _Scales, dtype: str) -> list
     return lines + (_network_constants(plan, scales, stored) if plan.centres else [])
 
 
-def _scale_constants(plan: Plan, scales: _Scales) -> list[str]:
+def _scale_constants(plan: Plan, scales: Scales) -> list[str]:
     bits = scales.scale_bits
     _, *slopes = np.abs(plan.arrays["scale"])
     steepest = max(slopes[0] + slopes[1] * float(scales.most[0]), 1e-12)
     # The terms in T get more bits than the whole, as long as their products fit.
-    spare = max(0, min(14, floor(61.0 - _VALUE_BITS - bits - log2(steepest))))
+    spare = max(0, min(14, floor(61.0 - VALUE_BITS - bits - log2(steepest))))
     whole = np.round(plan.arrays["scale"] * 2.0 ** (bits + spare))
     note = f"steps of 2^-{bits + spare} deg/h per unit of output, by powers of T"
     return [
@@ -340,15 +266,15 @@ def _scale_constants(plan: Plan, scales: _Scales) -> list[str]:
     ]
 
 
-def _network_constants(plan: Plan, scales: _Scales, stored: str) -> list[str]:
+def _network_constants(plan: Plan, scales: Scales, stored: str) -> list[str]:
     arrays, seen = plan.arrays, list(plan.columns)
-    spare = _VALUE_BITS - scales.stored_bits
+    spare = VALUE_BITS - scales.stored_bits
     step = 2.0**spare
     centres = np.round(arrays["centres"] * 2.0 ** scales.columns[seen] / step)
     if np.abs(centres).max(initial=0.0) >= 2.0 ** (scales.stored_bits + 1):
         raise InputError("export: a centre lies too far outside the trained box for fixed point; use float32")
     inverse = 1.0 / arrays["widths"]
-    bits = np.array([_common_bits(inverse[:, d], scales.stored_bits) for d in range(len(seen))])
+    bits = np.array([common_bits(inverse[:, d], scales.stored_bits) for d in range(len(seen))])
     shift = bits + scales.columns[seen] - 27
     lines = [
         "",

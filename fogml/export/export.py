@@ -15,6 +15,7 @@ from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.c_program import CProgram, cortex_m4_size
 from fogml.export.c_source import C_DTYPES, c_source
+from fogml.export.card import card_lines, export_card
 from fogml.export.check import (
     Difference,
     c_difference,
@@ -110,7 +111,7 @@ def export_model(
     _agreeing(whole, model, settings.seed)
     rows = training_rows(model, whole, train) if train else None
     plan, pruning = _pruned(whole, settings, dtype, rows)
-    card = _card(model, plan, pruning)
+    card = export_card(model, plan, pruning)
     if settings.to == "c":
         report, exported = _write_c(plan, folder, dtype, card, settings.seed)
     else:
@@ -217,56 +218,10 @@ def _within(
         )
 
 
-def _card(model: DriftModel, plan: Plan, pruning: dict[str, Any] | None) -> dict[str, Any]:
-    card = model.card_
-    return {
-        "kind": plan.kind,
-        "features": list(plan.names),
-        "unit": card.unit,
-        "axis": card.axis,
-        "training_runs": [{"name": run.name, "sha256": run.sha256} for run in card.runs],
-        "fogml_version": card.fogml_version,
-        "box": {
-            atom.text: [float(plan.limits.box_low[i]), float(plan.limits.box_high[i])]
-            for i, atom in enumerate(plan.atoms)
-        },
-        "half_width_90_deg_h": float(model.intervals_.half_width(0.9)),
-        "averaging_s": model.intervals_.averaging_s,
-        "earth_known": card.earth_known,
-        **({"pruned_to_bytes": pruning["bytes_asked"]} if pruning else {}),
-    }
-
-
-def _card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
-    """The card as lines of a C comment."""
-
-    def safe(text: object) -> str:
-        return str(text).replace("*/", "* /").replace("\n", " ").encode("ascii", "replace").decode()
-
-    runs = card["training_runs"]
-    lines = [
-        f"gyro          {safe(card['unit'] or 'not stated')}, axis {safe(card['axis'] or 'not stated')}",
-        *(f"trained on    {safe(run['name'])}, SHA-256 {run['sha256'][:16]}..." for run in runs),
-        f"features      {', '.join(plan.names) or 'none'}",
-        *(
-            f"trained box   {safe(name)}: {low:.6g} to {high:.6g}"
-            for name, (low, high) in card["box"].items()
-        ),
-        f"accuracy      90 % of {card['averaging_s']:g} s averages within "
-        f"{card['half_width_90_deg_h']:.3g} deg/h,",
-        "              by parts of the training runs that were left out; not known outside the trained box",
-        f"numbers       {dtype}"
-        + (f", pruned to {card['pruned_to_bytes']} bytes of weights" if "pruned_to_bytes" in card else ""),
-    ]
-    if not card["earth_known"]:
-        lines.append("earth rate    not known in training: its part along the axis is taken for drift")
-    return lines
-
-
 def _write_c(
     plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
 ) -> tuple[dict[str, Any], Plan]:
-    source = c_source(plan, dtype, _card_lines(card, plan, dtype))
+    source = c_source(plan, dtype, card_lines(card, plan, dtype))
     with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
         source = source.with_expected(*expected_outputs(source, Path(scratch)))
         program = CProgram(source, Path(scratch))
@@ -330,7 +285,7 @@ def _write_onnx(
         from onnxruntime import InferenceSession
     except ImportError:
         raise InputError("export: onnxruntime is not installed; pip install 'fogml[export]'") from None
-    model = onnx_model(plan, stored, dtype, settings.pipeline, "\n".join(_card_lines(card, plan, dtype)))
+    model = onnx_model(plan, stored, dtype, settings.pipeline, "\n".join(card_lines(card, plan, dtype)))
     data = model.SerializeToString()
     session = InferenceSession(data, providers=["CPUExecutionProvider"])
     real = np.float64 if dtype == "float64" else np.float32

@@ -1,0 +1,96 @@
+"""Steps of fixed-point numbers, chosen so that nothing a plan works out can overflow."""
+
+from __future__ import annotations
+
+from math import floor, frexp, log2
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.export.plan import Plan
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+OUTPUT_BITS = 12
+"""Outputs are multiples of 2**-12 deg/h."""
+VALUE_BITS = 30
+_SUM_BITS = 60
+_MOST_DRIFT_BITS = 36
+_TEMPERATURE_MARGIN = 1.1
+
+
+class Scales:
+    """Bits behind the binary point of every value, so that each fits 2**30."""
+
+    def __init__(self, plan: Plan, dtype: str) -> None:
+        self.plan = plan
+        self.stored_bits = 14 if dtype == "q15" else 30
+        limits = plan.limits
+        low, high = limits.low - limits.margin, limits.high + limits.margin
+        self.atoms = np.array([fitting_bits(max(abs(a), abs(b))) for a, b in zip(low, high)], dtype=np.int64)
+        ranges: list[tuple[float, float]] = []
+        for step in plan.steps:
+            span = (1.0, 1.0) if step.column is None else ranges[step.column]
+            for atom in step.atoms:
+                span = product_range(span, (float(low[atom]), float(high[atom])))
+            ranges.append(span)
+        self.most = np.array([max(abs(a), abs(b)) for a, b in ranges])
+        self.columns = np.array([fitting_bits(value) for value in self.most], dtype=np.int64)
+        self.temperature_bits = 22 if dtype == "q31" else sixteen_bits(plan)
+        self.gyro_bits = 0 if plan.form == "joint" and plan.gyro_unit == "count" else OUTPUT_BITS
+        arrays = plan.arrays
+        linear = arrays.get("linear", np.empty(0))
+        self.linear, self.linear_bits = mantissas(linear, self.stored_bits)
+        total = abs(float(arrays["constant"][0])) + float(np.abs(linear) @ self.most) if len(linear) else 1.0
+        total = max(total, abs(float(arrays["constant"][0])))
+        drift = [_MOST_DRIFT_BITS]
+        if len(linear):
+            drift.append(int((self.linear_bits + self.columns).min()))
+        self.weight_bits = 0
+        if plan.centres:
+            slope = 1.0 + (2048.0 if plan.edge_columns else 0.0)
+            total += float(np.abs(arrays["weights"]).sum()) * min(slope, 64.0)
+            self.weight_bits = common_bits(arrays["weights"], self.stored_bits)
+            drift.append(self.weight_bits + 30 - self.stored_bits)
+        if plan.form == "joint":
+            self.scale_bits = common_bits(arrays["scale"][:1] * 1.25, VALUE_BITS)
+            drift.append(self.scale_bits + self.gyro_bits)
+            total += float(abs(arrays["scale"][0])) * 2.0**31 / 2.0**self.gyro_bits
+        self.drift = min([*drift, floor(_SUM_BITS - log2(max(total, 1e-6)))])
+        if self.drift < OUTPUT_BITS:
+            raise InputError(
+                "export: the model's terms are so large, and cancel so finely, that fixed point cannot hold "
+                f"them ({dtype}); use float32, or train with lower powers"
+            )
+
+
+def fitting_bits(most: float) -> int:
+    """Most bits behind the point with which numbers up to `most` stay below 2**30."""
+    return min(VALUE_BITS, VALUE_BITS - frexp(max(most, 1e-12))[1])
+
+
+def common_bits(values: FloatArray, stored: int) -> int:
+    """Bits behind the point with which all values fit `stored` bits."""
+    most = float(np.max(np.abs(values), initial=0.0))
+    return stored - frexp(most)[1] if most > 0.0 else stored
+
+
+def mantissas(values: FloatArray, stored: int) -> tuple[IntArray, IntArray]:
+    """Each value as a whole number of `stored` bits, and its own bits behind the point."""
+    bits = np.array([common_bits(np.array([v]), stored) if v else stored for v in values], dtype=np.int64)
+    return np.round(values * 2.0**bits).astype(np.int64), bits
+
+
+def product_range(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    corners = [x * y for x in a for y in b]
+    return min(corners), max(corners)
+
+
+def sixteen_bits(plan: Plan) -> int:
+    """Bits behind the point of 16-bit temperatures: the trained ones fit with a tenth to spare."""
+    most = 100.0
+    for i, atom in enumerate(plan.atoms):
+        if atom.operator == "value" and atom.signal.is_sensor:
+            most = max(most, abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
+    return floor(log2(32767.0 / (most * _TEMPERATURE_MARGIN)))
