@@ -16,6 +16,7 @@ from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.models.box import learn_box
 from fogml.models.feature_model import FeatureModel
+from fogml.models.linear import LinearRegressor
 from fogml.models.prior import Prior, PriorRegressor
 from fogml.models.rbf.search import independent_share
 from fogml.models.table import run_rows, table_of_rows
@@ -34,7 +35,7 @@ _WORTH_UNITS = 2.0
 LEAST_UNITS = 3
 COVERED = 0.25
 """Least share of the fleet's temperatures in a unit's runs if the fleet is followed beyond them."""
-ODD = 16.0
+ODD = 4.0
 """Factor of a unit's covariance from which it counts as odd."""
 
 
@@ -203,8 +204,9 @@ class SharedModel(FeatureModel):
     """A unit's drift by the fleet's form, its constants drawn to the fleet's.
 
     The trained box is the fleet's and the unit's own together: where the unit's runs did not go,
-    the fleet's constants tell what to expect. With runs over less than a quarter of the fleet's
-    temperatures the box is the unit's own: an odd unit could not be told from the others then.
+    the fleet's constants tell what to expect. An odd unit is left to its own runs, as if there were
+    no fleet; so is one whose runs cover less than a quarter of the fleet's temperatures, as it
+    could not be told whether it is odd.
 
     Parameters
     ----------
@@ -225,28 +227,36 @@ class SharedModel(FeatureModel):
         """Fit to training runs, as `FeatureModel.fit`."""
         super().fit(runs)
         own = self.features_.box
-        notes = ["constants are drawn to the fleet's"]
         spread = getattr(self.regressor_, "spread_", 1.0)
         if spread >= ODD:
-            notes.append(
-                f"this unit is odd: its constants lie {np.sqrt(spread):.2g} times as far from the fleet's as "
-                "other units' do, and are mostly its own"
+            return self._alone(
+                runs,
+                f"this unit is odd: its constants lie about {np.sqrt(spread):.2g} times as far out",
             )
         covered = min((_span(own[name]) / _span(self.box[name]) for name in self._levels()), default=1.0)
         if covered < COVERED:
-            notes.append(
-                f"the runs cover {covered:.0%} of the fleet's temperatures: too little to tell whether it "
-                "is like its fleet, so the fleet is not followed beyond the runs"
+            return self._alone(
+                runs,
+                f"the runs cover {covered:.0%} of the fleet's temperatures, too little to tell an odd unit",
             )
-            self.card_ = replace(self.card_, notes=(*self.card_.notes, *notes))
-            return self
         wider = {
             name: (min(low, self.box[name][0]), max(high, self.box[name][1]))
             for name, (low, high) in own.items()
         }
         self.features_.set_box(wider)
-        notes.append("the trained box is the fleet's and the unit's together")
-        self.card_ = replace(self.card_, box=self.features_.box, notes=(*self.card_.notes, *notes))
+        note = (
+            "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"
+        )
+        self.card_ = replace(self.card_, box=self.features_.box, notes=(*self.card_.notes, note))
+        return self
+
+    def _alone(self, runs: Run | Sequence[Run], why: str) -> Self:
+        """Leave the unit to its own runs: the form by least squares, its ridge by cross-validation."""
+        alone = FeatureModel(self.features, LinearRegressor(ridge="auto"), kind=self.kind).fit(runs)
+        for name, value in vars(alone).items():
+            if name.endswith("_"):
+                setattr(self, name, value)
+        self.card_ = replace(self.card_, notes=(*self.card_.notes, f"{why}; it is left to its own runs"))
         return self
 
     def _levels(self) -> list[str]:
