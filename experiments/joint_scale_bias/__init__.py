@@ -1,0 +1,1 @@
+"""The patent on scale factor and bias from one temperature run, checked."""
