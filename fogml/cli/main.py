@@ -35,6 +35,7 @@ COMMANDS = {
         "fogml.cli.diagnose",
         "Where the twin's gap lies, which effect causes it, how far it closes.",
     ),
+    "plan": ("fogml.cli.plan", "A chamber programme that makes wanted parameters or effects identifiable."),
     "blind": ("fogml.cli.blind", "The check on withheld effects: make cases, answer them, score."),
 }
 """Name of each command: its module, and its help in one line."""

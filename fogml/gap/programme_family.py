@@ -261,7 +261,9 @@ class Family:
         if design.ladder != "none":
             words.append(f"turns at {design.ladder} in each soak")
         if design.power_steps != "none":
-            words.append(f"power off and on in {'the first' if design.power_steps == 'first' else 'each'} soak")
+            words.append(
+                f"power off and on in {'the first' if design.power_steps == 'first' else 'each'} soak"
+            )
         if design.cold_start:
             words.append("switched on at the beginning")
         words += [

@@ -38,6 +38,8 @@ class Stage:
     ----------
     model
         The twin with exact sensors, as a model that can be diagnosed.
+    reading
+        The same with the sensors that it has, whose noise tells how much rows weigh.
     noise
         Of the gyro.
     values
@@ -51,6 +53,7 @@ class Stage:
     """
 
     model: TwinModel
+    reading: TwinModel
     noise: NoiseModel
     values: Mapping[str, float]
     facts: Facts
@@ -79,8 +82,8 @@ def stage(
 ) -> Stage:
     """The twin made ready.
 
-    Sensors are exact: their noise must not make responses look unlike each other. A twin that states no heat of
-    its electronics gets the usual one, or power steps would warm nothing.
+    Responses are those to exact sensors: their noise must not make responses look unlike each other. A twin
+    that states no heat of its electronics gets the usual one, or power steps would warm nothing.
     """
     assumed = []
     heating = twin.plant.heating
@@ -91,8 +94,9 @@ def stage(
         assumed.append(
             f"the electronics turn {watts:g} W into heat while on; twin {twin.name} states no heat of its own"
         )
-    ready = replace(twin, sensors=Sensors(), plant=plant)
+    ready = replace(twin, plant=plant)
     return Stage(
+        TwinModel(replace(ready, sensors=Sensors())),
         TwinModel(ready),
         noise,
         dict(values),
@@ -102,7 +106,32 @@ def stage(
     )
 
 
-class Rehearsal:
+class Rehearsed:
+    """Whitened columns of one run or of several together.
+
+    Attributes
+    ----------
+    stage
+        Who rehearses.
+    fixed
+        Whitened columns of the constants, each scaled by its prior's standard deviation, shape (m, c).
+    """
+
+    stage: Stage
+    fixed: FloatArray
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        raise NotImplementedError
+
+    def beside(self, columns: FloatArray) -> FloatArray:
+        """Inner products of whitened columns beside the constants, their priors known, shape (k, k)."""
+        cross = self.fixed.T @ columns
+        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
+        return np.asarray(columns.T @ columns - cross.T @ np.linalg.solve(inner, cross))
+
+
+class Rehearsal(Rehearsed):
     """A run of a design as a diagnosis would see it.
 
     Parameters
@@ -118,19 +147,20 @@ class Rehearsal:
     ----------
     observation
         The run.
-    fixed
-        Whitened columns of the constants, each scaled by its prior's standard deviation, shape (m, c).
     """
 
     def __init__(self, on: Stage, family: Family, design: Design, sample_s: float = COARSE_S) -> None:
         self.stage = on
-        mounting = design.mounting or on.facts.input_axis
-        facts = on.facts.model_copy(update={"input_axis": mounting})
         programme = family.programme(design)
         sample_s = min(sample_s, max(math.floor(programme.total_s / LEAST_ROWS), 1.0))
-        simulated = on.model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns)
-        self.observation: Observation = observe(simulated.run, on.model)
-        self._whitener = RunWhitener(on.noise, self.observation, on.values)
+        facts = mounted(on.facts, design)
+
+        def seen(model: TwinModel) -> Observation:
+            simulated = model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns)
+            return observe(simulated.run, model)
+
+        self.observation = seen(on.model)
+        self._whitener = RunWhitener(on.noise, seen(on.reading), on.values)
         self.fixed = self._whitener.whiten(constant_columns(self.observation, on.model.constants))
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
@@ -139,11 +169,22 @@ class Rehearsal:
         columns = [o.averaged(o.model.response(id, shape, self.stage.values)) for shape in shapes]
         return self._whitener.whiten(np.column_stack(columns))
 
-    def beside(self, columns: FloatArray) -> FloatArray:
-        """Inner products of whitened columns beside the constants, their priors known, shape (k, k)."""
-        cross = self.fixed.T @ columns
-        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
-        return np.asarray(columns.T @ columns - cross.T @ np.linalg.solve(inner, cross))
+
+class Together(Rehearsed):
+    """Several runs of one unit, whose constants and effects are the same in all."""
+
+    def __init__(self, runs: Sequence[Rehearsed]) -> None:
+        self.stage, self._runs = runs[0].stage, runs
+        self.fixed = np.concatenate([run.fixed for run in runs])
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        return np.concatenate([run.white(id, shapes) for run in self._runs])
+
+
+def mounted(facts: Facts, design: Design) -> Facts:
+    """The facts with the design's mounting, where it states one."""
+    return facts.model_copy(update={"input_axis": design.mounting or facts.input_axis})
 
 
 def constant_columns(o: Observation, constants: Sequence[Constant]) -> FloatArray:

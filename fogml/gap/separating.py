@@ -1,7 +1,7 @@
 """The programme that pulls effects apart which runs so far can't tell from each other.
 
-The distance of a from b is the whitened length of what is left of a's response, at its size, after the best fit
-of b with any amplitude and shape and of the nominal constants under their priors::
+The distance of a from b is the whitened length of what is left of a's response, at its size, after the best
+fit of b with any amplitude and shape and of the nominal constants under their priors::
 
     d(a | b)^2 = min over A, s, c of |W (a - A b(s) - F c)|^2 + |c|^2
 
@@ -20,9 +20,9 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, EffectValue
-from fogml.gap.programme_family import Family
+from fogml.gap.programme_family import Family, Mounting
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
-from fogml.gap.rehearsal import FINE_S, Rehearsal, Stage, stage
+from fogml.gap.rehearsal import FINE_S, Rehearsal, Rehearsed, Stage, stage
 from fogml.gap.result import SeparatingRun
 from fogml.gap.shapes import Node, grid
 from fogml.runs.facts import Facts
@@ -97,8 +97,8 @@ def separating_run(
     Returns
     -------
     SeparatingRun or None
-        The programme as the text of a file for `fogml simulate`, its expected distance, and runners-up. None where
-        the best programme of the family reaches less than `LEAST_DISTANCE`.
+        The programme as the text of a file for `fogml simulate`, its expected distance, and runners-up. None
+        where the best programme of the family reaches less than `LEAST_DISTANCE`.
 
     Raises
     ------
@@ -106,8 +106,8 @@ def separating_run(
         If no effect is given, one is named twice or unknown, or the hours are too few.
     """
     on = stage(twin, noise, constants, facts=facts, columns=columns)
-    mountings = ("up", "north") if facts is None else (None,)
-    family = Family(hours, limits, mountings, power_steps)  # type: ignore[arg-type]
+    mountings: tuple[Mounting | None, ...] = ("up", "north") if facts is None else (None,)
+    family = Family(hours, limits, mountings, power_steps)
     told = members_of(on, family, members)
     tried = search(
         family,
@@ -174,11 +174,11 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
     return tuple(found)
 
 
-def distances(rehearsal: Rehearsal, members: Sequence[Member], *, refined: bool = False) -> FloatArray:
+def distances(rehearsal: Rehearsed, members: Sequence[Member], *, refined: bool = False) -> FloatArray:
     """Distance of each member (row) from each other one (column), shape (k, k).
 
-    On the diagonal stands the length of each beside the constants. `refined` fits shapes between the nodes too,
-    which is slower.
+    On the diagonal stands the length of each beside the constants. `refined` fits shapes between the nodes
+    too, which is slower.
     """
     columns = [
         rehearsal.white(m.value.id, [m.value.shape, *(draw for node in m.nodes for draw in node.draws)])
@@ -200,9 +200,7 @@ def distances(rehearsal: Rehearsal, members: Sequence[Member], *, refined: bool 
         for node in members[b].nodes:
             places = np.arange(first, first + len(node.draws))
             first += len(node.draws)
-            gains.append(
-                _gain(gram[np.ix_(places, places)], sign * gram[places, true], members[b].candidate)
-            )
+            gains.append(_gain(gram[np.ix_(places, places)], sign * gram[places, true], members[b].candidate))
         best = int(np.argmax(gains))
         gain = gains[best]
         if refined and size[true] > 0.0:
@@ -214,7 +212,7 @@ def distances(rehearsal: Rehearsal, members: Sequence[Member], *, refined: bool 
     return found
 
 
-def least_distance(rehearsal: Rehearsal, members: Sequence[Member], *, refined: bool = False) -> float:
+def least_distance(rehearsal: Rehearsed, members: Sequence[Member], *, refined: bool = False) -> float:
     """The least distance over pairs, or the length of a single member."""
     found = distances(rehearsal, members, refined=refined)
     if len(members) == 1:
@@ -259,7 +257,7 @@ def _gain(gram: FloatArray, fit: FloatArray, candidate: Candidate) -> float:
     return float(np.sum(along**2 / values[keep]))
 
 
-def _refined(rehearsal: Rehearsal, true: FloatArray, member: Member, node: Node, gain: float) -> float:
+def _refined(rehearsal: Rehearsed, true: FloatArray, member: Member, node: Node, gain: float) -> float:
     """The gain with the shape fitted from a node on, where it is free there."""
     from scipy.optimize import minimize
 
@@ -277,7 +275,11 @@ def _refined(rehearsal: Rehearsal, true: FloatArray, member: Member, node: Node,
 
     start = np.clip([node.shape[q.name] for q in free], *np.array(bounds).T)
     found = minimize(
-        lost, start, method="Nelder-Mead", bounds=bounds, options={"maxfev": _STEPS * len(free), "xatol": 1e-3}
+        lost,
+        start,
+        method="Nelder-Mead",
+        bounds=bounds,
+        options={"maxfev": _STEPS * len(free), "xatol": 1e-3},
     )
     return max(gain, -float(found.fun))
 

@@ -1,0 +1,134 @@
+"""The job of ``fogml plan``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any, ClassVar
+
+import yaml
+from pydantic import Field, field_validator
+
+from fogml.cli.settings import Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.gap.plan import Plan, plan_runs
+from fogml.gap.plan_json import plan_values, programme_file, simulation_file
+from fogml.outputs import whole_folder
+from fogml.runs.facts import Facts, facts_from
+from fogml.twin.simulate import DEFAULT_FACTS
+from fogml.twin.twin_file import load_twin, twin_names
+
+
+class PlanSettings(Settings):
+    """Settings of ``fogml plan``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("twin",)
+    want: list[str] = []
+    separate: list[list[str]] = []
+    hours: float = Field(24.0, allow_inf_nan=False)
+    criterion: str = "D"
+    runs: int = 1
+    twin: str = "nominal"
+    coldest: float = Field(-40.0, allow_inf_nan=False)
+    hottest: float = Field(60.0, allow_inf_nan=False)
+    input_axis: str | None = None
+    latitude: float = DEFAULT_FACTS.latitude or 0.0
+    power_steps: bool = True
+    out: str = "plan"
+
+    @field_validator("separate", mode="before")
+    @classmethod
+    def _from_text(cls, value: Any) -> Any:
+        """``["a,b", ...]`` as flags give them, or lists as YAML does."""
+        if not isinstance(value, list):
+            return value
+        return [
+            [part.strip() for part in group.split(",") if part.strip()] if isinstance(group, str) else group
+            for group in value
+        ]
+
+    @field_validator("criterion", mode="before")
+    @classmethod
+    def _capital(cls, value: Any) -> Any:
+        return value.upper() if isinstance(value, str) else value
+
+    def _ships(self, key: str, value: str) -> bool:
+        return super()._ships(key, value) or (key == "twin" and value in twin_names())
+
+
+def plan_and_write(settings: PlanSettings, terminal: Terminal) -> Plan:
+    """Plan, write ``programme.yaml``, ``plan.json`` and ``plan.html``, and print what is expected."""
+    twin = load_twin(settings.twin)
+    place = facts_from({"latitude": settings.latitude, "input_axis": settings.input_axis or "up"}, "settings")
+    facts = DEFAULT_FACTS.model_copy(update={"latitude": place.latitude, "input_axis": place.input_axis})
+    with whole_folder(settings.out) as folder:
+        with terminal.work("planning") as work:
+            plan = plan_runs(
+                twin,
+                settings.want,
+                separate=settings.separate,
+                hours=settings.hours,
+                criterion=settings.criterion,  # type: ignore[arg-type]
+                runs=settings.runs,
+                limits=(settings.coldest, settings.hottest),
+                facts=facts,
+                mountings=None if settings.input_axis else ("up", "north"),
+                power_steps=settings.power_steps,
+                seed=settings.seed,
+                progress=work.doing,
+            )
+        values = plan_values(plan)
+        _write(folder, settings, plan, values)
+    _print(values, terminal)
+    terminal.result(values)
+    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'plan.html'}")
+    return plan
+
+
+def _write(folder: Path, settings: PlanSettings, plan: Plan, values: dict[str, Any]) -> None:
+    from fogml.report.plan_page import plan_page
+
+    full = settings.in_full()
+    for place, run in enumerate(plan.runs):
+        (folder / programme_file(place)).write_text(run.programme.as_yaml(), encoding="utf-8")
+        simulation = _simulation(place, full.twin, run.facts)
+        (folder / simulation_file(place)).write_text(simulation, encoding="utf-8")
+    text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
+    (folder / "plan.json").write_text(text + "\n", encoding="utf-8")
+    (folder / "plan.html").write_text(plan_page(values), encoding="utf-8")
+    (folder / "config.yaml").write_text(full.yaml("plan"), encoding="utf-8")
+
+
+def _simulation(place: int, twin: str, facts: Facts) -> str:
+    """A configuration of ``fogml simulate`` that runs a programme with the plan's set-up."""
+    values = {
+        "schema": "fogml.simulate/1",
+        "programme": programme_file(place),
+        "twin": twin,
+        "facts": facts.as_dict(),
+    }
+    head = f"# Rehearse it with  fogml simulate {simulation_file(place)} --out run.csv\n"
+    return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    for run in values["runs"]:
+        terminal.say(f"{run['programme']}: {run['hours']:.3g} h, {run['summary']}")
+    if values["wanted"]:
+        rows = [
+            [e["name"], e["unit"], number(e["usual"]), number(e["prior_se"]), number(e["se"])]
+            for e in values["wanted"]
+        ]
+        header = ["wanted", "unit", "taken as", "before", "expected se"]
+        terminal.table("Expected standard errors", header, rows)
+    for item in values["separations"]:
+        told = "enough to tell" if item["enough"] else "not enough to tell"
+        what = " and ".join(item["separates"])
+        terminal.say(
+            f"{what}: distance {item['distance']:.3g}, {told} (from {values['least_distance']:g} on)"
+        )
+    hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
+    if hidden:
+        terminal.note(f"{', '.join(hidden)}: no programme within these hours tells it better than its prior")
+    for text in values["assumed"]:
+        terminal.note(f"assumed: {text}")
