@@ -116,7 +116,7 @@ def _ranked(
     chosen: Chosen, members: tuple[str, ...], explanations: Sequence[Explanation], weights: np.ndarray
 ) -> Ranked:
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
-    probability = float(weights[inside].sum())
+    probability = min(float(weights[inside].sum()), 1.0)
     without = max((e.log_posterior for e, i in zip(explanations, inside) if not i), default=-math.inf)
     with_it = max(e.log_posterior for e, i in zip(explanations, inside) if i)
     return Ranked(chosen, members, probability, with_it - without)

@@ -14,7 +14,7 @@ from fogml.gap.describe import describe_unknown
 from fogml.gap.dictionary import Group, unknown_groups
 from fogml.gap.evidence import Field
 from fogml.gap.fitting import Fit, fit_model
-from fogml.gap.starting import starting_values
+from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, EffectValue, GyroModel
 from fogml.gap.noise import Noise, noise_of, prior_of
@@ -23,6 +23,7 @@ from fogml.gap.reports import candidate_evidence, constant_fits, noise_report, r
 from fogml.gap.result import Diagnosis, Estimate, Found, HowFar, Unknown, Verdict
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.search import Search
+from fogml.gap.starting import starting_values
 from fogml.gap.structure import gaps_on_runs, stage_energies
 from fogml.gap.where import where
 from fogml.runs.run import Run
@@ -156,11 +157,8 @@ def _basis(
     p: Prepared, candidates: Mapping[str, Candidate], values: Mapping[str, float], tell: Progress
 ) -> Basis:
     return build_basis(
-        p.fit,
-        p.whiteners,
+        Frame(p.fit, p.whiteners, p.model.constants, values),
         candidates,
-        p.model.constants,
-        values,
         p.groups,
         p.model.grade,
         lambda id: tell(f"whitening candidates: {id}"),

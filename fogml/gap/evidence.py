@@ -15,10 +15,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_solve, solve_triangular
-from scipy.special import log_ndtr, logsumexp
+from scipy.special import log_ndtr
 
 from fogml.gap.basis import Basis, NodeColumns
 from fogml.gap.priors import LENGTHS
+from fogml.gap.slack import slack_columns
 from fogml.runs.run import FloatArray
 
 
@@ -45,25 +46,23 @@ class Field:
     ----------
     basis
         What there is.
-    runs
-        Runs to use; all if None.
     """
 
-    def __init__(self, basis: Basis, runs: Sequence[int] | None = None) -> None:
+    def __init__(self, basis: Basis) -> None:
         self.basis = basis
-        used = basis.by_run if runs is None else [basis.by_run[r] for r in runs]
-        gram = np.sum(used, axis=0)
         fixed = basis.constants
+        gram = basis.rows.T @ basis.rows
         inner = np.eye(len(fixed)) + gram[np.ix_(fixed, fixed)]
-        factor = np.linalg.cholesky(inner)
-        half = solve_triangular(factor, gram[fixed], lower=True)
-        self.gram: FloatArray = gram - half.T @ half
-        self.log_det = float(np.log(np.diag(factor)).sum())
+        self._factor = np.linalg.cholesky(inner)
+        self._half = solve_triangular(self._factor, gram[fixed], lower=True)
+        self.gram: FloatArray = gram - self._half.T @ self._half
+        self._rows = basis.rows
+        self._slacks: dict[int, tuple[int, ...]] = {}
         width = max((len(n.columns) for n in basis.nodes), default=1)
         self.rank = width
         # A column of zeros fills nodes of lower rank up.
         padded = len(self.gram)
-        self._index = np.full((len(basis.nodes), self.rank), padded)
+        self._index = np.full((len(basis.nodes), self.rank), -1)
         for i, node in enumerate(basis.nodes):
             self._index[i, : len(node.columns)] = node.columns
         extended = np.zeros((padded + 1, padded + 1))
@@ -72,6 +71,26 @@ class Field:
         self._fits = extended[self._index, 0]
         self.signs = np.array([n.sign for n in basis.nodes])
         self.log_weights = np.array([n.log_weights for n in basis.nodes])
+
+    def slack(self, node: int) -> tuple[int, ...]:
+        """Columns of what the form of a node's effect may differ by, a length of 1 in all."""
+        if node not in self._slacks:
+            self._slacks[node] = self._append(slack_columns(self.basis, node))
+        return self._slacks[node]
+
+    def _append(self, columns: FloatArray) -> tuple[int, ...]:
+        """Add whitened columns to the field, shape (n, k)."""
+        first, width = len(self.gram), columns.shape[1]
+        if width == 0:
+            return ()
+        fixed = self.basis.rows[:, self.basis.constants]
+        half = solve_triangular(self._factor, fixed.T @ columns, lower=True)
+        across = self._rows.T @ columns - self._half.T @ half
+        own = columns.T @ columns - half.T @ half
+        self.gram = np.block([[self.gram, across], [across.T, own]])
+        self._half = np.concatenate([self._half, half], axis=1)
+        self._rows = np.concatenate([self._rows, columns], axis=1)
+        return tuple(range(first, first + width))
 
     def condition(self, terms: Sequence[Term]) -> Conditioned:
         """The field with terms integrated out as well."""

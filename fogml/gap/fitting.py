@@ -63,7 +63,7 @@ class Fit:
         return [self._moved(step) for step in steps]
 
     def _moved(self, step: FloatArray) -> tuple[dict[str, float], tuple[EffectValue, ...]]:
-        moved = dict(zip(self.names, step))
+        moved = dict(zip(self.names, map(float, step)))
         constants = {name: value + moved[name] for name, value in self.constants.items()}
         effects = tuple(
             EffectValue(

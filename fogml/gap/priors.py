@@ -31,3 +31,9 @@ def plausible_lengths(candidate: Candidate, size: float) -> FloatArray:
     decades = np.log10(LENGTHS * size)
     outside = np.maximum(np.maximum(decades - np.log10(high), np.log10(low) - decades), 0.0)
     return np.log(LENGTH_WEIGHTS) - 0.5 * (outside / FURTHER_DECADES) ** 2
+
+
+SLACK = 0.2
+"""How much of an effect's length its true form may differ from the catalogue's."""
+SLACK_FROM = 10.0
+"""Whitened length from which that can be seen."""

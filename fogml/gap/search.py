@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import logsumexp
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate
-from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 
 MOST_EFFECTS = 4
 SIZES = (0.35, 0.4, 0.15, 0.07, 0.03)
@@ -188,7 +188,11 @@ class Search:
 
     def _terms(self, effects: Iterable[Chosen], group: tuple[str, float] | None) -> list[Term]:
         nodes, groups = self.field_.basis.nodes, self.field_.basis.groups
-        terms = [Term(nodes[c.node].columns, c.length) for c in effects]
+        terms = []
+        for c in effects:
+            terms.append(Term(nodes[c.node].columns, c.length))
+            if c.length >= SLACK_FROM:
+                terms.append(Term(self.field_.slack(c.node), SLACK * c.length))
         if group is not None:
             terms.append(Term(tuple(int(c) for c in groups[group[0]]), group[1]))
         return terms

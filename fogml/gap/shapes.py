@@ -38,10 +38,13 @@ class Node:
         Shape parameters at the node, linear ones in the middle of their range.
     draws
         Shapes to evaluate; the node's covariance is the mean of their responses' outer products.
+    frequency_hz
+        Of the line in time that the node is, if it is one.
     """
 
     shape: Mapping[str, float]
     draws: tuple[Mapping[str, float], ...]
+    frequency_hz: float | None = None
 
 
 def grid(
@@ -71,10 +74,16 @@ def grid(
     nodes = []
     for values in product(*axes):
         shape = usual | {q.name: value for q, value in zip(bent, values)}
-        # Lines are many: their linear parameters stay in the middle.
-        spread = _spread([] if any(map(_is_line, bent)) else linear, turning, grade)
-        nodes.append(Node(shape, tuple(shape | more for more in spread)))
+        draws = tuple(shape | more for more in _spread(linear, turning, grade))
+        nodes.append(Node(shape, draws, _frequency(bent, values)))
     return tuple(nodes)
+
+
+def _frequency(bent: Sequence[Quantity], values: Sequence[float]) -> float | None:
+    for quantity, value in zip(bent, values):
+        if _is_line(quantity) and quantity.unit in ("s", "Hz"):
+            return 1.0 / value if quantity.unit == "s" else value
+    return None
 
 
 def _is_angle(quantity: Quantity) -> bool:

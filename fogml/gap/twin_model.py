@@ -14,7 +14,14 @@ from fogml.gap.noise_effects import Line, noise_response
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.inputs import STAND_INS, Inputs
-from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, UNITS, NominalConstants, nominal_columns, temperature_slopes
+from fogml.twin.nominal import (
+    DELTA_WINDOW_S,
+    NAMES,
+    UNITS,
+    NominalConstants,
+    nominal_columns,
+    temperature_slopes,
+)
 from fogml.twin.plant.estimate import estimate_nodes
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import Replayer, inputs_of_run
@@ -81,7 +88,7 @@ class TwinModel:
             name=f"{self.twin.name}-diagnosed",
             description="Fitted to recordings, with the effects that a diagnosis named",
             nominal_sd=NominalConstants(**deviations),
-            noise=replace(self.twin.noise, N=noise.N, B=noise.B, K=noise.K),
+            noise=replace(self.twin.noise, N=float(noise.N), B=float(noise.B), K=float(noise.K)),
             noise_factor={"N": noise.factor_N, "B": noise.factor_B, "K": noise.factor_K},
         )
         save_twin(twin, path)
@@ -89,12 +96,19 @@ class TwinModel:
 
 def with_effects(twin: Twin, constants: Mapping[str, float], effects: tuple[EffectValue, ...]) -> Twin:
     """The twin with constants set and effects on."""
-    changed = twin.with_nominal(**constants)
+    changed = twin.with_nominal(**{name: float(value) for name, value in constants.items()})
     for value in effects:
-        known = {q.name for q in effect(value.id).shape}
-        shape = {name: number for name, number in value.shape.items() if name in known}
-        changed = changed.with_effect(value.id, value.amplitude, **shape)
+        declared = effect(value.id)
+        held = {
+            q.name: _inside(value.shape[q.name], q.limits) for q in declared.shape if q.name in value.shape
+        }
+        amplitude = _inside(value.amplitude, declared.amplitude.limits)
+        changed = changed.with_effect(value.id, amplitude, **held)
     return changed
+
+
+def _inside(value: float, limits: tuple[float, float]) -> float:
+    return float(np.clip(value, *limits))
 
 
 class TwinOnRun:

@@ -18,6 +18,8 @@ from fogml.runs.run import FloatArray
 from fogml.twin.inputs import Inputs
 
 DELTA_WINDOW_S = 64.0
+DELTA = "DeltaT"
+"""Name of the slope with DeltaT."""
 
 
 @dataclass(frozen=True)
@@ -102,13 +104,10 @@ def nominal_columns(inputs: Inputs) -> dict[str, FloatArray]:
 
 
 def temperature_slopes(inputs: Inputs, constants: NominalConstants) -> dict[str, FloatArray]:
-    """Change of the nominal output with each temperature [deg/h/degC], each of shape (n,).
-
-    DeltaT is left out: it follows a sensor's error only while that changes.
-    """
+    """Change of the nominal output with each temperature and with DeltaT [deg/h/degC], each of shape (n,)."""
     u, rate = inputs.u(), 1e-6 * inputs.input_rate_deg_h
     slope = constants.b1 + 2.0 * constants.b2 * u + rate * (constants.k1 + 2.0 * constants.k2 * u)
-    slopes = {"T": slope}
+    slopes = {"T": slope, DELTA: np.full(len(inputs), constants.m)}
     if has_gradient(inputs):
         slopes["T_in"] = np.full(len(inputs), constants.g)
         slopes["T_out"] = np.full(len(inputs), -constants.g)

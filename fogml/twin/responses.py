@@ -14,6 +14,7 @@ from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine
 from fogml.twin.inputs import Inputs
+from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
 
 _HEADINGS = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
 
@@ -52,8 +53,15 @@ def unseen(inputs: Inputs, missed: Callable[[str], FloatArray]) -> FloatArray:
     `missed` gives, by a sensor's name, its place's temperature less what it shows [degC].
     """
     total = np.zeros(len(inputs))
+    held: dict[str, FloatArray] = {}
     for name, slope in inputs.slopes.items():
-        total += slope * missed(name)
+        if name == DELTA:
+            continue
+        held[name] = missed(name)
+        total += slope * held[name]
+    if DELTA in inputs.slopes and "T" in held:
+        change = inputs.memory.difference("unseen delta", inputs.time, held["T"], DELTA_WINDOW_S)
+        total += inputs.slopes[DELTA] * change
     return total
 
 

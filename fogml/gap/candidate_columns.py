@@ -1,0 +1,127 @@
+"""A candidate as columns of the basis: nodes of its grid, whitened, on their main axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.gap.frame import Frame
+from fogml.gap.model import Candidate
+from fogml.gap.priors import plausible_lengths
+from fogml.gap.screening import Screening
+from fogml.gap.shapes import Node, grid
+from fogml.runs.run import FloatArray
+
+MOST_NODES = 16
+"""Nodes that are kept of a candidate with more: those that fit best."""
+SEARCHED_FROM = 40
+LARGEST_RANK = 4
+_KEPT = 2e-3
+LEAST_SHARE = 0.01
+"""A candidate that keeps less of its whitened length beside the constants is one with them."""
+
+
+@dataclass(frozen=True, eq=False)
+class NodeColumns:
+    """A node of a candidate's grid as columns of the basis.
+
+    Attributes
+    ----------
+    candidate
+        Id.
+    node
+        Shape parameters.
+    columns
+        Indices into the basis.
+    size
+        Amplitude that gives a whitened length of 1 beside the constants, in the card's unit.
+    usual
+        Whitened length at the usual size.
+    log_weights
+        Logarithm of the prior weight of the node among its candidate's at each of
+        `fogml.gap.priors.LENGTHS`.
+    sign
+        +1 where the first column is the response and the amplitude can't be negative, else 0.
+    """
+
+    candidate: str
+    node: Node
+    columns: tuple[int, ...]
+    size: float
+    usual: float
+    log_weights: FloatArray
+    sign: int
+
+    def placed(self, first: int, width: int) -> NodeColumns:
+        """The node with its columns' indices."""
+        return replace(self, columns=tuple(range(first, first + width)))
+
+
+def candidate_columns(
+    candidate: Candidate, frame: Frame, grade: str, screening: Screening
+) -> list[tuple[NodeColumns, FloatArray]]:
+    """The nodes of a candidate that these runs can tell from the constants, with their columns.
+
+    Columns have shape (n, rank); their outer products sum to the mean of what the node's shapes
+    can do, scaled to a length of 1 beside the constants.
+    """
+    widest = max(frame.observations, key=lambda o: float(np.ptp(o.temperature)))
+    nodes = grid(
+        candidate, grade, lambda s: widest.model.response(candidate.id, s, frame.values), frame.spans
+    )
+    count = len(nodes)
+    nodes = tuple(nodes[i] for i in screening.lines(nodes))
+    columns = frame.responses(candidate.id, [shape for node in nodes for shape in node.draws])
+    if not np.any(columns):
+        return []
+    apart = frame.runs if getattr(candidate, "drawn_per_run", False) and len(frame.runs) > 1 else []
+    widths = [len(node.draws) for node in nodes]
+    starts = np.cumsum([0, *widths])[:-1]
+    usual = abs(candidate.amplitude.typical(grade))  # type: ignore[arg-type]
+    signed = candidate.amplitude.signed or candidate.amplitude.range(grade)[0] < 0.0  # type: ignore[arg-type]
+    found = []
+    for i in _kept(columns, starts.tolist(), apart, screening):
+        part = columns[:, starts[i] : starts[i] + widths[i]]
+        if apart:
+            part = np.concatenate([_only(part, run) for run in apart], axis=1)
+        raw = float(np.sum(part**2))
+        if raw == 0.0 or np.trace(frame.beside(part, flat=True)) <= LEAST_SHARE**2 * raw:
+            continue
+        rank = LARGEST_RANK * max(len(apart), 1)
+        basis, length = _on_axes(part, frame.beside(part), widths[i], rank)
+        weights = plausible_lengths(candidate, 1.0 / length) - np.log(count)
+        one_way = basis.shape[1] == 1 and not signed
+        if one_way and basis[:, 0] @ part[:, 0] < 0.0:
+            basis = -basis
+        node = NodeColumns(candidate.id, nodes[i], (), 1.0 / length, usual * length, weights, int(one_way))
+        found.append((node, basis))
+    return found
+
+
+def _kept(
+    columns: FloatArray, starts: Sequence[int], apart: Sequence[slice], screening: Screening
+) -> Sequence[int]:
+    """The nodes that fit best, of many."""
+    if len(starts) <= SEARCHED_FROM:
+        return range(len(starts))
+    parts = [_only(columns, run) for run in apart] if apart else [columns]
+    gains = [screening.gains(part, starts) for part in parts]
+    order = [np.argsort(sum(gain))[::-1][:MOST_NODES] for gain in zip(*gains)]
+    return sorted(set(np.concatenate(order).tolist()))
+
+
+def _only(columns: FloatArray, run: slice) -> FloatArray:
+    """Columns of one run, zero on the others."""
+    part = np.zeros_like(columns)
+    part[run] = columns[run]
+    return part
+
+
+def _on_axes(part: FloatArray, beside: FloatArray, count: int, rank: int) -> tuple[FloatArray, float]:
+    """Columns on their main axes, scaled to a length of 1, and their length before."""
+    values, vectors = np.linalg.eigh(beside / count)
+    keep = np.flatnonzero(values > _KEPT * values[-1])[::-1][:rank]
+    length = float(np.sqrt(values[keep].sum()))
+    return part @ vectors[:, keep] / (np.sqrt(count) * length), length

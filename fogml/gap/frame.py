@@ -1,0 +1,127 @@
+"""The runs side by side as whitened rows: what every column of a diagnosis is brought to."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from fogml.gap.model import Constant
+from fogml.gap.observation import Observation
+from fogml.gap.run_whitener import RunWhitener
+from fogml.runs.run import FloatArray
+
+_FLAT = 1e6
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Runs, their whiteners and the constants' columns.
+
+    Attributes
+    ----------
+    observations, whiteners
+        The runs and the whitener of each.
+    constants
+        The model's constants with their priors.
+    values
+        The constants at which effects that act on inputs are linearised.
+    """
+
+    observations: Sequence[Observation]
+    whiteners: Sequence[RunWhitener]
+    constants: Sequence[Constant]
+    values: Mapping[str, float]
+
+    @cached_property
+    def runs(self) -> list[slice]:
+        """Rows of each run."""
+        edges = np.cumsum([0, *(len(o) for o in self.observations)])
+        return [slice(int(a), int(b)) for a, b in pairwise(edges)]
+
+    @cached_property
+    def spans(self) -> dict[str, float]:
+        """Longest run [s], widest span of temperature [degC] and longest row [s]."""
+        low = min(float(o.temperature.min()) for o in self.observations)
+        high = max(float(o.temperature.max()) for o in self.observations)
+        return {
+            "s": max(o.run.span_s for o in self.observations),
+            "degC": max(high - low, 1.0),
+            "sample": max(max(o.row_s, o.run.sample_s) for o in self.observations),
+        }
+
+    def white(self, columns: Sequence[FloatArray]) -> FloatArray:
+        """Columns of each run, shape (m_r, k), whitened and stacked, shape (n, k)."""
+        out = np.empty((self.runs[-1].stop, columns[0].shape[1]))
+        for part, whitener, column in zip(self.runs, self.whiteners, columns):
+            out[part] = whitener.whiten(column)
+        return out
+
+    def responses(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of a candidate at several shapes, shape (n, shapes)."""
+        return self.white(self.rows(lambda o, s: o.model.response(id, s, self.values), shapes))
+
+    def rows(
+        self,
+        of: Callable[[Observation, Mapping[str, float]], FloatArray],
+        shapes: Sequence[Mapping[str, float]],
+    ) -> list[FloatArray]:
+        """Series over the samples of each run, averaged to rows, shape (m_r, shapes)."""
+        return [np.column_stack([o.averaged(of(o, shape)) for shape in shapes]) for o in self.observations]
+
+    @cached_property
+    def residual(self) -> FloatArray:
+        """Recorded less replayed at the priors' means, whitened, shape (n, 1)."""
+        means = {c.name: c.mean for c in self.constants}
+        return self.white(
+            [(o.recorded - o.averaged(o.model.output(means)))[:, None] for o in self.observations]
+        )
+
+    @cached_property
+    def fixed(self) -> FloatArray:
+        """Responses to one prior standard deviation of each constant, whitened, shape (n, constants)."""
+        return self.white([constant_rows(o, self.constants) for o in self.observations])
+
+    def beside(self, columns: FloatArray, *, flat: bool = False) -> FloatArray:
+        """Inner products of whitened columns beside the constants, shape (k, k).
+
+        With the constants' own priors, or with flat ones.
+        """
+        cross = self.fixed.T @ columns
+        inverse = self._inverses[1 if flat else 0]
+        return np.asarray(columns.T @ columns - cross.T @ inverse @ cross)
+
+    @cached_property
+    def _inverses(self) -> tuple[FloatArray, FloatArray]:
+        gram = self.fixed.T @ self.fixed
+        own = np.linalg.inv(gram + np.eye(len(gram)))
+        flat = np.linalg.inv(gram + np.eye(len(gram)) / _FLAT)
+        return np.asarray(own, dtype=np.float64), np.asarray(flat, dtype=np.float64)
+
+
+def constant_rows(o: Observation, constants: Sequence[Constant]) -> FloatArray:
+    """Rows of the response to one prior standard deviation of each constant, shape (m, constants)."""
+    held = o.model.columns()
+    return np.column_stack(
+        [c.sd * o.averaged(held[c.name]) if c.name in held else np.zeros(len(o)) for c in constants]
+    )
+
+
+def main_axes(gram: FloatArray, share: float) -> FloatArray:
+    """What brings columns of given inner products to their main axes, a length of 1 in all; shape (k, axes).
+
+    Axes with less than `share` of the largest are left out.
+    """
+    scale = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    used = np.flatnonzero(scale > 1e-3 * scale.max(initial=0.0))
+    if len(used) == 0:
+        return np.empty((len(gram), 0))
+    scaled = gram[np.ix_(used, used)] / np.outer(scale[used], scale[used])
+    values, vectors = np.linalg.eigh(scaled)
+    keep = np.flatnonzero(values > share * values[-1])[::-1]
+    axes = np.zeros((len(gram), len(keep)))
+    axes[used] = vectors[:, keep] / scale[used, None] / np.sqrt(values[keep].sum())
+    return axes

@@ -1,0 +1,50 @@
+"""What an effect's true form may differ from the catalogue's by.
+
+No gyro follows a catalogue's equation to the last per cent. Without room for that, the rest of a
+large effect would be given another effect's name. The room is made of the response times powers of
+temperature, of the response lagged, and of the candidate's other shapes.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fogml.gap.frame import main_axes
+from fogml.gap.observation import Observation
+from fogml.runs.run import FloatArray
+from fogml.twin.memory import Memory
+
+if TYPE_CHECKING:
+    from fogml.gap.basis import Basis
+
+LAGS_S = (60.0, 300.0, 1200.0)
+MOST_COLUMNS = 8
+MOST_DRAWS = 4
+
+
+def slack_columns(basis: Basis, node: int) -> FloatArray:
+    """Whitened columns, shape (n, k), beside the node's own, a length of 1 in all beside the constants."""
+    chosen = basis.nodes[node]
+    frame = basis.frame
+    draws = chosen.node.draws[:: -(-len(chosen.node.draws) // MOST_DRAWS)]
+    parts = []
+    for o in frame.observations:
+        responses = [o.averaged(o.model.response(chosen.candidate, shape, frame.values)) for shape in draws]
+        parts.append(np.column_stack([column for r in responses for column in _varied(o, r)]))
+    others = [n.columns for n in basis.nodes if n.candidate == chosen.candidate and n is not chosen]
+    neighbours = basis.rows[:, [c for columns in others for c in columns]]
+    columns = np.concatenate([frame.white(parts), neighbours], axis=1)
+    own = basis.rows[:, list(chosen.columns)]
+    columns = columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0]
+    axes = main_axes(frame.beside(columns), 1e-2)[:, :MOST_COLUMNS]
+    return np.asarray(columns @ axes)
+
+
+def _varied(o: Observation, response: FloatArray) -> list[FloatArray]:
+    t = o.temperature
+    half = max(0.5 * float(np.ptp(t)), 1.0)
+    u = (t - 0.5 * (float(t.max()) + float(t.min()))) / half
+    lagged = [Memory().lag("lag", o.time, response, tau) - response for tau in LAGS_S]
+    return [response * u, response * u**2, *lagged]
