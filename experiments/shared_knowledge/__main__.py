@@ -111,8 +111,9 @@ def _said(rows: list[dict]) -> list[str]:
     return [
         f"To come within 10 % of what the longest run leaves, the median unit needs {needed('alone'):g} h "
         f"alone and {needed('drawn'):g} h drawn to its fleet. Of the odd units, the worst that the fleet did "
-        f"from 2 h on was {worst:.2f} times what the unit's own run alone left. An odd unit that its run tells is "
-        "left to that run, and so is any unit whose run covers less than a quarter of the fleet's temperatures.",
+        f"from 2 h on was {worst:.2f} times what the unit's own run alone left. An odd unit that its run "
+        "tells is left to that run, and so is any unit whose run covers less than a quarter of the fleet's "
+        "temperatures.",
     ]
 
 
