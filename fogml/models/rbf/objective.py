@@ -140,6 +140,11 @@ class Objective:
         place = self._linear.device, self._linear.dtype
         return self.rows, self.dimensions, self._linear_columns, self._evidence, *place
 
+    @property
+    def device_type(self) -> str:
+        """Where it is worked out: ``cpu``, ``cuda``."""
+        return str(self._linear.device.type)
+
     def __call__(self, shape: Shape) -> Value:
         """Objective and gradient at a shape; infinite where the normal equations break down."""
         together = joined()

@@ -23,7 +23,9 @@ Result = TypeVar("Result")
 _here = threading.local()
 _MOST_VALUES = 1 << 27
 # Numbers of one batch's design matrices: 1 GiB in float64.
-_KEPT = 4
+_MOST_IN_CACHE = 1 << 16
+# On a CPU a batch stays in the cache: 512 KiB.
+_KEPT, _KEPT_IN_CACHE = 4, 128
 
 
 @dataclass
@@ -94,7 +96,8 @@ class Together:
         for group in groups.values():
             first = group[0]
             per_network = first.objective.rows * (len(first.shape.centres) + first.objective.dimensions + 1)
-            step = max(1, _MOST_VALUES // per_network)
+            most = _MOST_IN_CACHE if first.objective.device_type == "cpu" else _MOST_VALUES
+            step = max(1, most // per_network)
             for start in range(0, len(group), step):
                 part = group[start : start + step]
                 # In one order, so that what was stacked is found again.
@@ -109,7 +112,8 @@ class Together:
 
         key = tuple(id(objective) for objective in objectives)
         if key not in self._stacks:
-            while len(self._stacks) >= _KEPT:
+            kept = _KEPT_IN_CACHE if objectives[0].device_type == "cpu" else _KEPT
+            while len(self._stacks) >= kept:
                 del self._stacks[next(iter(self._stacks))]
             self._stacks[key] = Stack(objectives)
         return self._stacks[key]
