@@ -1,0 +1,1 @@
+"""The multi-point temperature paper, checked."""
