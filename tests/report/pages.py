@@ -8,10 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from fogml.report import certificate, compare_page, index_page, inspect_page, noise_page, train_page
+from fogml.report import (
+    certificate,
+    compare_page,
+    gap_page,
+    index_page,
+    inspect_page,
+    noise_page,
+    train_page,
+)
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
+from tests.report.diagnoses import diagnosis
 from tests.report.judgements import judgement
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "rect"}
@@ -81,6 +90,7 @@ def every_page() -> dict[str, str]:
         "compare": compare_page(models, {"joint": "needs rate runs"}),
         "inspect": inspect_page([recorded_run(), recorded_run(3000)]),
         "noise": noise_page(noise_values()),
+        "gap": gap_page(diagnosis()),
         "index": index_page({axis: judgement() for axis in "xyz"}),
         "certificate": certificate(judgement(5), "2026-03-02"),
     }

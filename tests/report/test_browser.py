@@ -15,7 +15,7 @@ pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no Chromium at {CHROMIUM}"),
 ]
-KINDS = ("train", "train of five", "compare", "inspect", "noise", "index", "certificate")
+KINDS = ("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate")
 NAMED_BUTTONS = {"Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes", "Download plot"}
 pages = cache(every_page)
 

@@ -19,7 +19,7 @@ from fogml.runs.run import Run
 from tests.report.judgements import judged_run, judgement, linear_judgement
 from tests.report.pages import Page, every_page, noise_values, recorded_run
 
-KINDS = ("train", "train of five", "compare", "inspect", "noise", "index", "certificate")
+KINDS = ("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate")
 pages = cache(every_page)
 
 

@@ -1,0 +1,211 @@
+"""The page of a diagnosis: the verdict at one look, the right figures, and honest words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from fogml.gap.result import HowFar
+from fogml.gap.where_result import Where
+from fogml.report import gap_page
+from fogml.report.gap_page import MOST_RUNS_DRAWN
+from fogml.report.gap_words import probability_words, unit_words, with_error
+from fogml.twin.registry import effect, effects
+from tests.report.diagnoses import diagnosis, every_diagnosis, hysteresis, series
+from tests.report.pages import Page
+
+VERDICTS = ("explained", "ambiguous", "partly_explained", "unknown", "no_gap")
+
+
+@cache
+def page(verdict: str) -> Page:
+    return Page(gap_page(every_diagnosis()[verdict]))
+
+
+def tiles(read: Page) -> str:
+    """What stands between the heading and the first section: the first screen."""
+    return read.text[: read.text.index("Which effect")]
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_one_look_tells_verdict_cause_confidence_and_closing(verdict: str) -> None:
+    first = tiles(page(verdict))
+    assert {
+        "explained": "Explained. Missing from the twin: Thermal hysteresis of the bias",
+        "ambiguous": "Ambiguous. Missing from the twin: Thermal hysteresis of the bias or Lag of the",
+        "partly_explained": "Partly explained. Missing from the twin: Thermal hysteresis of the bias, and",
+        "unknown": "Unknown: the gap is there, and no candidate explains it",
+        "no_gap": "No gap: the recalibrated twin and the gyro agree within the noise",
+    }[verdict] in first
+    assert {"unknown": "Confidence 91 %", "no_gap": "Likeliest effect"}.get(
+        verdict, "Confidence 97 %"
+    ) in first
+    assert {"unknown": "Closed 0 %", "no_gap": "Closed –"}.get(
+        verdict, "Closed 98 % 90 %: 96 … 100 %"
+    ) in first
+    if verdict in ("unknown", "partly_explained"):
+        assert "follows the direction of temperature change" in first
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_every_axis_has_a_unit_and_every_figure_words(verdict: str) -> None:
+    read = page(verdict)
+    plots = [a for a in read.of("div") if "plot" in (a.get("class") or "").split()]
+    assert len(plots) == len(read.figures) >= 7
+    assert all(len(plot["aria-label"] or "") > 40 for plot in plots)
+    for figure in read.figures:
+        axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)]
+        told = [axis["title"]["text"] for axis in axes if axis.get("title", {}).get("text")]
+        assert told and all("[" in title for title in told)
+
+
+@pytest.mark.parametrize("verdict", VERDICTS)
+def test_nothing_depends_on_colour_alone(verdict: str) -> None:
+    for figure in page(verdict).figures:
+        looks: dict[tuple[str, ...], str] = {}
+        for trace in figure["data"]:
+            if trace["type"] == "bar":
+                look = (trace.get("yaxis", "y"), "bar", str(trace["marker"].get("pattern", {}).get("shape")))
+            elif trace.get("showlegend") is False or trace.get("fill"):
+                continue
+            else:
+                line, marker = trace.get("line", {}), trace.get("marker", {})
+                look = (
+                    trace.get("yaxis", "y"),
+                    trace["mode"],
+                    f"{line.get('dash', 'solid')}{line.get('width')}",
+                    str(marker.get("symbol")),
+                )
+            assert looks.setdefault(look, trace["name"]) == trace["name"]
+
+
+def test_nothing_is_loaded_and_no_name_becomes_markup() -> None:
+    name = "</script><script>alert(1)</script>.csv"
+    html = gap_page(diagnosis(fit=(name,), series=(series(name), series("c.csv", "held_out"))))
+    assert "<script>alert" not in html and name in Page(html).text
+    for _, attributes in Page(html).elements:
+        assert "src" not in attributes
+        assert not re.match(r"(?i)(\w+:)?//", attributes.get("href") or "")
+    assert len(html) < 7_000_000
+
+
+def test_figures_of_the_diagnosis_are_on_the_page() -> None:
+    text = page("explained").text
+    for told in ("2.31", "0.0361", "0.00790", "0.00750", "98 %", "0.0214 ± 0.0011", "9.12 ± 0.43 °C"):
+        assert told in text
+    assert "agree in sign and size (2 runs)" in text
+    assert "5400 9000 60.0 min 0.0330" in text
+    assert "Place of the temperature sensors" in text and "Nothing is said of these" in text
+    assert "Earth rate is known." in text
+    assert "a.csv, b.csv and c.csv: synthetic: programme cycle" in text
+    assert "FOG-0417, axis x" in text
+
+
+def test_look_alikes_come_with_what_separates_them() -> None:
+    text = page("ambiguous").text
+    assert effect("thermal_hysteresis").confused_with["sensor_lag"] in text
+    assert "two ramp rates over one range" in text and "11.5 h" in text and "soak at 25 degC for 1 h" in text
+    assert "What looks alike" not in page("explained").text
+
+
+def test_segments_are_drawn_where_they_are() -> None:
+    drawn = [
+        trace
+        for figure in page("explained").figures
+        for trace in figure["data"]
+        if trace.get("name") == "over the floor"
+    ]
+    assert len(drawn) == 1
+    assert drawn[0]["x"][:2] == [1.5, 2.5]
+
+
+def test_a_gap_in_time_is_drawn_as_recorded_less_replayed() -> None:
+    wanted = series("c.csv", "held_out")
+    figure = next(f for f in page("explained").figures if any(t.get("name") == "recorded" for t in f["data"]))
+    held = {t.get("name"): t for t in figure["data"]}
+    gap = decoded(held["gap, recalibrated"]["y"])
+    np.testing.assert_allclose(gap, decoded(held["recorded"]["y"]) - decoded(held["recalibrated twin"]["y"]))
+    np.testing.assert_allclose(gap, wanted.gap_recalibrated)
+
+
+def decoded(values: object) -> np.ndarray:
+    """Numbers of a trace: plotly writes arrays in base 64."""
+    if isinstance(values, dict):
+        import base64
+
+        return np.frombuffer(base64.b64decode(values["bdata"]), dtype=values["dtype"])
+    return np.asarray(values, dtype=np.float64)
+
+
+def test_what_was_not_held_out_is_said_first() -> None:
+    kept = Page(gap_page(diagnosis(held_out=("b.csv",), held_out_is_part=True)))
+    assert "No run was held out. The last stretch of b.csv was kept back" in tiles(kept)
+    none = Page(gap_page(diagnosis(held_out=(), how_far=(), series=(series("a.csv"),))))
+    assert "No run could be held out" in tiles(none) and "nothing was held out" in tiles(none)
+
+
+def test_doubts_are_warned_of() -> None:
+    base = diagnosis(
+        found=(hysteresis(consistent=False),), unusable=(("short.csv", "short.csv: lasts 100 s"),)
+    )
+    noise = replace(
+        base.noise, white=False, failed=("the variance of means over 80 s is 3 times as expected",)
+    )
+    far = (HowFar("c.csv", 100.0, 2.3, 0.01, 0.01, 0.05, None, None, "at the floor"),)
+    first = tiles(Page(gap_page(replace(base, noise=noise, how_far=far))))
+    assert "does not show with the same sign and size on every run" in first
+    assert "short.csv was not used: lasts 100 s." in first
+    assert "The noise check fails" in first and "over 80 s is 3 times" in first
+    assert "it overstates slow noise" in first
+    assert "Mind:" not in tiles(page("explained"))
+
+
+def test_of_several_held_out_runs_the_worst_is_told() -> None:
+    (far,) = diagnosis().how_far
+    both = (far, replace(far, run="d.csv", closed=0.61, closed_ci90=(0.5, 0.7)))
+    first = tiles(Page(gap_page(diagnosis(how_far=both, held_out=("c.csv", "d.csv")))))
+    assert "Closed 61 % 90 %: 50 … 70 %; the least of 2 held-out runs: d.csv" in first
+
+
+def test_of_many_runs_those_with_most_of_the_gap_are_drawn() -> None:
+    names = tuple(f"run-{i:02d}.csv" for i in range(12))
+    quiet = replace(series(names[3]), gap_recalibrated=np.zeros(240))
+    every = tuple(quiet if name == names[3] else series(name) for name in names)
+    read = Page(gap_page(diagnosis(fit=names, series=(*every, series("c.csv", "held_out")), where=Where())))
+    assert read.text.count(", fitted on") == MOST_RUNS_DRAWN - 1
+    assert f"{names[3]}, fitted on" not in read.text and "Not drawn, with less of the gap" in read.text
+
+
+def test_an_effect_of_another_model_needs_no_card() -> None:
+    found = hysteresis(("own_effect", "other_effect"), effect="own_effect")
+    text = Page(gap_page(diagnosis("ambiguous", (found,)))).text
+    assert "Own effect" in text and "Other effect" in text and "the cards name no simple test" in text
+
+
+def test_every_unit_of_the_catalogue_is_written_for_people() -> None:
+    for declared in effects().values():
+        for quantity in (declared.amplitude, *declared.shape):
+            words = unit_words(quantity.unit)
+            assert "degC" not in words and "sqrt" not in words and words != "1"
+
+
+@given(st.floats(0.0, 1.0 + 1e-12))
+def test_a_probability_is_never_told_as_certainty(probability: float) -> None:
+    words = probability_words(probability)
+    share = float(re.findall(r"\d+", words)[0])
+    assert 1.0 <= share <= 99.0
+    assert words.endswith(" %") and abs(share - 100.0 * probability) <= 1.0 + 1e-9
+
+
+@given(st.floats(-1e3, 1e3), st.floats(1e-5, 1e2))
+def test_a_value_and_its_error_are_rounded_alike(value: float, se: float) -> None:
+    told = with_error(value, se).replace("−", "-")
+    first, second = (float(part) for part in told.split(" ± "))
+    assert second == pytest.approx(se, rel=0.06)
+    assert abs(first - value) <= 0.06 * se
