@@ -21,7 +21,6 @@ from fogml.fleet.tasks import DONE, Task
 from fogml.outputs import whole_folder
 from fogml.validation.report_json import finite_json
 
-
 _SHOWN = 40
 
 
