@@ -16,6 +16,7 @@ from fogml.report.gap_words import (
     verdict_words,
 )
 from fogml.report.page import Drawing, render
+from fogml.report.tables import Table
 from fogml.report.words import duration, listed, number, plural
 
 MOST_RUNS_DRAWN = 8
@@ -154,32 +155,27 @@ def _agreement(found: Diagnosis, names: dict[str, str]) -> str:
 
 @dataclass(frozen=True)
 class Separating:
-    """The separating run in words."""
+    """The separating run as the page shows it."""
 
-    separates: str
+    aim: str
+    steps: tuple[str, ...]
     programme: str
     facts: list[tuple[str, str]]
-    steps: tuple[str, ...]
-    alternatives: list[str]
+    alternatives: Table | None
 
 
 def _separating(found: Diagnosis, names: dict[str, str]) -> Separating | None:
     run = found.separating_run
     if run is None:
         return None
+    told = [title_of(id, names) for id in run.separates]
+    aim = f"To tell apart: {listed(told, 6)}." if len(told) > 1 else f"To show: {''.join(told)}."
     facts = [
-        ("lasts", f"{number(run.hours)} h"),
-        ("expected distance", f"{number(run.distance)} standard deviations"),
+        ("lasts", duration(3600.0 * run.hours)),
+        ("expected distance", f"{number(run.distance, 2)} standard deviations of the noise"),
     ]
-    others = [
-        ", ".join(
-            f"{key.replace('_', ' ')} {number(v) if isinstance(v, float) else v}" for key, v in other.items()
-        )
-        for other in run.alternatives
-    ]
-    return Separating(
-        listed([title_of(id, names) for id in run.separates], 6), run.programme, facts, run.steps, others
-    )
+    others = gap_tables.alternatives_table(run.alternatives) if run.alternatives else None
+    return Separating(aim, run.steps, run.programme, facts, others)
 
 
 def _noise_words(found: Diagnosis) -> str:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import combinations
+from typing import Any
 
 from fogml.gap.result import Diagnosis, Found
 from fogml.report.gap_words import (
@@ -195,6 +196,27 @@ def regimes_table(found: Diagnosis) -> Table:
             ("90 % interval", "", "figure"),
         ),
         rows=tuple(rows),
+    )
+
+
+def alternatives_table(alternatives: Sequence[Mapping[str, Any]]) -> Table:
+    """Other programmes that were weighed as the next run."""
+    return Table(
+        columns=(
+            ("Programme", "", "text"),
+            ("Lasts", "", "figure"),
+            ("Expected distance", "", "figure"),
+        ),
+        rows=tuple(
+            Row(
+                (
+                    str(other.get("summary") or other.get("programme") or MISSING),
+                    duration(3600.0 * other["hours"]) if "hours" in other else MISSING,
+                    number(other.get("distance"), 2),
+                )
+            )
+            for other in alternatives
+        ),
     )
 
 
