@@ -158,10 +158,11 @@ def every_diagnosis() -> dict[str, Diagnosis]:
     pair = hysteresis(("thermal_hysteresis", "sensor_lag"))
     separating = SeparatingRun(
         ("thermal_hysteresis", "sensor_lag"),
-        "two ramp rates over one range",
+        "schema: fogml.programme/1\nname: separating-run\n",
         6.2,
         11.5,
-        ("soak at 25 degC for 1 h",),
+        ("soak at 25 degC for 1 h", "ramp to 60 degC at 2 degC/min"),
+        ({"summary": "one ramp rate", "hours": 9.0, "programme": "name: b\n", "distance": 4.1},),
     )
     at_floor = (HowFar("c.csv", 100.0, 2.31, 0.0076, 0.0076, FLOOR, None, None, "at the floor"),)
     return {

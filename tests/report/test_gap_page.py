@@ -110,7 +110,8 @@ def test_figures_of_the_diagnosis_are_on_the_page() -> None:
 def test_look_alikes_come_with_what_separates_them() -> None:
     text = page("ambiguous").text
     assert effect("thermal_hysteresis").confused_with["sensor_lag"] in text
-    assert "two ramp rates over one range" in text and "11.5 h" in text and "soak at 25 degC for 1 h" in text
+    assert "11.5 h" in text and "6.2 standard deviations" in text and "soak at 25 degC for 1 h" in text
+    assert "schema: fogml.programme/1" in text and "one ramp rate 9.00 h 4.1" in text
     assert "What looks alike" not in page("explained").text
 
 
