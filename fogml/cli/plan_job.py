@@ -11,8 +11,9 @@ from pydantic import Field, field_validator
 
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
-from fogml.gap.plan import Plan, plan_runs
+from fogml.gap.plan import plan_runs
 from fogml.gap.plan_json import plan_values, programme_file, simulation_file
+from fogml.gap.plan_result import Plan
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.simulate import DEFAULT_FACTS
@@ -129,6 +130,6 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         )
     hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
     if hidden:
-        terminal.note(f"{', '.join(hidden)}: no programme within these hours tells it better than its prior")
+        terminal.note(f"{', '.join(hidden)}: does not show at its usual size, or no better than beforehand")
     for text in values["assumed"]:
         terminal.note(f"assumed: {text}")

@@ -21,138 +21,18 @@ from fogml.gap.fisher import (
     unknowns,
     usual_value,
 )
+from fogml.gap.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
 from fogml.gap.programme_family import Design, Family, Mounting
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, Rehearsed, Stage, Together, mounted, stage
-from fogml.gap.separating import LEAST_DISTANCE, Member, distances, least_distance, log_distance, members_of
+from fogml.gap.separating import Member, distances, least_distance, log_distance, members_of
 from fogml.runs.facts import Facts
-from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.nominal import NAMES
-from fogml.twin.programme import Programme
 from fogml.twin.twin import Twin
 
 MOST_PLANNED = 8
 _EXACT = "table rate and clock are exact, and the plant, the noise and the constants' priors are the twin's"
-
-
-@dataclass(frozen=True)
-class ExpectedError:
-    """What a plan promises of one wanted parameter.
-
-    Attributes
-    ----------
-    name, unit
-        A constant, or ``effect.amplitude`` or ``effect.parameter``.
-    usual
-        Its value in the plan.
-    prior
-        Standard deviation beforehand; None for an amplitude.
-    se
-        Expected standard error; None where the runs don't show it.
-    """
-
-    name: str
-    unit: str
-    usual: float
-    prior: float | None
-    se: float | None
-
-
-@dataclass(frozen=True, eq=False)
-class Separation:
-    """How far apart a plan pulls effects: least distance, and of each (row) from each other (column)."""
-
-    members: tuple[str, ...]
-    distance: float
-    pairs: FloatArray
-
-    @property
-    def enough(self) -> bool:
-        """Whether they can be told apart."""
-        return self.distance >= LEAST_DISTANCE
-
-
-@dataclass(frozen=True, eq=False)
-class Outlook:
-    """What runs are expected to tell.
-
-    Attributes
-    ----------
-    errors
-        Of the wanted parameters.
-    correlations
-        Between them, shape (wanted, wanted).
-    separations
-        Of the groups to be told apart.
-    """
-
-    errors: tuple[ExpectedError, ...]
-    correlations: FloatArray
-    separations: tuple[Separation, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedRun:
-    """One run of a plan.
-
-    Attributes
-    ----------
-    programme, summary
-        What to do, and in words.
-    facts
-        Of the set-up, the mounting among them.
-    outlook
-        After this run and those before it.
-    alternatives
-        Other programmes in its place, with their summaries and outlooks.
-    rehearsal
-        A rehearsal of it.
-    """
-
-    programme: Programme
-    summary: str
-    facts: Facts
-    outlook: Outlook
-    alternatives: tuple[tuple[Programme, str, Outlook], ...]
-    rehearsal: Rehearsal
-
-
-@dataclass(frozen=True, eq=False)
-class Plan:
-    """The result of `plan_runs`.
-
-    Attributes
-    ----------
-    twin, grade
-        Whose responses were planned with.
-    criterion
-        ``D`` or ``A``.
-    hours
-        Longest time of a run [h].
-    limits
-        Lowest and highest temperature [degC].
-    noise
-        Of the gyro.
-    runs
-        In order; the last one's outlook is the plan's.
-    assumed
-        What was assumed, in words.
-    """
-
-    twin: str
-    grade: str
-    criterion: Criterion
-    hours: float
-    limits: tuple[float, float]
-    noise: NoiseModel
-    runs: tuple[PlannedRun, ...]
-    assumed: tuple[str, ...]
-
-    @property
-    def outlook(self) -> Outlook:
-        """What is expected of all runs together."""
-        return self.runs[-1].outlook
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.gap.plan import Outlook, Plan, PlannedRun
+from fogml.gap.plan_result import Outlook, Plan, PlannedRun
 from fogml.gap.rehearsal import COARSE_S, FINE_S
 from fogml.gap.separating import LEAST_DISTANCE
 from fogml.twin.programme import Programme
@@ -78,7 +78,7 @@ def _outlook(outlook: Outlook) -> dict[str, Any]:
                 "usual": e.usual,
                 "prior_se": e.prior,
                 "se": e.se,
-                "shown": e.se is not None and (e.prior is None or e.se < 0.9 * e.prior),
+                "shown": e.shown,
             }
             for e in outlook.errors
         ],

@@ -1,0 +1,73 @@
+"""``fogml plan``: what it writes, and what it refuses."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+import yaml
+
+from fogml.runs.reading import read_run
+from fogml.twin.programme import load_programme
+
+
+def test_plan_then_simulate(tmp_path, invoke, invoke_json, monkeypatch):
+    out = tmp_path / "plan"
+    ask = ("plan", "--want", "k1", "--separate", "thermal_hysteresis,stress_relaxation", "--hours", "5")
+    values = invoke_json(*ask, "--criterion", "a", "--input-axis", "up", "-o", out)
+    assert values["schema"] == "fogml.plan/1" and values == json.loads((out / "plan.json").read_text())
+    assert values["criterion"] == "A" and values["total_hours"] <= 5.0
+    (wanted,) = values["wanted"]
+    assert (
+        wanted["name"] == "k1" and wanted["unit"] == "ppm/degC" and wanted["se"] < wanted["prior_se"] == 50.0
+    )
+    (apart,) = values["separations"]
+    assert apart["distance"] == min(pair["distance"] for pair in apart["pairs"])
+    assert "synthetic" in values["data"] and values["assumed"]
+    programme = load_programme(out / "programme.yaml")
+    assert programme.total_hours == pytest.approx(values["runs"][0]["hours"])
+    profile = values["runs"][0]["profile"]
+    assert profile["set_point"]["time_s"][-1] == pytest.approx(3600.0 * programme.total_hours)
+    page = (out / "plan.html").read_text()
+    assert "Expected standard errors" in page and "http-equiv" in page and 'src="http' not in page
+    run = tmp_path / "run.csv"
+    invoke(
+        "simulate", "--programme", out / "programme.yaml", "--twin", "nominal", "--sample", "60", "-o", run
+    )
+    first = read_run(run)
+    # The simulation's own file states the set-up as well.
+    config = yaml.safe_load((out / "simulation.yaml").read_text())
+    assert config["facts"]["input_axis"] == "up"
+    monkeypatch.chdir(out)
+    invoke("simulate", "simulation.yaml", "--sample", "60", "-o", tmp_path / "again.csv")
+    assert (read_run(tmp_path / "again.csv").gyro == first.gyro).all()
+
+
+def test_the_configuration_gives_the_same_plan_again(tmp_path, invoke_json, invoke):
+    config = tmp_path / "plan.yaml"
+    config.write_text("want: [coil_expansion]\nhours: 3.8\nruns: 2\n")
+    values = invoke_json("plan", "--config", config, "-o", tmp_path / "one")
+    assert [run["programme"] for run in values["runs"]] == ["programme.yaml", "programme-2.yaml"]
+    assert values == invoke_json("plan", "--config", tmp_path / "one" / "config.yaml", "-o", tmp_path / "two")
+    # It is k1 under another name, and the page says that it does not show.
+    assert not values["wanted"][0]["shown"]
+    assert "No programme within these hours shows" in (tmp_path / "one" / "plan.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "nothing is asked for"),
+        (("--want", "thermal_histeresis"), "did you mean 'thermal_hysteresis'"),
+        (("--want", "k1", "--hours", "1"), "the shortest programme"),
+        (("--want", "k1", "--hours", "nan"), "hours"),
+        (("--want", "k1", "--criterion", "X"), "D or A was expected"),
+        (("--want", "k1", "--twin", "nothing.yaml"), "nothing.yaml"),
+        (("--want", "k1", "--coldest", "40"), "temperature limits"),
+        (("--want", "k1", "--input-axis", "sideways"), "input_axis"),
+    ],
+)
+def test_faults(tmp_path, invoke, arguments, message):
+    out = tmp_path / "plan"
+    result = invoke("plan", *arguments, "-o", out, status=2)
+    assert message in result.stderr and not out.exists()
