@@ -27,7 +27,7 @@ class RunSection:
     """A run as the page shows it."""
 
     name: str
-    held_out: bool
+    role: str
     drawing: Drawing
 
 
@@ -129,11 +129,12 @@ def _drawn(found: Diagnosis) -> list[RunSection]:
     held = [s for s in found.series if s.role == "held_out"]
     fit = [s for s in found.series if s.role == "fit"]
     kept = sorted(fit, key=lambda s: -energy[s.run])[: max(MOST_RUNS_DRAWN - len(held), 2)]
+    held_words = "its last stretch, kept back" if found.held_out_is_part else "held out"
     shown = [*held[:MOST_RUNS_DRAWN], *(s for s in fit if s in kept)]
     return [
         RunSection(
             name=s.run,
-            held_out=s.role == "held_out",
+            role="fitted on" if s.role == "fit" else held_words,
             drawing=figures_gap.run_in_time(
                 s, [g for g in found.where.segments if s.role == "fit" and g.run == s.run], named
             ),

@@ -17,6 +17,8 @@ from fogml.report.words import MISSING, number, plural
 
 _FAR_UNDER_FLOOR = 0.6
 """Rms over the floor under which the floor is in doubt."""
+_WORSE = 1.05
+"""Rms after over before from which what was found does harm."""
 
 
 def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
@@ -101,6 +103,11 @@ def warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
     elif not found.how_far:
         told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
     for item in found.how_far:
+        if found.named and item.after > _WORSE * item.recalibrated:
+            told.append(
+                f"What was found makes the replay of {item.run} worse: {number(item.after)} deg/h where the "
+                f"recalibrated twin leaves {number(item.recalibrated)}. Doubt it there."
+            )
         if item.recalibrated < _FAR_UNDER_FLOOR * item.floor:
             told.append(
                 f"On {item.run} the recalibrated twin leaves {number(item.recalibrated)} deg/h where the "

@@ -164,6 +164,8 @@ def test_doubts_are_warned_of() -> None:
     assert "short.csv was not used: lasts 100 s." in first
     assert "The noise check fails" in first and "over 80 s is 3 times" in first
     assert "it overstates slow noise" in first
+    (worse,) = (replace(item, after=0.05) for item in base.how_far)
+    assert "makes the replay of c.csv worse: 0.0500" in tiles(Page(gap_page(replace(base, how_far=(worse,)))))
     assert "Mind:" not in tiles(page("explained"))
 
 
