@@ -3,8 +3,9 @@
 Candidates are scored on averages of the training runs: blocks of their time are held out, and
 where there are several, each run in turn as well. What is held out is limited to the box of the
 rows fitted to, as in use. The rule that picks one is `fogml.models.score.choose`: a larger
-candidate than the standard form only if it beats it beyond noise, a smaller one if it is no
-worse, and no compensation where nothing beats the mean on runs left out.
+candidate than the standard form only if it beats it beyond noise (and, where the runs hold fewer
+than three rates of temperature, by a multiple of what noise costs a fit), a smaller one if it is
+no worse, and no compensation where nothing beats the mean on runs left out.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ class AutoModel(DriftModel):
             if self.progress is not None:
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
-        self.choice_ = choose(scores)
+        self.choice_ = choose(scores, rates_told=trial.rates >= RATES_THAT_TELL)
         self.chosen_ = fit_candidate(self.choice_.candidate, group, self.seed)
         notes = (*self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from experiments.default_rates import __main__ as default_rates
 from experiments.synthetic_world import World, cycle, programme
 from fogml.features.parse import parse_features
 from fogml.models import trial
@@ -22,6 +23,13 @@ WORLD = World(noise=0.05)
 
 def world_run(rate: float, seed: int, world: World = WORLD) -> tuple[Run, np.ndarray]:
     return world.run(cycle(rate, SAMPLE_S), SAMPLE_S, seed, f"{rate}-{seed}.csv")
+
+
+def errors_at_other_rates(unit: World, run: Run, candidate: Candidate) -> np.ndarray:
+    """Errors of a candidate fitted to a run against the noise-free truth at other rates [deg/h]."""
+    sample_s = run.sample_s
+    tests = [unit.run(cycle(rate, sample_s), sample_s, 0, "test") for rate in (0.4, 3.0)]
+    return np.array(default_rates.model_errors(trial.fit_candidate(candidate, [run], 0), tests))
 
 
 @pytest.fixture
@@ -43,8 +51,29 @@ def test_a_larger_candidate_needs_a_gain_beyond_its_standard_error() -> None:
     standard = score(STANDARD.features, 6, [1.0, 1.0, 1.0, 1.0])
     unsure = score("T^1..5", 7, [0.2, 1.3, 0.4, 1.0])  # gains 0.28 on average, 1.2 of its standard error
     sure = score("T^1..4", 8, [0.9, 0.91, 0.92, 0.9])
-    assert choose([standard, unsure, mean]) is standard
-    assert choose([standard, unsure, sure, mean]) is sure
+    assert choose([standard, unsure, mean], rates_told=True) is standard
+    assert choose([standard, unsure, sure, mean], rates_told=True) is sure
+
+
+@pytest.mark.parametrize("several_runs", [False, True])
+def test_at_few_rates_a_gain_must_outweigh_what_noise_costs_a_fit(several_runs: bool) -> None:
+    """The rule in its own words: twenty times p * s**2 / n, with n the training rows."""
+    rows, noise = 400, 1.0
+    least = 20.0 * 6 * noise / rows
+
+    def of(features: str, parameters: int, squares: float) -> Score:
+        blocks = np.full(8, squares)
+        if several_runs:  # Each row is held out twice, and is no more than one row for that.
+            both, each = np.concatenate([blocks, blocks]), np.full(16, rows // 8)
+            return Score(Candidate(features), parameters, both, each, of_runs=8)
+        return Score(Candidate(features), parameters, blocks, np.full(8, rows // 8))
+
+    mean = of("", 1, 9.0)
+    larger = of("T^1..5, dT, T*dT", 8, noise)
+    for gain, taken in ((0.9 * least, False), (1.1 * least, True)):
+        standard = of(STANDARD.features, 6, noise + gain)
+        assert choose([standard, larger, mean], rates_told=True) is larger
+        assert (choose([standard, larger, mean], rates_told=False) is larger) == taken
 
 
 def test_a_smaller_candidate_is_taken_if_it_is_no_worse() -> None:
@@ -52,13 +81,13 @@ def test_a_smaller_candidate_is_taken_if_it_is_no_worse() -> None:
     standard = score(STANDARD.features, 6, [1.0, 1.0, 1.0, 1.0])
     as_good = score("T, dT", 3, [1.0, 0.9, 1.1, 1.0])
     worse = score("T", 2, [1.1, 1.1, 1.0, 1.0])
-    assert choose([standard, worse, as_good, mean]) is as_good
+    assert choose([standard, worse, as_good, mean], rates_told=True) is as_good
 
 
 def test_nothing_is_better_than_a_gain_within_its_noise() -> None:
     mean = score("", 1, [1.0, 1.0, 1.0, 1.0])
     standard = score(STANDARD.features, 6, [0.2, 1.9, 0.9, 0.9])
-    assert choose([standard, mean]) is mean
+    assert choose([standard, mean], rates_told=True) is mean
 
 
 def test_harm_is_looked_for_on_runs_left_out() -> None:
@@ -70,9 +99,9 @@ def test_harm_is_looked_for_on_runs_left_out() -> None:
     mean = both("", 1, [1.0, 1.1, 0.9, 1.0], [9.0, 9.1, 8.9, 9.0])
     standard = both(STANDARD.features, 6, [1.2, 0.9, 1.3, 1.1], [0.1, 0.1, 0.1, 0.1])
     assert standard.beats(mean) and not standard.on_runs.beats(mean.on_runs)
-    assert choose([standard, mean]) is mean
+    assert choose([standard, mean], rates_told=True) is mean
     helps = both(STANDARD.features, 6, [0.2, 0.2, 0.3, 0.2], [0.1, 0.1, 0.1, 0.1])
-    assert choose([helps, mean]) is helps
+    assert choose([helps, mean], rates_told=True) is helps
 
 
 def test_several_runs_are_left_out_in_turn_and_in_parts() -> None:
@@ -105,6 +134,28 @@ def test_it_finds_the_drift_and_holds_at_another_rate(linear_only: None) -> None
     evaluation = model.evaluate(other)
     error = (evaluation.drift - truth)[evaluation.full]
     assert np.sqrt(np.mean(error**2)) < 0.25 * truth.std()
+
+
+@pytest.mark.parametrize("seed", [71017, 71038, 71056])
+def test_at_one_rate_what_passed_by_luck_is_not_taken(seed: int, linear_only: None) -> None:
+    """Units on which a form that gains two standard errors is worse at another rate than the standard."""
+    unit = default_rates.world(seed)
+    run, _ = unit.run(cycle(1.0, default_rates.SAMPLE_S), default_rates.SAMPLE_S, 10 * seed, "run.csv")
+    one_rate = trial.Trial([run], 0)
+    scores = [one_rate.score(candidate) for candidate in one_rate.candidates]
+    lucky = choose(scores, rates_told=True).candidate
+    assert choose(scores, rates_told=False).candidate == STANDARD
+    standard, larger = (errors_at_other_rates(unit, run, candidate) for candidate in (STANDARD, lucky))
+    assert (larger > 1.02 * standard).any()
+
+
+def test_at_one_rate_a_gradient_well_above_the_noise_is_taken(linear_only: None) -> None:
+    unit = World(noise=0.02, gradient=0.1)
+    run, _ = world_run(1.0, 0, unit)
+    chosen = AutoModel().fit(run).choice_.candidate
+    assert "T_in-T_out" in chosen.features
+    standard, larger = (errors_at_other_rates(unit, run, candidate) for candidate in (STANDARD, chosen))
+    assert (larger < 0.5 * standard).all()
 
 
 def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
