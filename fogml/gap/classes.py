@@ -12,6 +12,8 @@ from scipy.special import logsumexp
 from fogml.gap.search import Chosen, Explanation, Search
 
 SAME_CLASS_NATS = 3.0
+FORM_SHARE = 0.006
+"""Share of an effect's gain that may hang on details of its form."""
 LEAST_PROBABILITY = 0.1
 """Effects less probable than this are not listed."""
 
@@ -98,15 +100,17 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
     held = search.field_.condition(search._terms(others, best.unknown))
     gains = held.node_gains()
     members = {id: best.log_evidence}
+    # No form is known to the last per cent: of a large effect more nats hang on that.
+    nats = SAME_CLASS_NATS + FORM_SHARE * max(float(logsumexp(gains[search.places[id]])), 0.0)
     for other in search.places:
         if other in best.ids:
             continue
         # A quick look first: with the others held, a swap only gets better by a few nats.
         quick = float(logsumexp(gains[search.places[other]])) - float(logsumexp(gains[search.places[id]]))
-        if quick < -SAME_CLASS_NATS - 3.0:
+        if quick < -nats - 3.0:
             continue
         swapped = search.explanation((*others, search._best(other, gains)), unknown=best.unknown is not None)
-        if swapped.log_evidence > best.log_evidence - SAME_CLASS_NATS:
+        if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
     rest = sorted((m for m in members if m != id), key=lambda m: -members[m])
     return (id, *rest)

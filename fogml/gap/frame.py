@@ -82,8 +82,14 @@ class Frame:
 
     @cached_property
     def fixed(self) -> FloatArray:
-        """Responses to one prior standard deviation of each constant, whitened, shape (n, constants)."""
-        return self.white([constant_rows(o, self.constants) for o in self.observations])
+        """Responses to one prior standard deviation of each constant and nuisance, whitened."""
+        held = [o.model.nuisances(self.values) for o in self.observations]
+        names = sorted(set().union(*held))
+        rows = []
+        for o, late in zip(self.observations, held):
+            more = [o.averaged(late[n]) if n in late else np.zeros(len(o)) for n in names]
+            rows.append(np.column_stack([constant_rows(o, self.constants), *more]))
+        return self.white(rows)
 
     def beside(self, columns: FloatArray, *, flat: bool = False) -> FloatArray:
         """Inner products of whitened columns beside the constants, shape (k, k).

@@ -101,6 +101,12 @@ class ModelOnRun(Protocol):
     def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
         """What the noise of the inputs makes of the replay, as a standard deviation [deg/h], shape (n,)."""
 
+    def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
+        """What is always a little off, one standard deviation of each [deg/h], shape (n,); may be empty.
+
+        The names must be the same on every run that has them.
+        """
+
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
 

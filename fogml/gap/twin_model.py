@@ -15,6 +15,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.inputs import STAND_INS, Inputs
 from fogml.twin.nominal import (
+    DELTA,
     DELTA_WINDOW_S,
     NAMES,
     UNITS,
@@ -27,6 +28,9 @@ from fogml.twin.registry import effect, effects
 from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
+
+USUAL_LAG_S = 2.0
+"""Lag of a good sensor on the coil [s], as a standard deviation: part of any recording."""
 
 
 class TwinModel:
@@ -81,7 +85,7 @@ class TwinModel:
         """Write a twin file: constants as fitted, their standard errors as priors, effects on."""
         twin = with_effects(self.twin, constants, effects)
         deviations = asdict(self.twin.nominal_sd) | {
-            name: value for name, value in standard_errors.items() if value > 0.0
+            name: float(value) for name, value in standard_errors.items() if value > 0.0
         }
         twin = replace(
             twin,
@@ -171,6 +175,21 @@ class TwinOnRun:
             if place is not None:
                 variance += (slope * _reading_noise(self._recorded.temperatures[place])) ** 2
         return np.sqrt(variance)
+
+    def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
+        """What sensors of ordinary quality make of the replay [deg/h], shape (n,): each late by a little."""
+        inputs = self._recorded.afresh()
+        slopes = temperature_slopes(inputs, NominalConstants(**dict(constants)))
+        late = {}
+        for name, slope in slopes.items():
+            if name == DELTA or not np.any(slope):
+                continue
+            missed = USUAL_LAG_S / 60.0 * inputs.dT(name)
+            late[f"lag of {name}"] = slope * missed
+            if name == "T" and DELTA in slopes:
+                change = inputs.memory.difference("nuisance", inputs.time, missed, DELTA_WINDOW_S)
+                late[f"lag of {name}"] = late[f"lag of {name}"] + slopes[DELTA] * change
+        return late
 
     def _meets_output(self, declared: Effect) -> bool:
         return bool({"output", "slopes"} & set(declared.needs))
