@@ -123,7 +123,9 @@ class Objective:
             empty[:, count:] = self._linear
             self._buffers[count] = empty
         design = self._buffers[count]
-        inverse_square = np.exp(-2.0 * shape.log_widths)
+        # A step of the search may try a width of next to nothing; its objective is infinite then.
+        with np.errstate(over="ignore"):
+            inverse_square = np.exp(-2.0 * shape.log_widths)
         exponent = np.hstack(
             [
                 -inverse_square,
