@@ -171,6 +171,24 @@ def test_the_small_figure_of_a_constant_is_drawn() -> None:
     assert "nan" not in svg
 
 
+def test_the_small_figure_has_a_legend_dots_and_logarithmic_axes() -> None:
+    x, y = np.array([1.0, 10.0, 100.0]), np.array([0.01, 0.1, 1.0])
+    curve = Curve(x, y, "#000000", label="left & right", dots=True)
+    svg = line_figure([curve], "window [s]", "error [deg/h]", "grows", log="xy")
+    assert "left &amp; right" in svg
+    places = [
+        [float(part.split('"')[1]) for part in (circle.split("cx=")[1], circle.split("cy=")[1])]
+        for circle in svg.split("<circle ")[1:]
+    ]
+    assert len(places) == 3
+    # Equal ratios are equal steps, and the middle lies midway.
+    np.testing.assert_allclose(places[1], np.mean([places[0], places[2]], axis=0), atol=0.11)
+    for tick in ("1", "10", "100", "0.01", "0.1"):
+        assert f">{tick}</text>" in svg
+    plain = line_figure([Curve(x, y, "#000000")], "window [s]", "error [deg/h]", "grows")
+    assert "<circle" not in plain and "left" not in plain
+
+
 def test_a_wide_band_does_not_flatten_what_is_left() -> None:
     run = judged_run()
     series = replace(run.series, lower=-100.0 * run.series.upper, upper=100.0 * run.series.upper)
