@@ -1,0 +1,125 @@
+"""Grids over shapes: dense enough, with what is linear left to columns; lines found by the periodogram."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.gap.candidate_columns import candidate_columns
+from fogml.gap.model import EffectValue
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, plausible_lengths
+from fogml.gap.screening import Screening
+from fogml.gap.shapes import grid
+from tests.gap.small_model import KINDS, MEANS, SmallModel, framed, noise_of, ramps, recorded
+
+MODEL = SmallModel()
+RUN = ramps("a", count=400, step=20.0)
+SPANS = {"s": RUN.span_s, "degC": 40.0, "sample": 20.0}
+
+
+def response_of(id):
+    on = MODEL.on(RUN)
+    return lambda shape: on.response(id, shape, MEANS)
+
+
+def grid_of(id):
+    return grid(KINDS[id], "tactical", response_of(id), SPANS)
+
+
+def cosine(a, b):
+    a, b = a - a.mean(), b - b.mean()
+    return abs(a @ b) / np.linalg.norm(a) / np.linalg.norm(b)
+
+
+def test_any_shape_within_its_range_is_near_a_node():
+    response = response_of("bend")
+    nodes = [response(n.shape) for n in grid_of("bend")]
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        off = {"centre_temperature": rng.uniform(10.0, 30.0), "width": rng.uniform(3.0, 12.0)}
+        assert max(cosine(response(off), node) for node in nodes) > 0.97
+
+
+def test_a_line_of_any_period_and_phase_is_near_a_node():
+    response = response_of("line")
+    nodes = grid_of("line")
+    rng = np.random.default_rng(1)
+    for _ in range(25):
+        true = response({"period": 1.0 / rng.uniform(1 / 4000, 1 / 200), "phase": rng.uniform(0.0, 360.0)})
+        best = 0.0
+        for node in nodes:
+            span = np.column_stack([response(shape) for shape in node.draws])
+            left = true - span @ np.linalg.lstsq(span, true, rcond=None)[0]
+            best = max(best, 1.0 - (left @ left) / (true @ true))
+        assert best > 0.9
+    frequencies = np.array([n.frequency_hz for n in nodes])
+    np.testing.assert_allclose([1.0 / n.shape["period"] for n in nodes], frequencies)
+    assert frequencies.min() == pytest.approx(1 / 4000) and frequencies.max() == pytest.approx(1 / 200)
+
+
+def test_what_is_linear_needs_one_node_with_the_moments_of_its_prior():
+    (node,) = grid_of("mixture")
+    shares = np.array([draw["share"] for draw in node.draws])
+    assert shares.mean() == pytest.approx(0.5)
+    assert np.var(shares) == pytest.approx(1.0 / 12.0)
+    assert grid_of("cube")[0].draws == ({},)
+
+
+def test_no_line_is_faster_than_the_rows_can_show():
+    slow = {**SPANS, "sample": 200.0}
+    nodes = grid(KINDS["line"], "tactical", response_of("line"), slow)
+    assert min(n.shape["period"] for n in nodes) >= 400.0
+
+
+def with_line(period):
+    line = EffectValue("line", 0.5, {"period": period, "phase": 70.0})
+    rng = np.random.default_rng(int(period))
+    made = recorded(RUN, MODEL, {"offset": 1.0, "slope": 0.4}, (line,), noise_of(RUN, rng))
+    return framed([made], MODEL)
+
+
+@pytest.mark.parametrize("period", [263.0, 771.0, 1900.0])
+def test_the_true_line_is_kept_of_many(period):
+    frame = with_line(period)
+    screening = Screening(frame, [])
+    nodes = grid_of("line")
+    kept = screening.lines(nodes)
+    assert len(kept) < len(nodes) / 2
+    nearest = min(range(len(nodes)), key=lambda i: abs(nodes[i].frequency_hz - 1.0 / period))
+    assert nearest in kept
+    found = candidate_columns(KINDS["line"], frame, "tactical", screening)
+    assert min(abs(n.node.frequency_hz - 1.0 / period) for n, _ in found) < 0.5 / RUN.span_s
+    # Of what is kept the true line fits best, by plain least squares as well.
+    gains = []
+    for _, columns in found:
+        held = np.concatenate([frame.fixed, columns], axis=1)
+        left = frame.residual - held @ np.linalg.lstsq(held, frame.residual, rcond=None)[0]
+        gains.append(-float(np.sum(left**2)))
+    best = found[int(np.argmax(gains))][0]
+    assert abs(best.node.frequency_hz - 1.0 / period) < 0.5 / RUN.span_s
+
+
+def test_gains_of_screening_are_what_least_squares_gains():
+    frame = with_line(771.0)
+    screening = Screening(frame, [])
+    nodes = grid_of("line")[::40]
+    columns = frame.responses("line", [shape for node in nodes for shape in node.draws])
+    starts = list(range(0, columns.shape[1], 2))
+    for gain, node, a in zip(screening.gains(columns, starts)[0], nodes, starts):
+        prior = np.zeros((2, 1))
+        target = np.concatenate([frame.residual, prior])[:, 0]
+        fixed = np.concatenate([frame.fixed, np.eye(2)])
+        both = np.concatenate([fixed, np.concatenate([columns[:, a : a + 2], np.zeros((2, 2))])], axis=1)
+        left = [target - c @ np.linalg.lstsq(c, target, rcond=None)[0] for c in (fixed, both)]
+        expected = 0.5 * float(left[0] @ left[0] - left[1] @ left[1])
+        assert gain == pytest.approx(expected, rel=1e-3, abs=1e-3), node.shape
+
+
+def test_lengths_that_no_gyro_of_any_grade_has_weigh_less():
+    inside = plausible_lengths(KINDS["cube"], 0.1)
+    np.testing.assert_allclose(inside[:4], np.log(LENGTH_WEIGHTS[:4]))
+    # 1000 times 0.1 deg/h is ten times the range's end.
+    assert inside[-1] < np.log(LENGTH_WEIGHTS[-1]) - 1.0
+    tiny = plausible_lengths(KINDS["cube"], 1e-5)
+    assert (np.diff(tiny - np.log(LENGTH_WEIGHTS)) > 0.0).all()
+    assert LENGTH_WEIGHTS.sum() == pytest.approx(1.0) and (np.diff(LENGTHS) > 0.0).all()
