@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 from fogml.gap.search import Chosen, Explanation, Search
 
 SAME_CLASS_NATS = 3.0
-FORM_SHARE = 0.006
+FORM_SHARE = 0.01
 """Share of an effect's gain that may hang on details of its form."""
 LEAST_PROBABILITY = 0.1
 """Effects less probable than this are not listed."""

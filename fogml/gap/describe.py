@@ -8,7 +8,7 @@ from fogml.gap.search import Search
 
 if TYPE_CHECKING:
     from fogml.gap.classes import Ranking
-    from fogml.gap.diagnosis import Prepared
+    from fogml.gap.preparing import Prepared
 
 
 def describe_unknown(p: Prepared, search: Search, ranking: Ranking) -> str:

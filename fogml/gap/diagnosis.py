@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -11,44 +10,25 @@ from fogml.errors import InputError
 from fogml.gap.basis import Basis, build_basis
 from fogml.gap.classes import Ranked, Ranking, rank
 from fogml.gap.describe import describe_unknown
-from fogml.gap.dictionary import Group, unknown_groups
 from fogml.gap.evidence import Field
 from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, EffectValue, GyroModel
-from fogml.gap.noise import Noise, noise_of, prior_of
-from fogml.gap.observation import Observation, Unusable, observe
+from fogml.gap.noise import Noise
+from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
 from fogml.gap.reports import candidate_evidence, constant_fits, noise_report, run_series, with_run_amplitudes
 from fogml.gap.result import Diagnosis, Estimate, Found, HowFar, Unknown, Verdict
-from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.search import Search
 from fogml.gap.starting import starting_values
 from fogml.gap.structure import gaps_on_runs, stage_energies
 from fogml.gap.where import where
-from fogml.runs.run import Run
+from fogml.runs.run import FloatArray, Run
 from fogml.twin.twin import Twin
 
-LEAST_MOTION_DEGC = 2.0
-KEPT_BACK = 0.25
-"""Share of the last run that is held out where no run is."""
-Progress = Callable[[str], None]
-
-
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """Everything that does not depend on which effects are looked for."""
-
-    model: GyroModel
-    fit: tuple[Observation, ...]
-    held_out: tuple[Observation, ...]
-    noise: Noise
-    groups: tuple[Group, ...]
-    recalibrated: Fit
-    whiteners: tuple[RunWhitener, ...]
-    noise_run: str | None
-    held_out_is_part: bool
-    unusable: tuple[tuple[str, str], ...]
+NOISE_MATTERS = 0.1
+"""Change of an Allan variance's logarithm from which a search is done again."""
+MOST_DRAWS = 4
 
 
 def diagnose(
@@ -86,71 +66,72 @@ def diagnose(
         If runs are of different units, a run is used twice, no temperature moves, an effect is
         unknown, or no run can be used.
     """
-    tell = progress or (lambda what: None)
-    model = as_model(twin)
-    candidates = _candidates(model, without)
-    prepared = prepare(model, fit, held_out, noise, tell)
-    tell("whitening candidates")
-    basis = _basis(prepared, candidates, prepared.recalibrated.constants, tell)
-    search = Search(Field(basis))
-    tell("searching sets of effects")
-    ranking = rank(search, search.run())
-    return _result(prepared, candidates, basis, search, ranking, seed, tell)
+    from threadpoolctl import threadpool_limits
+
+    # Matrices are small: more threads than one cost more than they bring.
+    with threadpool_limits(1):
+        return _diagnosed(twin, fit, held_out, noise, without, seed, progress or (lambda what: None))
 
 
-def prepare(
-    model: GyroModel,
+def _diagnosed(
+    twin: Twin | GyroModel,
     fit: Sequence[Run],
     held_out: Sequence[Run],
     noise: Run | None,
-    tell: Progress = lambda what: None,
-) -> Prepared:
-    """Runs made ready, noise fitted, constants recalibrated."""
-    _check_runs(fit, held_out, noise)
-    part = not held_out
-    if part:
-        fit, held_out = _keep_back(fit)
-    tell("reading inputs")
-    fit_rows, unusable = _observed(fit, model)
-    held_rows, more = _observed(held_out, model)
-    unusable += more
-    if not fit_rows:
-        raise InputError("; ".join(reason for _, reason in unusable))
-    moved = max(float(np.ptp(o.temperature)) for o in fit_rows)
-    if moved < LEAST_MOTION_DEGC and not any(np.any(o.run.rate) for o in fit_rows):
-        raise InputError(
-            f"{', '.join(o.run.name for o in fit_rows)}: temperature moves by {moved:.2g} degC in all; "
-            f"a diagnosis needs a run in which it moves by {LEAST_MOTION_DEGC:g} degC or more"
-        )
-    groups = tuple(unknown_groups(fit_rows))
-    tell("fitting the noise")
-    prior, source = prior_of(model, noise)
-    fitted_noise = noise_of(fit_rows, model.constants, groups, prior, source)
-    whiteners, recalibrated = _recalibrated(model, fit_rows, fitted_noise)
-    return Prepared(
-        model,
-        tuple(fit_rows),
-        tuple(held_rows),
-        fitted_noise,
-        groups,
-        recalibrated,
-        whiteners,
-        noise.name if noise else None,
-        part,
-        tuple(unusable),
-    )
+    without: Iterable[str],
+    seed: int,
+    tell: Progress,
+) -> Diagnosis:
+    model = as_model(twin)
+    candidates = _candidates(model, without)
+    prepared = prepare(model, fit, held_out, noise, tell)
+    basis = _basis(prepared, candidates, prepared.recalibrated.constants, tell)
+    search, ranking = _searched(basis, tell)
+    if ranking.best.effects:
+        # What was taken for noise may have been the effect, and the constants may have made up for it.
+        tell("fitting the noise beside what was found")
+        values = _found(prepared, candidates, basis, ranking)[1].constants
+        again = with_noise_beside(prepared, _explained(prepared, basis, ranking))
+        if _differ(prepared.noise, again.noise) or _act_on_inputs(candidates, ranking):
+            prepared = again
+            basis = _basis(prepared, candidates, values, tell)
+            search, ranking = _searched(basis, tell)
+    return _result(prepared, candidates, basis, search, ranking, seed, tell)
 
 
-def _recalibrated(
-    model: GyroModel, observations: Sequence[Observation], noise: Noise
-) -> tuple[tuple[RunWhitener, ...], Fit]:
-    """Constants fitted, and whiteners whose weights know them."""
-    values: Mapping[str, float] = {c.name: c.mean for c in model.constants}
-    for _ in range(2):
-        whiteners = tuple(RunWhitener(noise.model, o, values) for o in observations)
-        fit = fit_model(observations, whiteners, model.constants)
-        values = fit.constants
-    return whiteners, fit
+def _searched(basis: Basis, tell: Progress) -> tuple[Search, Ranking]:
+    tell("searching sets of effects")
+    search = Search(Field(basis))
+    return search, rank(search, search.run())
+
+
+def _explained(p: Prepared, basis: Basis, ranking: Ranking) -> list[FloatArray]:
+    """Rows of what the effects of the best explanation can do, and its unknown, on each run."""
+    rows = []
+    for r, o in enumerate(p.fit):
+        columns = [
+            o.averaged(o.model.response(c.candidate, shape, basis.frame.values))
+            for c in ranking.best.effects
+            for shape in basis.nodes[c.node].node.draws[:MOST_DRAWS]
+        ]
+        rows.append(np.column_stack(columns))
+        if ranking.best.unknown is not None:
+            group = next(g for g in p.groups if g.name == ranking.best.unknown[0])
+            rows[-1] = np.concatenate([rows[-1], group.columns[r]], axis=1)
+    return rows
+
+
+def _differ(first: Noise, second: Noise) -> bool:
+    """Whether the noise differs by more than matters, at the averaging time of the figures."""
+    taus = np.array([10.0, AVERAGING_S, 3000.0])
+    ratio = second.model.allan_variance(taus) / first.model.allan_variance(taus)
+    return bool(np.any(np.abs(np.log(ratio)) > NOISE_MATTERS))
+
+
+def _act_on_inputs(candidates: Mapping[str, Candidate], ranking: Ranking) -> bool:
+    """Whether a member of a class that was found depends on where the constants are."""
+    stages = {candidates[m].stage for r in ranking.effects for m in r.members}
+    return bool(stages & {"sensor", "logger", "loop", "readout"})
 
 
 def _basis(
@@ -290,42 +271,6 @@ def _candidates(model: GyroModel, without: Iterable[str]) -> dict[str, Candidate
             continue
         del candidates[id]
     return candidates
-
-
-def _check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
-    if not fit:
-        raise InputError("no run to diagnose is given")
-    hashes: dict[str, str] = {}
-    for role, runs in (("fit", fit), ("held-out", held_out)):
-        for run in runs:
-            if run.hash in hashes:
-                raise InputError(
-                    f"{run.name}: given as a {role} run and as {hashes[run.hash]} too; a held-out run "
-                    "must be one that the fit has not seen"
-                )
-            hashes[run.hash] = f"a {role} run ({run.name})"
-    units = {run.facts.unit: run.name for run in (*fit, *held_out) if run.facts.unit}
-    axes = {run.facts.axis: run.name for run in (*fit, *held_out) if run.facts.axis}
-    for what, held in (("unit", units), ("axis", axes)):
-        if len(held) > 1:
-            listed = ", ".join(f"{name} is {what} {value}" for value, name in held.items())
-            raise InputError(f"the runs are of different {what}s ({listed}); diagnose one {what} at a time")
-
-
-def _keep_back(fit: Sequence[Run]) -> tuple[Sequence[Run], Sequence[Run]]:
-    last = fit[-1]
-    cut = int(len(last) * (1.0 - KEPT_BACK))
-    return [*fit[:-1], last[:cut]], [last[cut:]]
-
-
-def _observed(runs: Sequence[Run], model: GyroModel) -> tuple[list[Observation], list[tuple[str, str]]]:
-    rows, unusable = [], []
-    for run in runs:
-        try:
-            rows.append(observe(run, model))
-        except Unusable as error:
-            unusable.append((run.name, str(error)))
-    return rows, unusable
 
 
 __all__ = ["AVERAGING_S", "HowFar", "Prepared", "averages", "diagnose", "prepare"]

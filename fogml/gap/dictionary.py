@@ -63,6 +63,10 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
             ("direction", "follows the direction of temperature change", _directions(observations, u)),
             ("past", "remembers past temperatures", [_past(o, half) for o in observations]),
         ]
+    if all(_differences(o) for o in observations):
+        groups.append(
+            ("gradient", "follows differences between sensors or their rates", _gradients(observations))
+        )
     if any(np.any(o.run.rate) for o in observations):
         groups.append(("table_rate", "follows the table's rate", _table(observations, temperatures)))
     return [Group(name, words, tuple(columns)) for name, words, columns in groups]
@@ -122,6 +126,28 @@ def _directions(observations: Sequence[Observation], u: Sequence[FloatArray]) ->
         held = Memory()
         plays = [held.play(f"{w}", o.temperature, w) - o.temperature for w in (2.0, 6.0, 18.0)]
         blocks.append(np.column_stack([sign, sign * x, sign * x**2, *plays, x * plays[1]]))
+    return blocks
+
+
+def _differences(o: Observation) -> list[str]:
+    """Temperatures besides the leading one, for their differences from it."""
+    names = ("T_out", "T_case", "T_electronics", "T_chamber")
+    held = [name for name in names if name in o.run.columns]
+    if "T_out" not in held and "T2" in o.run.columns:
+        held.insert(0, "T_out")
+    return held
+
+
+def _gradients(observations: Sequence[Observation]) -> list[FloatArray]:
+    names = [n for n in _differences(observations[0]) if all(n in _differences(o) for o in observations)]
+    blocks = []
+    for o in observations:
+        columns = [np.zeros(len(o))]
+        for name in names:
+            difference = o.averaged(o.run.temperature(name)) - o.temperature
+            quick = difference - _lag(o, difference, 100.0)
+            columns += [difference / 10.0, quick, difference * o.temperature / 500.0]
+        blocks.append(np.column_stack(columns))
     return blocks
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.gap.dictionary import Group
@@ -17,7 +18,7 @@ from fogml.signals.noise_model import NoiseModel
 
 UNIT_FACTOR = 1.3
 """Noise of a unit from one run to another, as a factor."""
-BESIDE = ("temperature", "temperature_rate", "past", "start", "time", "direction", "table_rate")
+BESIDE = ("temperature", "temperature_rate", "past", "start", "time", "direction", "gradient", "table_rate")
 """Groups of the unknown that are kept out of the noise."""
 MOST_ROWS = 2048
 
@@ -73,18 +74,26 @@ def noise_of(
     groups: Sequence[Group],
     prior: NoisePrior,
     source: str,
+    explained: Sequence[FloatArray] | None = None,
 ) -> Noise:
-    """The noise of the fit runs, beside the constants and smooth unknowns, under a prior."""
-    series, times, columns, deviations = [], [], [], None
+    """The noise of the fit runs, beside the constants and smooth unknowns, under a prior.
+
+    `explained` are rows of what effects that were found can do on each run, shape (m_r, k).
+    """
+    series, times, columns, deviations = [], [], [], np.empty(0)
     means = {c.name: c.mean for c in constants}
     smooth = [g for g in groups if g.name in BESIDE]
     for r, o in enumerate(observations):
         held = o.model.columns()
         fixed = [o.averaged(held[c.name]) * c.sd if c.name in held else np.zeros(len(o)) for c in constants]
         free = [column for g in smooth for column in g.columns[r].T]
-        columns.append(np.column_stack(fixed + free))
-        series.append(o.recorded - o.averaged(o.model.output(means)))
-        times.append(o.time)
+        if explained is not None:
+            # Scaled so that one prior standard deviation is plenty.
+            free += [column / max(float(np.abs(column).max()), 1e-300) for column in explained[r].T]
+        used = _quiet(o)
+        columns.append(np.column_stack(fixed + free)[used])
+        series.append((o.recorded - o.averaged(o.model.output(means)))[used])
+        times.append(o.time[used])
         deviations = np.concatenate([np.ones(len(fixed)), np.full(len(free), 5.0)])
     fit = fit_noise(
         times,
@@ -96,6 +105,13 @@ def noise_of(
         most=MOST_ROWS,
     )
     return Noise(fit.model, fit, source)
+
+
+def _quiet(o: Observation) -> NDArray[np.bool_]:
+    """Rows in which the table rests, if they are enough: in turns the readings' noise counts as well."""
+    rate = np.abs(o.averaged(o.run.rate))
+    still = rate <= 1e-3 * float(rate.max(initial=0.0))
+    return still if still.sum() >= 0.4 * len(still) else np.ones(len(still), dtype=np.bool_)
 
 
 def _motion(run: Run, usable: np.ndarray) -> FloatArray:

@@ -29,7 +29,7 @@ from fogml.signals.whiteness import whiteness
 
 if TYPE_CHECKING:
     from fogml.gap.classes import Ranking
-    from fogml.gap.diagnosis import Prepared
+    from fogml.gap.preparing import Prepared
 
 LEAST_LENGTH = 3.0
 """Whitened length under which an effect can't be shown."""

@@ -106,6 +106,8 @@ def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]
     low, high = quantity.range(grade)  # type: ignore[arg-type]
     if _is_line(quantity):
         return _lines(quantity, low, high, spans)
+    if quantity.name == "harmonic":
+        return [float(x) for x in np.arange(math.ceil(low), math.floor(high) + 1)]
     if quantity.unit == "degC" and "temperature" in quantity.name:
         # A place on the temperature scale is told to a fraction of what happens there.
         return [float(x) for x in np.arange(low, high + 1e-9, PLACE_DEGC)]

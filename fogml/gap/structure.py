@@ -15,7 +15,7 @@ from fogml.runs.run import FloatArray
 
 if TYPE_CHECKING:
     from fogml.gap.classes import Ranking
-    from fogml.gap.diagnosis import Prepared
+    from fogml.gap.preparing import Prepared
 
 GROUP_STAGE = {"table_rate": "scale_factor"}
 """Stage that a group of the unknown is booked on; bias for the others."""

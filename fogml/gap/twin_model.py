@@ -29,6 +29,8 @@ from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
 
+SMOOTHED_S = 150.0
+"""Readings are smoothed over this time for the responses of candidates [s]."""
 USUAL_LAG_S = 2.0
 """Lag of a good sensor on the coil [s], as a standard deviation: part of any recording."""
 
@@ -143,7 +145,9 @@ class TwinOnRun:
                 fan=self._recorded.drives.get("fan"),
                 table_rate=self._recorded.table_rate,
             )
-        self._full = replace(self._recorded, temperatures={**nodes, **self._recorded.temperatures}, cache={})
+        # Responses to rates of temperature would be blurred by the readings' noise.
+        smooth = {name: _smoothed(run, t) for name, t in {**nodes, **self._recorded.temperatures}.items()}
+        self._full = replace(self._recorded, temperatures=smooth, cache={})
         self._outputs: dict[tuple[float, ...], tuple[FloatArray, Mapping[str, FloatArray]]] = {}
 
     def columns(self) -> Mapping[str, FloatArray]:
@@ -207,6 +211,23 @@ class TwinOnRun:
             )
         output, slopes = self._outputs[key]
         return replace(self._full.afresh(), output=output, slopes=slopes)
+
+
+def _smoothed(run: Run, temperature: FloatArray) -> FloatArray:
+    """A temperature without the noise of its readings: local parabolas over `SMOOTHED_S`, shape (n,).
+
+    Reference: A. Savitzky and M. J. E. Golay, Anal. Chem. 36 (1964) 1627.
+    """
+    from scipy.signal import savgol_filter
+
+    width = 2 * round(0.5 * SMOOTHED_S / max(run.sample_s, 1e-9)) + 1
+    if width < 5:
+        return temperature
+    smooth = temperature.copy()
+    for part in run.stretches:
+        if part.stop - part.start >= width:
+            smooth[part] = savgol_filter(temperature[part], width, 2)
+    return smooth
 
 
 def _reading_noise(temperature: FloatArray) -> float:

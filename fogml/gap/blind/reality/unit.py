@@ -110,7 +110,14 @@ class Unit:
     def whitening(self, run: UnitRun) -> Whitening:
         """The true whitening of a run's rows that count."""
         count = len(run.world.time) - self.skipped
-        return Whitening(self.noise, count, self.sample_s, before=self.skipped)
+        inner = run.world.nodes["T_in"][self.skipped :] - 25.0
+        rate = 1e-6 * run.world.rate_deg_h[self.skipped :]
+        c, tools = self.constants, self.instruments
+        # DeltaT and the difference of the faces see little of it; a scale factor over temperature does.
+        slope = c.b1 + 2.0 * c.b2 * inner + rate * (c.k1 + 2.0 * c.k2 * inner)
+        sensors = 2.0 if tools.layout == "four" else 1.0
+        variance = (tools.noise**2 + tools.resolution**2 / 12.0) / sensors
+        return Whitening(self.noise, count, self.sample_s, self.skipped, slope**2 * variance)
 
 
 def compatible(forms: Sequence[type[Form]]) -> bool:

@@ -48,10 +48,18 @@ def flicker_ladder(length: int) -> Ladder:
 class Whitening:
     """The noise of one run of `count` samples at `sample_s`, as its inverse covariance.
 
-    The random walk began `before` samples before the first of them.
+    The random walk began `before` samples before the first of them. `reading` is the variance that
+    the noise of temperature sensors adds to each sample of the gap [(deg/h)^2], shape (count,).
     """
 
-    def __init__(self, constants: NoiseConstants, count: int, sample_s: float, before: int = 0) -> None:
+    def __init__(
+        self,
+        constants: NoiseConstants,
+        count: int,
+        sample_s: float,
+        before: int = 0,
+        reading: FloatArray | None = None,
+    ) -> None:
         self.count, self._before = count, before
         self._hours = hours = sample_s / 3600.0
         self.constants = constants
@@ -63,6 +71,7 @@ class Whitening:
         self._first = np.concatenate([self._variance, [constants.K**2 * hours * (before + 1)]])
         self._first = np.maximum(self._first, 1e-18)
         self.white = constants.N**2 / hours + constants.B**2 * ladder.white
+        self._each = np.full(count, self.white) + (0.0 if reading is None else reading)
 
     @cached_property
     def _factor(self) -> FloatArray:
@@ -73,22 +82,22 @@ class Whitening:
         own[0] = 1.0 / self._first + self._decay**2 / self._step
         own[-1] = (1.0 / self._step) if n > 1 else 1.0 / self._first
         band = np.zeros((m + 1, n * m))
-        band[m] = (own + 1.0 / self.white).ravel()
+        band[m] = (own + 1.0 / self._each[:, None]).ravel()
         next_ = band[0].reshape(n, m)
         next_[1:] = -self._decay / self._step
         for offset in range(1, m):
             # All states of a sample add up in it, so that each pair of them is coupled.
             row = band[m - offset].reshape(n, m)
-            row[:, offset:] += 1.0 / self.white
+            row[:, offset:] += 1.0 / self._each[:, None]
         return np.asarray(cholesky_banded(band, lower=False, check_finite=False, overwrite_ab=True))
 
     def solve(self, vectors: FloatArray) -> FloatArray:
         """C^-1 times columns, shape (n, k)."""
         m, n = len(self._decay), self.count
-        right = np.repeat(vectors / self.white, m, axis=0)
+        right = np.repeat(vectors / self._each[:, None], m, axis=0)
         states = cho_solve_banded((self._factor, False), right, check_finite=False)
         total = states.reshape(n, m, -1).sum(axis=1)
-        return np.asarray((vectors - total) / self.white)
+        return np.asarray((vectors - total) / self._each[:, None])
 
     def mean_square_of_means(self, width: int) -> float:
         """Expected mean square of means over `width` samples, over all whole blocks [(deg/h)^2]."""
