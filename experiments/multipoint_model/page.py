@@ -207,6 +207,9 @@ Std of 10 s samples [deg/h], sensors T1 to T4 in turn.
 |---:|---|{"---:|" * len(RUNS)}
 {_order_rows(values["orders"])}
 
+At 2 °C/min it is the powers of the rate that fail, whatever the order of T: a run at one rate tells no curve
+in the rate. A higher order of T costs little there, and in reversed order too, as temperatures are the same.
+
 ## Which sensors and orders, chosen by training folds
 
 {values["choice"]["tried"]} forms: every set of sensors, orders and rate orders. Test runs play no part in the
