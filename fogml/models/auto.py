@@ -72,7 +72,8 @@ class AutoModel(DriftModel):
             if self.progress is not None:
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
-        self.choice_ = choose(scores, rates_told=trial.rates >= RATES_THAT_TELL)
+        told = trial.rates >= RATES_THAT_TELL
+        self.choice_ = choose(scores, rates_told=told, both_directions=trial.both_directions)
         self.chosen_ = fit_candidate(self.choice_.candidate, group, self.seed)
         notes = (*self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

@@ -75,6 +75,18 @@ class Score:
         gain = other.mean_square - self.mean_square
         return gain > MATERIAL * other.parameters * self.mean_square / self.trained_rows
 
+    @property
+    def leaves_even_noise(self) -> bool:
+        """Whether its errors are as large in all blocks as white noise of one size would be.
+
+        The mean squares of m rows of white noise scatter by 2 s**4 / m; their sum of squares in these
+        units is a chi-square of b - 1 degrees of freedom, exceeded by chance once in a thousand.
+        """
+        from scipy.stats import chi2
+
+        scatter = np.sum(self.rows * (self.squared_errors / self.mean_square - 1.0) ** 2) / 2.0
+        return bool(scatter < chi2.ppf(0.999, len(self.rows) - 1))
+
     def beats(self, other: Score) -> bool:
         """Whether it is better by more than two standard errors of the difference, block by block."""
         weights = self.rows / self.rows.sum()
@@ -93,7 +105,7 @@ class Score:
         }
 
 
-def choose(scores: Sequence[Score], *, rates_told: bool) -> Score:
+def choose(scores: Sequence[Score], *, rates_told: bool, both_directions: bool = True) -> Score:
     """The candidate to take.
 
     The first score is the standard form's. A larger candidate replaces it only if it beats it; of
@@ -101,7 +113,9 @@ def choose(scores: Sequence[Score], *, rates_told: bool) -> Score:
     those is taken. What does not beat the training runs' mean is not worth its parameters: then
     the mean is taken. That last question is put to runs left out, where there are several: parts
     of a run are predicted well from the rest of it whatever it is that moved the drift, time
-    included, and harm shows on the next run only.
+    included, and harm shows on the next run only. Of one run up and down, a gain that comes from a
+    few blocks may be within two standard errors however sure it is; where what is left is even
+    noise, it is worth its parameters too if it outweighs the noise.
 
     Parameters
     ----------
@@ -111,6 +125,9 @@ def choose(scores: Sequence[Score], *, rates_told: bool) -> Score:
         Whether the training runs hold three or more distinct rates of temperature. With fewer,
         what is held out lies at the rates fitted to and can't show what goes wrong at another, so
         the gain of a larger candidate must outweigh the noise too.
+    both_directions
+        Whether temperature both rises and falls. On one way only, drift in time looks like drift
+        with temperature, and noise is no measure of what is sure.
     """
     mean = next(score for score in scores if not score.candidate.features)
     standard = scores[0]
@@ -123,4 +140,8 @@ def choose(scores: Sequence[Score], *, rates_told: bool) -> Score:
         small = [s for s in scores if s.parameters <= standard.parameters]
         no_worse = [s for s in small if s.mean_square <= standard.mean_square]
         choice = min(no_worse, key=lambda s: (s.parameters, s.mean_square))
-    return choice if choice.on_runs.beats(mean.on_runs) else mean
+    if choice.on_runs.beats(mean.on_runs):
+        return choice
+    one_run = choice.of_runs is None
+    sure = one_run and both_directions and choice.leaves_even_noise and choice.outweighs_noise(mean)
+    return choice if sure else mean

@@ -90,6 +90,32 @@ def test_nothing_is_better_than_a_gain_within_its_noise() -> None:
     assert choose([standard, mean], rates_told=True) is mean
 
 
+def test_a_sure_gain_from_a_few_blocks_is_worth_its_parameters() -> None:
+    """A drift at the ends of the temperatures alone: most blocks gain nothing, two gain much."""
+    noise = 1.0 + 0.02 * np.array([1, -1, 2, 0, -2, 1, 0, -1])
+    blocks = np.full(8, 200)
+    standard = Score(STANDARD, 6, noise, blocks)
+    mean = Score(Candidate(""), 1, noise + np.array([0.0, 0.0, 0.5, 0.0, 0.0, 0.6, 0.0, 0.0]), blocks)
+    assert not standard.beats(mean)
+    assert choose([standard, mean], rates_told=False) is standard
+    assert choose([standard, mean], rates_told=False, both_directions=False) is mean
+    # What is left is systematic, in some blocks more than in others: noise is no measure of the gain.
+    uneven = np.array([0.5, 0.0, 1.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    rough = [replace(score, squared_errors=score.squared_errors + uneven) for score in (standard, mean)]
+    assert choose(rough, rates_told=False) is rough[1]
+
+
+def test_even_noise_is_told_from_what_is_systematic() -> None:
+    """White noise passes but once in a thousand; a ripple in a third of the time does not."""
+    draws = np.random.default_rng(5).standard_normal((400, 20, 125))
+    even = [Score(STANDARD, 6, np.mean(d**2, axis=1), np.full(20, 125)).leaves_even_noise for d in draws]
+    assert np.mean(even) > 0.99
+    draws[:, :7] += 1.5 * np.sin(np.arange(125) / 9.0)
+    assert not any(
+        Score(STANDARD, 6, np.mean(d**2, axis=1), np.full(20, 125)).leaves_even_noise for d in draws
+    )
+
+
 def test_harm_is_looked_for_on_runs_left_out() -> None:
     """Parts of a run may be told by the rest of it where the next run is not."""
 
