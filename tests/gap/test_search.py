@@ -1,0 +1,114 @@
+"""Sets of effects: the search against trying them all, classes of those that are alike, the unknown."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from scipy.special import logsumexp
+
+from fogml.gap.basis import build_basis
+from fogml.gap.classes import rank
+from fogml.gap.dictionary import unknown_groups
+from fogml.gap.evidence import Field
+from fogml.gap.model import EffectValue
+from fogml.gap.search import Search
+from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded
+
+TRUE = {"offset": 1.0, "slope": -0.5}
+BEND = ("bend", 2.0, (("centre_temperature", 18.0), ("width", 6.0)))
+CUBE = ("cube", 3.0, ())
+LINE = ("line", 0.8, (("period", 900.0), ("phase", 70.0)))
+
+
+def nothing(time):
+    return 0.0
+
+
+@cache
+def searched(effects, ids=("bend", "cube", "mixture", "line"), added=nothing) -> Search:
+    rng = np.random.default_rng(1)
+    model, whole = SmallModel(ids), SmallModel()
+    acting = tuple(EffectValue(id, size, dict(shape)) for id, size, shape in effects)
+    runs = []
+    for name, count, turns, low in (("a", 300, 2, 0.0), ("b", 240, 3, 5.0)):
+        run = ramps(name, count=count, turns=turns, low=low)
+        made = recorded(run, whole, TRUE, acting, noise_of(run, rng))
+        runs.append(made.with_columns(gyro=made.gyro + added(made.time)))
+    frame = framed(runs, model)
+    groups = unknown_groups(frame.observations)
+    return Search(Field(build_basis(frame, model.candidates(), groups, model.grade)))
+
+
+def ranked(search):
+    explanations = search.run()
+    return rank(search, explanations), explanations
+
+
+@pytest.mark.parametrize("effects", [(), (BEND,), (CUBE, LINE)])
+def test_what_acts_is_what_is_found(effects):
+    ranking, explanations = ranked(searched(effects))
+    assert {e[0] for e in effects} == ranking.best.ids and ranking.best.unknown is None
+    named = {r.chosen.candidate for r in ranking.effects if r.probability >= 0.5}
+    assert named == ranking.best.ids
+    assert ranking.unknown < 0.5
+    order = [e.log_posterior for e in explanations]
+    assert order == sorted(order, reverse=True)
+
+
+def test_no_set_beats_the_one_that_the_search_ends_on():
+    search = searched((CUBE, LINE))
+    best = search.run()[0]
+    every = Search(search.field_)
+    held = every.field_.condition([])
+    first = {id: every._best(id, held.node_gains()) for id in every.places}
+    for size in (0, 1, 2):
+        for ids in combinations(every.places, size):
+            for unknown in (False, True):
+                found = every.explanation([first[id] for id in ids], unknown=unknown)
+                assert found.log_posterior <= best.log_posterior + 0.5, found
+
+
+def test_evidence_of_one_effect_is_the_sum_over_its_shapes_and_sizes():
+    search = searched((BEND,))
+    gains = search.field_.condition([]).node_gains()
+    # Below the length from which room for a form is made the two are the same sum.
+    for id in ("cube", "mixture"):
+        found = search.explanation([search._best(id, gains)])
+        if found.effects[0].length < 10.0:
+            assert found.log_evidence == pytest.approx(float(logsumexp(gains[search.places[id]])), abs=1e-6)
+
+
+def test_two_that_are_alike_form_a_class_whose_probability_is_of_both():
+    ranking, _ = ranked(searched((BEND,), ids=("bend", "bend_again", "cube", "line")))
+    (one,) = (r for r in ranking.effects if r.probability >= 0.5)
+    assert set(one.members) == {"bend", "bend_again"} and one.members[0] == one.chosen.candidate
+    assert one.probability > 0.9 and one.margin > 5.0
+
+
+def test_one_that_nothing_else_is_like_stands_alone():
+    ranking, _ = ranked(searched((CUBE, LINE)))
+    (one,) = (r for r in ranking.effects if r.chosen.candidate == "line")
+    assert one.members == ("line",) and one.margin > 10.0
+
+
+def test_something_that_no_candidate_can_do_is_the_unknowns():
+    def wander(time):
+        rng = np.random.default_rng([4, len(time)])
+        waves = zip(rng.normal(size=6), rng.uniform(1500.0, 5000.0, 6), rng.uniform(0.0, 6.0, 6))
+        return sum(0.3 * size * np.sin(2.0 * np.pi * time / period + f) for size, period, f in waves)
+
+    ranking, _ = ranked(searched((), ids=("bend", "bend_again", "cube"), added=wander))
+    assert ranking.unknown > 0.9
+    # What else is named is small beside it.
+    assert all(c.length < ranking.best.unknown[1] for c in ranking.best.effects)
+
+
+def test_probabilities_are_probabilities():
+    ranking, _ = ranked(searched((CUBE, LINE)))
+    assert 0.0 <= ranking.unknown <= 1.0
+    assert all(0.0 <= r.probability <= 1.0 for r in ranking.effects)
+    certain = [r.probability for r in ranking.effects]
+    assert certain == sorted(certain, reverse=True)

@@ -1,0 +1,103 @@
+"""Where a gap lies: what was put in at known places comes out there, and noise alone is nowhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.gap.noise import Noise
+from fogml.gap.observation import observe
+from fogml.gap.where import SHORTEST_SEGMENT_S, GapOnRun, where
+from fogml.runs.regimes import regimes
+from fogml.signals.noise_fit import NoiseFit, NoisePrior
+from tests.gap.small_model import NOISE, SmallModel, noise_of, ramps
+
+KNOWN = Noise(NOISE, NoiseFit(NOISE, np.diag([1e-4, 1e-3, 1e-2]), NoisePrior(NOISE), 0.0, 1), "known")
+RUN = ramps("a", count=1000, step=10.0, turns=2)
+TIME = RUN.time
+
+
+def located(added, seed=0, systematic=None, stages=None, run=RUN):
+    gap = added + noise_of(run, np.random.default_rng(seed))
+    o = observe(run, SmallModel())
+    part = GapOnRun(o, gap, added if systematic is None else systematic)
+    return where([part], {"bias": 1.0} if stages is None else stages, KNOWN)
+
+
+@pytest.fixture(scope="module")
+def bump():
+    """0.5 deg/h from 2000 to 4000 s, and for 300 s later on."""
+    inside = (TIME >= 2000.0) & (TIME < 4000.0)
+    blip = (TIME >= 7000.0) & (TIME < 7300.0)
+    return located(0.5 * (inside | blip))
+
+
+def test_shares_of_each_list_add_to_one(bump):
+    for shares in (bump.stage, bump.regime):
+        assert sum(s.share for s in shares) == pytest.approx(1.0)
+        assert all(0.0 <= s.share <= 1.0 for s in shares)
+    for share in bump.regime:
+        low, high = share.share_ci90
+        assert low <= share.share <= high
+
+
+def test_stages_share_as_their_energies():
+    found = located(np.zeros(len(RUN)), stages={"bias": 3.0, "sensor": 1.0, "rig": 0.0})
+    assert [(s.name, s.share) for s in found.stage] == [("bias", 0.75), ("sensor", 0.25)]
+    assert located(np.zeros(len(RUN)), stages={}).stage == ()
+
+
+def test_segments_are_where_it_was_and_not_shorter_than_ten_minutes(bump):
+    (segment,) = bump.segments
+    assert segment.run == "a"
+    assert segment.from_s == pytest.approx(2000.0, abs=100.0)
+    assert segment.to_s == pytest.approx(4000.0, abs=100.0)
+    assert segment.to_s - segment.from_s >= SHORTEST_SEGMENT_S
+    assert segment.excess_rms == pytest.approx(0.5, abs=0.15)
+
+
+def test_temperatures_of_the_gap_are_those_where_it_was():
+    warm = RUN.columns["T"] > 30.0
+    found = located(0.8 * warm)
+    for t in found.temperature:
+        expected = 0.8 if t.from_degc >= 30.0 else 0.0
+        assert t.excess_rms == pytest.approx(expected, abs=0.2)
+        assert t.significant == (expected > 0.0)
+
+
+def test_up_and_down_are_told_apart():
+    rising = np.gradient(RUN.columns["T"]) > 0.0
+    found = located(np.where(rising, 0.4, -0.4))
+    for t in found.temperature:
+        assert t.mean_up == pytest.approx(0.4, abs=0.25) and t.mean_down == pytest.approx(-0.4, abs=0.25)
+
+
+def test_regimes_of_the_gap_are_those_where_it_was():
+    labels = regimes(RUN)
+    name = "ramp_down"
+    added = 0.6 * (labels.labels == labels.names.index(name))
+    found = {s.name: s for s in located(added).regime}
+    assert found[name].share > 0.85 and found[name].significant
+    assert found[name].excess_rms == pytest.approx(0.6, abs=0.15)
+
+
+def test_time_scales_of_a_slow_gap_are_the_long_ones():
+    slow = located(0.4 * np.sin(2.0 * np.pi * TIME / 9000.0))
+    assert [t.tau_s for t in slow.timescale] == [10.0, 30.0, 100.0, 300.0, 1000.0]
+    excess = [t.excess for t in slow.timescale]
+    assert excess == sorted(excess) and slow.timescale[-1].significant
+    # By hand at 10 s: samples of noise and of the wave over samples of noise.
+    floor = float(np.mean(np.diag(NOISE.covariance(TIME, 10.0, NOISE.ladder(10.0, TIME[-1] + 10.0)))))
+    assert excess[0] == pytest.approx(np.sqrt((0.08 + floor) / floor), rel=0.1)
+
+
+def test_noise_alone_is_significant_nowhere():
+    flagged, told = 0, 0
+    for seed in range(6):
+        found = located(np.zeros(len(RUN)), seed)
+        assert found.segments == ()
+        for item in (*found.regime, *found.temperature):
+            told += 1
+            flagged += item.significant
+    # A regime or a temperature is flagged at 2.6 standard deviations.
+    assert flagged <= 0.15 * told, f"{flagged} of {told}"
