@@ -16,6 +16,7 @@ from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
+from fogml.models.score import MATERIAL
 from fogml.models.table import training_table
 from fogml.runs.run import Run
 
@@ -26,9 +27,16 @@ TRAINED = {"one rate": (1.0,), "three rates": (0.5, 1.0, 2.0)}
 OTHER_RATES = (0.4, 0.7, 1.5, 3.0)
 PROCESS_ROWS = 500
 AVERAGING_S = 100.0
-UNITS = {"first": range(10), "fresh": range(500, 520)}
-"""Seeds of the units: those that the rule of the choice was set with, and others."""
-SAME = 1e-9
+UNITS = {"in view": range(82000, 82060), "fresh": range(83000, 83060)}
+"""Seeds of the units: some of those that the rule of the choice was set with, and others."""
+IN_VIEW = "71000 to 71149 and 82000 to 82059"
+"""Seeds of all units that the rule at one rate was set with; that at three rates has seen none."""
+AT_THREE_RATES = UNITS["in view"]
+"""Units that are trained at three rates too, which takes most of the time."""
+HARMFUL = 11.0
+"""The largest gain, in units of p s**2/n, of a form worse at another rate, on seeds 71000 to 71149."""
+SAME = 0.02
+"""Errors alike to this share are one."""
 
 
 def world(seed: int) -> World:
@@ -83,6 +91,8 @@ def case(seed: int) -> list[dict]:
     tests = [unit.run(cycle(rate, SAMPLE_S), SAMPLE_S, 900 + seed, "test") for rate in OTHER_RATES]
     rows = []
     for trained, rates in TRAINED.items():
+        if len(rates) > 1 and seed not in AT_THREE_RATES:
+            continue
         runs = [unit.run(cycle(r, SAMPLE_S), SAMPLE_S, 10 * seed + i, f"{r}")[0] for i, r in enumerate(rates)]
         auto = make_model("auto").fit(runs)
         standard = make_model("polynomial", features=STANDARD).fit(runs)
@@ -131,7 +141,9 @@ def table(rows: list[dict]) -> str:
     ]
     for group, seeds in UNITS.items():
         chosen = [row for row in rows if row["seed"] in seeds]
-        for trained in TRAINED:
+        for trained, rates in TRAINED.items():
+            if len(rates) > 1 and not set(seeds) <= set(AT_THREE_RATES):
+                continue
             for against in ("cubic, dT, T*dT", "Gaussian process"):
                 pure = ratios(chosen, trained, against, with_floor=False)
                 residual = ratios(chosen, trained, against, with_floor=True)
@@ -149,18 +161,23 @@ def page(rows: list[dict]) -> str:
 Data: **synthetic** (units drawn by `experiments/synthetic_world.py`, noise 0.1 to 0.5 deg/h a sample
 of {SAMPLE_S:.0f} s; every other unit has a ripple over temperature that no cubic follows). `auto` is
 trained on one cycle at 1 °C/min, or on three at 0.5, 1 and 2 °C/min, and used at 0.4, 0.7, 1.5 and
-3 °C/min. The rule of the choice was set with the first units in view and judged on the fresh ones
-({described}). Ratios of
+3 °C/min. The rule of the choice at one rate was set with units {IN_VIEW} in view
+(the last of them are here) and judged once on the fresh ones ({described}). Ratios of
 `auto` to another model, unit by unit and rate by rate; below 1 `auto` is better. Means are geometric.
 *Error* is against the noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages
-in it, as a recording would; *worse in* counts the cases with a ratio of errors above 1.
+in it, as a recording would; *worse in* counts the cases with a ratio of errors above {1.0 + SAME:.2f}.
 The process sees {PROCESS_ROWS} averages. fogml {__version__}; `python -m experiments.default_rates`.
 
 {table(rows)}
 
-At one rate `auto` keeps the cubic's terms in the rate and adds to them only what gains two standard
-errors on the left-out parts of the run; so in most cases it is the cubic itself, or better. Where it is
-worse, a larger form passed by luck, and the residual shows by how little the two differ.
+At one rate `auto` keeps the cubic's terms in the rate. It adds to them only what gains two standard errors
+on the left-out parts of the run, and {MATERIAL:.0f} times what noise costs a fit (p s²/n for p parameters,
+n rows, noise s). Among forms that gain less, luck decides which does better at another rate, mostly at a
+slow one: on 150 units in view, forms that did harm gained up to {HARMFUL:.0f} p s²/n. So `auto` is the cubic
+itself in most cases, and else better. The price: a form that is right but gains little is not taken
+until the training run is quieter or longer, or until there are three rates: there two standard errors do.
+On one unit of the last 60 in view `auto` used to compensate nothing where the cubic was better; since then a
+gain over the mean that outweighs the noise counts too, where what is left is even noise.
 """
 
 
