@@ -19,12 +19,17 @@ PACKAGES = (
     "torch",
     "numba",
     "allantools",
+    "avar",
+    "polars",
+    "onnxruntime",
     "colorednoise",
+    "pysindy",
+    "sbi",
 )
 
 
 def describe_machine() -> dict[str, Any]:
-    """Processor, cores that may be used, memory, system, versions and date, JSON-ready."""
+    """Processor, cores that may be used, OpenMP threads, memory, system, versions and date, JSON-ready."""
     return {
         "date": datetime.now(UTC).strftime("%Y-%m-%d"),
         "processor": _first("/proc/cpuinfo", "model name") or platform.processor() or platform.machine(),
@@ -32,6 +37,7 @@ def describe_machine() -> dict[str, Any]:
         "memory_gb": _memory_gb(),
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
+        "threads": os.environ.get("OMP_NUM_THREADS", "all cores"),
         "versions": {name: found for name in PACKAGES if (found := _version(name))},
     }
 

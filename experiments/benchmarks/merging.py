@@ -9,6 +9,7 @@ from typing import Any
 
 from experiments.benchmarks.machine import describe_machine
 
+KINDS = ("studies", "jobs")
 SAME = ("processor", "cores", "memory_gb", "system", "python")
 """What must be the same of the machine: figures of two machines in one table would mislead."""
 
@@ -43,19 +44,23 @@ def merged(kept: Mapping[str, Any], new: Mapping[str, Any], order: Sequence[str]
     kept, new
         Results as ``results.json`` holds them.
     order
-        Names of all jobs in the order of the page.
+        Names of all jobs and studies in the order of the page.
     """
-    names = [job["name"] for job in new["jobs"]]
-    jobs = {job["name"]: job for job in (*kept["jobs"], *new["jobs"])}
+    names = [each["name"] for kind in KINDS for each in new.get(kind, [])]
+    found = {
+        kind: {each["name"]: each for each in (*kept.get(kind, []), *new.get(kind, []))} for kind in KINDS
+    }
+    known = set(order)
     later = [
-        {**entry, "jobs": [name for name in entry["jobs"] if name not in names]}
+        {**entry, "jobs": [name for name in entry["jobs"] if name not in names and name in known]}
         for entry in kept.get("merged", [])
     ]
-    how = {"jobs": names, **{key: new[key] for key in ("command", "machine", "repeats")}}
-    skipped = [left for left in (*kept["skipped"], *new["skipped"]) if left["name"] not in jobs]
+    how = {"jobs": names, **{key: new.get(key) for key in ("command", "machine", "repeats", "note")}}
+    measured = set().union(*found.values())
+    skipped = [left for left in (*kept["skipped"], *new["skipped"]) if left["name"] not in measured]
     return {
         **kept,
-        "jobs": [jobs[name] for name in order if name in jobs],
+        **{kind: [found[kind][name] for name in order if name in found[kind]] for kind in KINDS},
         "skipped": list({left["name"]: left for left in skipped}.values()),
         "merged": [*(entry for entry in later if entry["jobs"]), *([how] if names else [])],
     }

@@ -1,4 +1,4 @@
-"""Jobs within one process: Allan deviation, reading, features, training."""
+"""Training and least squares within one process."""
 
 from __future__ import annotations
 
@@ -11,109 +11,6 @@ from experiments.benchmarks.chamber import chamber_run, four_sensor_run
 from experiments.benchmarks.harness import Job, Work
 
 FloatArray = NDArray[np.float64]
-
-
-def _allan(taus: FloatArray | None, samples: int) -> Work:
-    from fogml.signals.allan import allan_deviation
-
-    rng = np.random.default_rng(1)
-    x = 15.0 + rng.standard_normal(samples)
-    # The longest of 10 million samples is a third of them; allantools gives no value of one difference.
-    times = None if taus is None else taus[taus < samples / 3]
-
-    def ours() -> tuple[FloatArray, FloatArray]:
-        found = allan_deviation(x, 1.0, times)
-        return found.taus_s, found.adev
-
-    def plain() -> tuple[FloatArray, FloatArray]:
-        import allantools
-
-        taus_s, adev, _, _ = allantools.oadev(
-            x, rate=1.0, data_type="freq", taus="octave" if times is None else times
-        )
-        return taus_s, adev
-
-    def check(a: tuple[FloatArray, FloatArray], b: tuple[FloatArray, FloatArray]) -> str:
-        np.testing.assert_array_equal(a[0], b[0])
-        np.testing.assert_allclose(a[1], b[1], rtol=1e-9)
-        return f"{len(a[0])} deviations to {np.max(np.abs(a[1] / b[1] - 1)):.1e}"
-
-    return Work(ours, plain, check)
-
-
-def _allan_octaves(quick: bool, folder: Path) -> Work:
-    return _allan(None, 50_000 if quick else 10_000_000)
-
-
-def _allan_200(quick: bool, folder: Path) -> Work:
-    return _allan(np.geomspace(1, 3.3e6, 200), 50_000 if quick else 10_000_000)
-
-
-def _csv(quick: bool, folder: Path) -> Work:
-    import pyarrow as pa
-    import pyarrow.csv
-
-    from fogml.runs.reading import read_run
-
-    run = chamber_run(20_000 if quick else 1_000_000, seed=2)
-    columns = {
-        "time [s]": run.time,
-        "gyro [deg/h]": np.round(run.gyro, 5),
-        "T_in [degC]": np.round(run.columns["T_in"], 4),
-        "T_out [degC]": np.round(run.columns["T_out"], 4),
-        "rate [deg/s]": np.zeros(len(run)),
-        "power [W]": np.round(5.0 + 0.01 * run.columns["T_in"], 3),
-    }
-    path = folder / "run.csv"
-    options = pyarrow.csv.WriteOptions(quoting_style="none")
-    pyarrow.csv.write_csv(pa.table(columns), path, options)
-
-    def ours() -> FloatArray:
-        return read_run(path).gyro
-
-    def plain() -> FloatArray:
-        import pandas
-
-        return np.asarray(pandas.read_csv(path)["gyro [deg/h]"])
-
-    def check(a: FloatArray, b: FloatArray) -> str:
-        np.testing.assert_array_equal(a, b)
-        return f"gyro, {len(a)} rows, digit by digit"
-
-    return Work(ours, plain, check)
-
-
-def _features(text: str, quick: bool) -> Work:
-    from fogml.features.features import Features
-
-    run = chamber_run(20_000 if quick else 1_000_000, seed=3)
-
-    def ours() -> FloatArray:
-        # A fresh view, so that nothing kept with a run from the turn before helps.
-        return Features(text).transform(run[:])
-
-    def plain() -> FloatArray:
-        import pandas
-
-        inner = pandas.Series(run.columns["T_in"])
-        means = inner.rolling(64).mean()
-        rate = np.asarray((means - means.shift(64)) / (64.0 / 60.0))
-        gradient = pandas.Series(run.columns["T_in"] - run.columns["T_out"])
-        means = gradient.rolling(64).mean()
-        gradient_rate = np.asarray((means - means.shift(64)) / (64.0 / 60.0))
-        t = run.columns["T_in"]
-        return np.column_stack((t, rate, t * rate, gradient, gradient_rate))
-
-    def check(a: FloatArray, b: FloatArray) -> str:
-        full = slice(128, None)
-        np.testing.assert_allclose(a[full], b[full], atol=1e-8)
-        return f"{a.shape[1]} columns to {np.max(np.abs(a[full] - b[full])):.0e}"
-
-    return Work(ours, plain, check)
-
-
-def _features_default(quick: bool, folder: Path) -> Work:
-    return _features("T, dT, T*dT, T_in-T_out, d(T_in-T_out)", quick)
 
 
 def _multipoint_columns(sensors: list[FloatArray]) -> FloatArray:
@@ -238,38 +135,5 @@ NUMERIC_JOBS = (
         "LinearRegressor",
         "scikit-learn: LinearRegression",
         _least_squares,
-    ),
-    Job(
-        "csv",
-        "CSV, 1,000,000 rows × 6",
-        "read_run, with every check",
-        "pandas.read_csv",
-        _csv,
-        limit_s=0.5,
-    ),
-    Job(
-        "features",
-        "features, 1,000,000 samples: T, dT, T*dT, gradient and its rate",
-        "Features.transform",
-        "pandas: rolling means",
-        _features_default,
-        limit_s=0.1,
-    ),
-    Job(
-        "allan-octaves",
-        "Allan deviation, 10,000,000 samples, octaves",
-        "allan_deviation, with intervals",
-        "allantools.oadev",
-        _allan_octaves,
-        least_ratio=6.0,
-        memory=True,
-    ),
-    Job(
-        "allan-200",
-        "Allan deviation, 10,000,000 samples, 200 times",
-        "allan_deviation, with intervals",
-        "allantools.oadev",
-        _allan_200,
-        least_ratio=6.0,
     ),
 )

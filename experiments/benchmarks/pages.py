@@ -13,11 +13,21 @@ def results_page(results: Mapping[str, Any]) -> str:
     machine = results["machine"]
     versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
     lines = [
-        "# Speed and memory",
+        "# Accuracy, speed and memory beside what a user would pick instead",
         "",
         f"`{results['command']}` on {machine['processor']}, {machine['cores']} cores, "
-        f"{machine['memory_gb']} GB, {machine['system']}, Python {machine['python']}, {machine['date']}.",
+        f"{machine['memory_gb']} GB, {machine['system']}, Python {machine['python']}, {machine['date']}, "
+        f"{_threads(machine)}{_note(results)}.",
         f"{versions}.",
+    ]
+    lines += [line for entry in results.get("merged", []) for line in ("", _measured_later(entry, results))]
+    for left in results["skipped"]:
+        lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
+    for study in results.get("studies", []):
+        lines += ["", f"## {study['title'][0].upper()}{study['title'][1:]}", "", _section(study)]
+    lines += [
+        "",
+        "## Pairs",
         "",
         f"Each pair ran {results['repeats']} times in turns after one run that is not counted; "
         "medians, with the least and the greatest in brackets. Ratio: the plain way's time over ours, "
@@ -37,24 +47,40 @@ def results_page(results: Mapping[str, Any]) -> str:
     lines += [
         f"| {job['name']} | {job['ours']} | {job['plain']} | {job['checked']} |" for job in results["jobs"]
     ]
-    for left in results["skipped"]:
-        lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
-    for entry in results.get("merged", []):
-        lines += ["", _measured_later(entry, machine["versions"], results["repeats"])]
     busiest = max((job["load"] for job in results["jobs"]), default=0.0)
     lines += ["", f"Greatest load of the machine before a job: {busiest:.1f}."]
     return "\n".join(lines) + "\n"
 
 
-def _measured_later(entry: Mapping[str, Any], versions: Mapping[str, str], repeats: int) -> str:
-    """How jobs that were merged in were measured, where it differs from the rest."""
-    machine = entry["machine"]
-    changed = [
+def _section(study: Mapping[str, Any]) -> str:
+    from experiments.benchmarks.jobs import STUDIES
+
+    return next(each for each in STUDIES if each.name == study["name"]).page(study)
+
+
+def _threads(machine: Mapping[str, Any]) -> str:
+    return f"OMP_NUM_THREADS {machine.get('threads', 'all cores')}"
+
+
+def _note(results: Mapping[str, Any]) -> str:
+    return f"; {results['note']}" if results.get("note") else ""
+
+
+def _measured_later(entry: Mapping[str, Any], results: Mapping[str, Any]) -> str:
+    """How measurements that were merged in were made, where it differs from the rest."""
+    machine, versions = entry["machine"], results["machine"]["versions"]
+    differs = [
         f"{name} {number}" for name, number in machine["versions"].items() if versions.get(name) != number
     ]
-    differs = [*changed, *([f"{entry['repeats']} pairs"] if entry["repeats"] != repeats else [])]
+    if _threads(machine) != _threads(results["machine"]):
+        differs.append(_threads(machine))
+    if entry["repeats"] != results["repeats"]:
+        differs.append(f"{entry['repeats']} pairs")
     told = f"; {', '.join(differs)}" if differs else ""
-    return f"{', '.join(entry['jobs'])}: `{entry['command']}` on the same machine, {machine['date']}{told}."
+    return (
+        f"{', '.join(entry['jobs'])}: `{entry['command']}` on the same machine, {machine['date']}{told}"
+        f"{_note(entry)}."
+    )
 
 
 def _seconds(spread: Mapping[str, Any]) -> str:
