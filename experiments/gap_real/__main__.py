@@ -101,26 +101,28 @@ def page(rows: list[dict[str, Any]]) -> str:
     """The result page."""
     by_prior = {label: [r for r in rows if r["noise"] == label] for label in PRIORS}
     wide, near = by_prior.values()
-    walks = [max(r["walk"] for r in part) for part in (wide, near)]
+    last = [r for r in wide if r["held_out"] == LEGS[-1]]
+    closed = ", ".join(
+        f"from {r['before']:.0f} to {r['recalibrated']:.0f} deg/h on {r['axis']}" for r in last
+    )
     borrowed = "\n".join(f"- `{id}`: {title[0].lower()}{title[1:]}" for id, title in BORROWED.items())
     return f"""# A laboratory's own simulator against a real thermal cycle
 
-Data: the shipped thermal cycle of a **MEMS** unit (no fibre-optic gyro), 52 → −17.6 → 74 → 36 °C, legs `down`,
-`up` and `last down`, three axes. Its clock can't be trusted: 0.5057 s a row is assumed, and every time constant and
-rate below scales with it. Rms of {wide[0]["averaging_s"]:.0f} s averages, deg/h. fogml {__version__};
-`python -m experiments.gap_real`.
+Data: the shipped thermal cycle of a **MEMS** unit (no fibre-optic gyro), 52 → −17.6 → 74 → 36 °C, legs
+`down`, `up` and `last down`, three axes. Its clock can't be trusted: 0.5057 s a row is assumed, and every
+time constant and rate below scales with it. Rms of {wide[0]["averaging_s"]:.0f} s averages, deg/h. fogml
+{__version__}; `python -m experiments.gap_real`.
 
-The simulator (`mems_twin.py`) is not the twin of this package: a bias polynomial of third order in T, and nothing else.
-It takes the twin's place by the documented protocol, `fogml.gap.model.GyroModel`. Each leg is replayed with the
-temperatures of the legs before it, so that hysteresis and relaxation know where the unit came from. Candidates are
-the catalogue's bias effects that need the temperature alone, with sizes a
-hundred times those of a tactical fibre-optic gyro:
+The simulator (`mems_twin.py`) is not the twin of this package: a bias polynomial of third order in T, and
+nothing else. It takes the twin's place by the documented protocol, `fogml.gap.model.GyroModel`. Each leg is
+replayed with the temperatures of the legs before it, so that hysteresis and relaxation know where the unit
+came from. Candidates are the catalogue's bias effects that need the temperature alone, with sizes a hundred
+times those of a tactical fibre-optic gyro:
 
 {borrowed}
 
-
-Two legs are fitted and the third is held out. No static run of the unit ships, so that the noise has to come from the
-same two legs.
+Two legs are fitted and the third is held out. No static run of the unit ships, so that the noise has to
+come from the same two legs.
 
 ## The noise as the runs tell it
 
@@ -139,51 +141,29 @@ B and K within a factor of 1.3: a random walk of half a degree per hour in an ho
 
 {summary(near)}
 
-{VERDICT.format(wide=walks[0], near=walks[1])}"""
+{VERDICT.format(walk=max(r["walk"] for r in wide), closed=closed)}"""
 
 
 VERDICT = """## Verdict
 
-- **Closed:** what a polynomial in T can close. Recalibration alone takes the gap from 206 to 23 deg/h on x, from 82 to 6
-  on y and from 60 to 13 on z, last leg held out.
-- **Not closed:** the rest, 3 to 60 times the floor. No candidate that needs the temperature alone closes half of it on a
-  leg that was held out, on any axis. The loop between the legs on x stays unknown, and the diagnosis says so where it is
-  asked for the last leg.
-- **Named, and not to be believed:** where a name is given, the leg held out does not confirm it, although its probability
-  is near 1. A probability is of the fit runs: one leg down and one up, in which temperature, its rate and time go
-  together, and a transition whose place and width are free bends a polynomial wherever that helps. `after` beside
-  `recalibrated` is what tells; the page of a diagnosis warns where what was found does harm. Held-out figures are for
-  that, and nothing else here could have told.
-- **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes for random
-  walk: K up to {wide:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y. With K held near a data
-  sheet's (below {near:.1f} here) more is named and no more is closed.
-- **Leg `down` held out:** nobody recorded what the unit had been through before it, so that relaxation and hysteresis
-  start from rest there, and do harm.
+- **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
+  {closed}.
+- **Not closed:** the rest, 3 to 60 times the floor. No candidate that needs the temperature alone closes
+  half of it on a leg that was held out, on any axis. The loop between the legs on x stays unknown, and the
+  diagnosis says so where it is asked for the last leg.
+- **Named, and not to be believed:** where a name is given, the leg held out does not confirm it, although
+  its probability is near 1. A probability is of the fit runs: one leg down and one up, in which
+  temperature, its rate and time go together, and a transition whose place and width are free bends a
+  polynomial wherever that helps. `after` beside `recalibrated` is what tells; the page of a diagnosis warns
+  where what was found does harm. Held-out figures are for that, and nothing else here could have told.
+- **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
+  for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
+  With B and K pulled to a data sheet's more is named and no more is closed.
+- **Leg `down` held out:** nobody recorded what the unit had been through before it, so that relaxation and
+  hysteresis start from rest there, and do harm.
 
-What to record next: a static run; a second cycle at another rate, with soaks at both ends; a clock that can be
-trusted; the temperatures before the first leg.
-
-## A simulator of one's own in the twin's place
-
-`fogml.gap.model` states what is asked for. `mems_twin.py` is all of it, `notebooks/own-simulator.ipynb` writes a
-smaller one step by step.
-
-1. **The model** (`GyroModel`): `name`; `grade`, whose column of the candidates' ranges is usual; `memory_s`, how far back
-   a replay looks; `constants` with normal priors, in which it is linear; `noise`, coefficients with factors; `candidates()`,
-   `on(run)` and `write(...)`.
-2. **The model on a run** (`ModelOnRun`): `columns()`, the response to a unit of each constant; `output(constants,
-   effects)`, the replay; `response(id, shape, constants)`, the change of the output per unit of a candidate's amplitude;
-   `reading_noise(constants)`, what the noise of the inputs makes of the replay (zeros if none); `nuisances(constants)`,
-   what is always a little off (`{{}}` if nothing). Everything is in deg/h, one value a sample. A run that lacks an input is
-   refused with an `InputError`; others are then used without it.
-3. **Candidates** (`Candidate`): `id`, `title`, `stage`, the `amplitude` and `shape` as `Quantity` with unit, usual range and
-   limits, and `confused_with`. Every effect of the catalogue is one; so is a dataclass of a few lines.
-4. `diagnose(model, fit=[...], held_out=[...])` gives the same result as for the twin, `gap_page(found)` its page, and
-   `found.write_model(model, path)` calls the model's own `write` with what was found.
-
-What to check first, before a diagnosis is believed: `output` must be linear in the constants with just these columns,
-and an effect's `output` with a small amplitude must differ from that without by amplitude times `response`; a
-synthetic run with a known effect must give that effect. The notebook does all three.
+What to record next: a static run; a second cycle at another rate, with soaks at both ends; a clock that can
+be trusted; the temperatures before the first leg.
 """
 
 
