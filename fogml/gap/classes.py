@@ -7,13 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from fogml.gap.search import Chosen, Explanation, Search
+from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
 SAME_CLASS_NATS = 3.0
 FORM_SHARE = 0.01
 """Share of an effect's gain that may hang on details of its form."""
+UNEVEN = 0.03
+"""Prior probability of an unknown in the noise."""
 LEAST_PROBABILITY = 0.1
 """Effects less probable than this are not listed."""
 
@@ -52,11 +55,14 @@ class Ranking:
         Effects with some probability, the most certain first.
     unknown
         Probability that something unknown acts, by the evidence.
+    noise
+        What is uneven in the noise.
     """
 
     best: Explanation
     effects: tuple[Ranked, ...]
     unknown: float
+    noise: UnevenNoise
 
 
 def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
@@ -73,6 +79,9 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
     classes = {c.candidate: _members(search, best, c.candidate) for c in best.effects}
     weights = _weights(explanations)
     unknown = float(sum(w for e, w in zip(explanations, weights) if e.unknown is not None))
+    noise = uneven_noise(search, best)
+    uneven = expit(noise.gain + math.log(UNEVEN / (1.0 - UNEVEN)))
+    unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
     ranked = []
     taken: set[str] = set()
     for chosen in best.effects:
@@ -86,7 +95,7 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
         if other.probability >= LEAST_PROBABILITY:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
-    return Ranking(best, tuple(ranked), unknown)
+    return Ranking(best, tuple(ranked), unknown, noise)
 
 
 def _weights(explanations: Sequence[Explanation]) -> np.ndarray:

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 def describe_unknown(p: Prepared, search: Search, ranking: Ranking) -> str:
     """The best group's words."""
     best = ranking.best
+    if best.unknown is None and ranking.noise.gain > 3.0:
+        return ranking.noise.looks_like
     shown = best if best.unknown is not None else search.explanation(best.effects, unknown=True)
     if shown.unknown is None:
         return ""

@@ -20,7 +20,11 @@ LAGS_S = (600.0, 1800.0, 5400.0, 16200.0)
 DECAYS_S = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
 SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
 """Shortest half-period of each group of cosines in time [s]."""
+EDGES_S = (30.0, 120.0, 600.0, 2400.0)
 KNOTS = 9
+WAVES = 40
+MIXED = ("start", "time", "temperature", "temperature_rate", "direction", "past", "gradient", "table_rate")
+"""Groups that may act together."""
 
 
 @dataclass(frozen=True)
@@ -59,6 +63,7 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
         u = [(t - 0.5 * (low + high)) / half for t in temperatures]
         groups += [
             ("temperature", "is a function of temperature", [_bumps(x) for x in u]),
+            ("temperature_fine", "is periodic in temperature, or jumps with it", [_waves(x) for x in u]),
             ("temperature_rate", "follows the rate of temperature", _rates(observations, u)),
             ("direction", "follows the direction of temperature change", _directions(observations, u)),
             ("past", "remembers past temperatures", [_past(o, half) for o in observations]),
@@ -69,7 +74,11 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
         )
     if any(np.any(o.run.rate) for o in observations):
         groups.append(("table_rate", "follows the table's rate", _table(observations, temperatures)))
-    return [Group(name, words, tuple(columns)) for name, words, columns in groups]
+    held = [Group(name, words, tuple(columns)) for name, words, columns in groups]
+    mixed = [g for g in held if g.name in MIXED]
+    together = tuple(np.concatenate([g.columns[r] for g in mixed], axis=1) for r in range(len(observations)))
+    words = "follows temperature, its rate and its past in a way of its own"
+    return [*held, Group("mixed", words, together)]
 
 
 def _own(observations: Sequence[Observation], half_period_s: float) -> list[FloatArray]:
@@ -105,6 +114,11 @@ def _bumps(u: FloatArray) -> FloatArray:
     return np.exp(-0.5 * ((u[:, None] - centres) * (KNOTS - 1) / 2.0 / 0.9) ** 2)
 
 
+def _waves(u: FloatArray) -> FloatArray:
+    """Cosines over the span of temperatures, shape (m, WAVES)."""
+    return np.asarray(np.cos(0.5 * np.pi * np.outer(u + 1.0, np.arange(1, WAVES + 1))))
+
+
 def _rates(observations: Sequence[Observation], u: Sequence[FloatArray]) -> list[FloatArray]:
     blocks = []
     for o, x in zip(observations, u):
@@ -124,7 +138,7 @@ def _directions(observations: Sequence[Observation], u: Sequence[FloatArray]) ->
     for o, x in zip(observations, u):
         sign = np.tanh(_rate(o) / 0.05)
         held = Memory()
-        plays = [held.play(f"{w}", o.temperature, w) - o.temperature for w in (2.0, 6.0, 18.0)]
+        plays = [held.play(f"{w}", o.temperature, w) - o.temperature for w in (2.0, 6.0, 18.0, 40.0)]
         blocks.append(np.column_stack([sign, sign * x, sign * x**2, *plays, x * plays[1]]))
     return blocks
 
@@ -155,7 +169,8 @@ def _past(o: Observation, half: float) -> FloatArray:
     t = o.temperature
     lagged = [(_lag(o, t, tau) - t) / half for tau in LAGS_S]
     swing = [_lag(o, np.abs(_rate(o)), tau) for tau in LAGS_S[1:]]
-    return np.column_stack([*lagged, *swing])
+    reached = [np.minimum.accumulate(t) / half, np.maximum.accumulate(t) / half]
+    return np.column_stack([*lagged, *swing, *reached])
 
 
 def _table(observations: Sequence[Observation], temperatures: Sequence[FloatArray]) -> list[FloatArray]:
@@ -163,23 +178,14 @@ def _table(observations: Sequence[Observation], temperatures: Sequence[FloatArra
     blocks = []
     for o, t in zip(observations, temperatures):
         rate = o.averaged(o.run.rate) / top
+        size = np.abs(rate)
         u = (t - 25.0) / 50.0
         hours = (o.time - o.time[0]) / 36000.0
-        blocks.append(
-            np.column_stack(
-                [
-                    np.abs(rate),
-                    rate**2,
-                    rate**3,
-                    np.sign(np.round(rate, 6)),
-                    np.abs(rate) * u,
-                    rate * u**3,
-                    rate * _rate(o),
-                    rate * hours,
-                    _lag(o, np.abs(rate), 600.0),
-                ]
-            )
-        )
+        direct = [size, rate**2, rate**3, np.sign(np.round(rate, 6)), size * u, rate * u**3]
+        after = [_lag(o, rate, tau) - rate for tau in EDGES_S] + [
+            _lag(o, size, tau) - size for tau in EDGES_S
+        ]
+        blocks.append(np.column_stack([*direct, rate * _rate(o), rate * hours, *after]))
     return blocks
 
 

@@ -56,7 +56,7 @@ class Field:
         self._factor = np.linalg.cholesky(inner)
         self._half = solve_triangular(self._factor, gram[fixed], lower=True)
         self.gram: FloatArray = gram - self._half.T @ self._half
-        self._rows = basis.rows
+        self.rows = basis.rows
         self._slacks: dict[int, tuple[int, ...]] = {}
         width = max((len(n.columns) for n in basis.nodes), default=1)
         self.rank = width
@@ -85,11 +85,11 @@ class Field:
             return ()
         fixed = self.basis.rows[:, self.basis.constants]
         half = solve_triangular(self._factor, fixed.T @ columns, lower=True)
-        across = self._rows.T @ columns - self._half.T @ half
+        across = self.rows.T @ columns - self._half.T @ half
         own = columns.T @ columns - half.T @ half
         self.gram = np.block([[self.gram, across], [across.T, own]])
         self._half = np.concatenate([self._half, half], axis=1)
-        self._rows = np.concatenate([self._rows, columns], axis=1)
+        self.rows = np.concatenate([self.rows, columns], axis=1)
         return tuple(range(first, first + width))
 
     def condition(self, terms: Sequence[Term]) -> Conditioned:

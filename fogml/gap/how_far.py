@@ -119,7 +119,7 @@ def _mean_square(values: FloatArray) -> float:
 
 def _floor(windows: Averages, noise: Noise, rng: np.random.Generator) -> tuple[float, float]:
     """Expected mean square of the noise's averages, and the deviation of one run's from it."""
-    floor = expected_mean_square(noise.model, windows.time, windows.window_s)
-    drawn = mean_square_draws(noise.model, windows.time, windows.window_s, 200, rng)
+    floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
+    drawn = mean_square_draws(noise.fit.model, windows.time, windows.window_s, 200, rng)
     models = [expected_mean_square(m, windows.time, windows.window_s) for m in noise.fit.draw(rng, 12)]
     return float(floor), float(np.hypot(np.std(drawn), np.std(models)))

@@ -20,7 +20,9 @@ UNIT_FACTOR = 1.3
 """Noise of a unit from one run to another, as a factor."""
 BESIDE = ("temperature", "temperature_rate", "past", "start", "time", "direction", "gradient", "table_rate")
 """Groups of the unknown that are kept out of the noise."""
-MOST_ROWS = 2048
+MOST_ROWS = 1500
+SAFE_SIDE = 0.6
+"""Standard errors that slow noise is taken larger by."""
 
 
 @dataclass(frozen=True)
@@ -104,7 +106,16 @@ def noise_of(
         averaging_s=observations[0].row_s,
         most=MOST_ROWS,
     )
-    return Noise(fit.model, fit, source)
+    return Noise(_on_the_safe_side(fit), fit, source)
+
+
+def _on_the_safe_side(fit: NoiseFit) -> NoiseModel:
+    """The fitted noise with slow terms larger by a share of their uncertainty.
+
+    Slow noise that is underestimated looks like an effect; overestimated it only hides a weak one.
+    """
+    _, b, k = SAFE_SIDE * np.minimum(fit.standard_errors, 1.0)
+    return NoiseModel(float(fit.model.N), float(fit.model.B * np.exp(b)), float(fit.model.K * np.exp(k)))
 
 
 def _quiet(o: Observation) -> NDArray[np.bool_]:

@@ -140,7 +140,7 @@ def _series(p: Prepared, o: Observation, role: str, after: Fit) -> RunSeries:
         gap_before=windows.of(o.recorded - replays["before"]),
         gap_recalibrated=windows.of(o.recorded - replays["recalibrated"]),
         gap_after=windows.of(o.recorded - replays["after"]),
-        floor=expected_mean_square(p.noise.model, windows.time, windows.window_s) ** 0.5,
+        floor=expected_mean_square(p.noise.fit.model, windows.time, windows.window_s) ** 0.5,
         gyro=o.run.facts.unit,
         axis=o.run.facts.axis,
         note=o.run.facts.notes or "",

@@ -18,9 +18,9 @@ from fogml.gap.evidence import Conditioned, Field, Term, by_candidate
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 
 MOST_EFFECTS = 4
-SIZES = (0.35, 0.4, 0.15, 0.07, 0.03)
+SIZES = (0.4, 0.4, 0.15, 0.04, 0.01)
 """Prior probability of 0, 1, ... effects; all effects are equally likely."""
-UNKNOWN = 0.2
+UNKNOWN = 0.25
 """Prior probability that something unknown acts besides."""
 BEAM = (8, 6, 4)
 """Sets that grow further, by their size."""

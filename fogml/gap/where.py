@@ -100,7 +100,7 @@ class _Averaged:
             windows,
             windows.of(g.gap),
             windows.of(g.systematic),
-            expected_mean_square(noise.model, windows.time, windows.window_s),
+            expected_mean_square(noise.fit.model, windows.time, windows.window_s),
             o.regime[windows.starts[windows.full]].astype(np.float64),
             temperature,
             np.gradient(temperature) if len(temperature) > 1 else np.zeros(len(temperature)),
@@ -181,7 +181,7 @@ def _timescales(gaps: Sequence[GapOnRun], noise: Noise) -> tuple[TimescaleExcess
         for g in gaps:
             windows = averages(g.observation, tau)
             values = windows.of(g.gap)
-            floor = expected_mean_square(noise.model, windows.time, windows.window_s)
+            floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
             ratios.append(float(np.mean(values**2)) / floor)
             weights.append(len(values))
             counts += len(values)

@@ -197,11 +197,14 @@ def _closed_covered(truth: Truth, gap: Gap) -> tuple[bool, ...]:
 def _amplitude_covered(truth: Truth, which: tuple[Listed, ...]) -> tuple[bool, ...]:
     """For named effects that are true themselves, where units and forms compare."""
     true = {effect.id: effect.amplitude for effect in truth.known}
+    # (A, phase) and (-A, phase + 180 deg) are the same effect.
+    turning = {effect.id for effect in truth.known if {"phase", "direction"} & set(effect.shape)}
     covered = []
     for item in which:
         fitted, value = item.amplitude, true.get(item.effect)
         if not item.named or fitted is None or value is None or fitted.se is None:
             continue
         if fitted.unit == value.unit and np.isfinite(fitted.se):
-            covered.append(abs(fitted.value - value.value) <= _Z90 * fitted.se)
+            sign = -1.0 if item.effect in turning and fitted.value * value.value < 0.0 else 1.0
+            covered.append(abs(sign * fitted.value - value.value) <= _Z90 * fitted.se)
     return tuple(covered)
