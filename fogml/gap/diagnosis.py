@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.gap.assumptions import assumptions
 from fogml.gap.basis import Basis, build_basis
 from fogml.gap.classes import Ranked, Ranking, rank
 from fogml.gap.describe import describe_unknown
@@ -15,9 +16,17 @@ from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, EffectValue, GyroModel
+from fogml.gap.next_run import next_run
 from fogml.gap.noise import Noise
 from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
-from fogml.gap.reports import candidate_evidence, constant_fits, noise_report, run_series, with_run_amplitudes
+from fogml.gap.reports import (
+    candidate_evidence,
+    constant_fits,
+    noise_report,
+    run_series,
+    weighed_by_runs,
+    with_run_amplitudes,
+)
 from fogml.gap.result import Diagnosis, Estimate, Found, HowFar, Unknown, Verdict
 from fogml.gap.search import Search
 from fogml.gap.starting import starting_values
@@ -39,6 +48,7 @@ def diagnose(
     noise: Run | None = None,
     without: Iterable[str] = (),
     seed: int = 0,
+    plan: bool = True,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Where the gap between a model and recordings lies, which effect causes it, how far it closes.
@@ -57,6 +67,8 @@ def diagnose(
         Ids of effects that are no candidates.
     seed
         Of the draws behind intervals.
+    plan
+        Whether to look for a programme that tells a class's members apart.
     progress
         Told what is being done.
 
@@ -70,7 +82,7 @@ def diagnose(
 
     # Matrices are small: more threads than one cost more than they bring.
     with threadpool_limits(1):
-        return _diagnosed(twin, fit, held_out, noise, without, seed, progress or (lambda what: None))
+        return _diagnosed(twin, fit, held_out, noise, without, seed, plan, progress or (lambda what: None))
 
 
 def _diagnosed(
@@ -80,6 +92,7 @@ def _diagnosed(
     noise: Run | None,
     without: Iterable[str],
     seed: int,
+    plan: bool,
     tell: Progress,
 ) -> Diagnosis:
     model = as_model(twin)
@@ -96,7 +109,7 @@ def _diagnosed(
             prepared = again
             basis = _basis(prepared, candidates, values, tell)
             search, ranking = _searched(basis, tell)
-    return _result(prepared, candidates, basis, search, ranking, seed, tell)
+    return _result(prepared, candidates, basis, search, ranking, seed, plan, tell)
 
 
 def _searched(basis: Basis, tell: Progress) -> tuple[Search, Ranking]:
@@ -153,10 +166,12 @@ def _result(
     search: Search,
     ranking: Ranking,
     seed: int,
+    plan: bool,
     tell: Progress,
 ) -> Diagnosis:
     tell("fitting what was found")
     found, fits = _found(p, candidates, basis, ranking)
+    found = weighed_by_runs(with_run_amplitudes(p, fits, found))
     unknown = Unknown(
         ranking.unknown, describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
     )
@@ -175,19 +190,19 @@ def _result(
         noise_run=p.noise_run,
         held_out_is_part=p.held_out_is_part,
         verdict=verdict,
-        found=with_run_amplitudes(p, after, found),
+        found=found,
         unknown=unknown,
         where=where(gaps, stage_energies(p, after, candidates, search, ranking), p.noise),
         how_far=far,
         undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
-        separating_run=None,
+        separating_run=next_run(p, found, candidates, search, seed, tell) if plan else None,
         constants=constant_fits(p.model, after),
         evidence=evidence,
         noise=noise_report(p, after),
         effects=after.effects,
         series=run_series(p, after),
         unusable=p.unusable,
-        assumed=(),
+        assumed=assumptions(p, basis),
         model=p.model.name,
     )
 

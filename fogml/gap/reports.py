@@ -31,6 +31,8 @@ if TYPE_CHECKING:
     from fogml.gap.classes import Ranking
     from fogml.gap.preparing import Prepared
 
+INCONSISTENT = 0.6
+"""What is left of the probability of an effect whose runs disagree on its size."""
 LEAST_LENGTH = 3.0
 """Whitened length under which an effect can't be shown."""
 
@@ -193,3 +195,8 @@ def _agree(rows: Sequence[RunAmplitude]) -> bool:
     return bool(
         np.all(np.sign(values[np.abs(values) > 2.0 * errors]) == np.sign(mean)) and square < 4.0 * len(rows)
     )
+
+
+def weighed_by_runs(found: Sequence[Found]) -> tuple[Found, ...]:
+    """Effects that differ from run to run are less probable by `INCONSISTENT`."""
+    return tuple(f if f.consistent else replace(f, probability=INCONSISTENT * f.probability) for f in found)

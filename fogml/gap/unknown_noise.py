@@ -39,7 +39,8 @@ def uneven_noise(search: Search, best: Explanation) -> UnevenNoise:
     expected = float(
         np.mean(np.minimum(np.random.default_rng(0).standard_normal(100_000) ** 2, LARGEST_SQUARE))
     )
-    data, kinds = [], {}
+    data: list[FloatArray] = []
+    kinds: dict[str, list[tuple[FloatArray, FloatArray]]] = {}
     for o, run in zip(frame.observations, frame.runs):
         starts = np.arange(0, len(o), BLOCK_ROWS)
         counts = np.diff(starts, append=len(o))
@@ -73,15 +74,13 @@ def _causes(o: Observation) -> dict[str, FloatArray]:
     t = o.temperature
     rate = 60.0 * (t - Memory().lag("rate", o.time, t, 100.0)) / 100.0
     middle = 0.5 * (float(t.max()) + float(t.min()))
-    causes = {
+    causes: dict[str, FloatArray] = {
         "high temperature": np.maximum(t - middle, 0.0),
         "low temperature": np.maximum(middle - t, 0.0),
         "the rate of temperature": np.abs(rate),
         "time": o.time - o.time[0],
     }
-    if np.any(o.run.rate):
-        causes["the table's rate"] = np.abs(o.averaged(o.run.rate))
-    return causes
+    return causes | {"the table's rate": np.abs(o.averaged(o.run.rate))}
 
 
 def _residual(search: Search, best: Explanation) -> FloatArray:

@@ -64,6 +64,7 @@ def diagnosis(case: CaseFiles, out: Path) -> Any:
         noise=read_run(case.noise) if case.noise else None,
         without=case.without,
         seed=case.seed,
+        plan=False,
     )
     text = json.dumps(found.as_dict(), allow_nan=False, ensure_ascii=False)
     (out / "gap.json").write_text(text + "\n", encoding="utf-8")

@@ -1,0 +1,34 @@
+"""What a diagnosis assumes, in words."""
+
+from __future__ import annotations
+
+from fogml.gap.basis import Basis
+from fogml.gap.noise import SAFE_SIDE
+from fogml.gap.preparing import Prepared
+from fogml.gap.priors import SLACK
+
+
+def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
+    """Sentences for the report."""
+    fitted = ", ".join(o.run.name for o in p.fit)
+    said = [
+        "The constants of the model are normal about their priors, shared by all runs of the unit, and "
+        "fitted together with every effect.",
+        f"After a start or a gap {p.model.memory_s:g} s of each run take no part in any figure: "
+        "the model can't know what came before.",
+        "Noise is Gaussian: white noise, flicker and a random walk. It was fitted on "
+        f"{p.noise.source}; for the search its slow terms are taken {SAFE_SIDE:g} standard errors larger.",
+        f"An effect's true form may differ from the catalogue's by {SLACK:.0%} of its size.",
+        "Amplitudes are taken to lie within the card's ranges, or a decade or so outside.",
+    ]
+    widths = {o.run.name: o.row_s for o in p.fit if o.width > 1}
+    if widths:
+        listed = ", ".join(f"{name}: {width:g} s" for name, width in widths.items())
+        said.append(f"Long runs were averaged before the search ({listed}); faster effects can't be seen.")
+    if len(p.fit) == 1:
+        said.append(f"One run only ({fitted}): nothing that differs between runs can be told.")
+    if not any(o.run.earth_known for o in p.fit):
+        said.append("Earth rate is not known from the side files and is part of the bias b0.")
+    if basis.within_constants:
+        said.append("One with the constants on these runs: " + ", ".join(basis.within_constants) + ".")
+    return tuple(said)
