@@ -7,6 +7,7 @@ from experiments.benchmarks.allan_jobs import ALLAN_JOBS
 from experiments.benchmarks.command_jobs import COMMAND_JOBS
 from experiments.benchmarks.compensation_jobs import COMPENSATION_JOBS
 from experiments.benchmarks.compensation_study import COMPENSATION_STUDIES
+from experiments.benchmarks.diagnosis import DIAGNOSIS_STUDIES
 from experiments.benchmarks.feature_jobs import FEATURE_JOBS
 from experiments.benchmarks.file_jobs import FILE_JOBS
 from experiments.benchmarks.harness import Job
@@ -29,5 +30,6 @@ STUDIES: tuple[Study, ...] = (
     *ACCURACY_STUDIES,
     *TRAINING_STUDIES,
     *COMPENSATION_STUDIES,
+    *DIAGNOSIS_STUDIES,
     *LIMIT_STUDIES,
 )

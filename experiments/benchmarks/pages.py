@@ -25,6 +25,10 @@ def results_page(results: Mapping[str, Any]) -> str:
         lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
     for study in results.get("studies", []):
         lines += ["", f"## {study['title'][0].upper()}{study['title'][1:]}", "", _section(study)]
+    if results.get("studies"):
+        lines += ["", "## Peers", "", *_peers()]
+    if not results["jobs"]:
+        return "\n".join(lines) + "\n"
     lines += [
         "",
         "## Pairs",
@@ -56,6 +60,23 @@ def _section(study: Mapping[str, Any]) -> str:
     from experiments.benchmarks.jobs import STUDIES
 
     return next(each for each in STUDIES if each.name == study["name"]).page(study)
+
+
+def _peers() -> list[str]:
+    """What each name in the tables stands for."""
+    from experiments.benchmarks.peers import PEERS
+
+    lines = ["| name | what | inputs | rows at most | set by the search |", "|---|---|---|---:|---|"]
+    for peer in PEERS:
+        most = f"{peer.most_rows:,}" if peer.most_rows else "all"
+        lines.append(f"| {peer.name} | {peer.title} | {peer.features} | {most} | {', '.join(peer.ranges)} |")
+    return [
+        *lines,
+        "",
+        "More rows than that are averaged over blocks of time. Not all of a recording fits every peer: a "
+        "Gaussian process on 10,000 rows needs 0.8 GB for its matrix and a third of a Tflop for each of some "
+        "hundred steps of its search, SVR and KernelRidge take time in the square or cube of their rows.",
+    ]
 
 
 def _threads(machine: Mapping[str, Any]) -> str:
