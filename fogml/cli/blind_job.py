@@ -122,6 +122,14 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             kinds=kinds,
             progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
         )
+    from fogml.gap.blind.without import leave_out_relatives
+
+    with terminal.work("leaving out relatives") as work:
+        leave_out_relatives(
+            folder,
+            settings.workers,
+            lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
+        )
     config = settings.in_full().yaml("blind make")
     (folder.path / "make.yaml").write_text(config, encoding="utf-8")
     terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})

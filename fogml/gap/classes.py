@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit, logsumexp
 
+from fogml.gap.confidence import named_probability, unknown_probability
 from fogml.gap.search import Chosen, Explanation, Search
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
@@ -55,6 +56,8 @@ class Ranking:
         Effects with some probability, the most certain first.
     unknown
         Probability that something unknown acts, by the evidence.
+    log_odds
+        Those of the unknown, before calibration.
     noise
         What is uneven in the noise.
     """
@@ -62,6 +65,7 @@ class Ranking:
     best: Explanation
     effects: tuple[Ranked, ...]
     unknown: float
+    log_odds: float
     noise: UnevenNoise
 
 
@@ -95,7 +99,8 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
         if other.probability >= LEAST_PROBABILITY:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
-    return Ranking(best, tuple(ranked), unknown, noise)
+    log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))
+    return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise)
 
 
 def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
@@ -132,4 +137,8 @@ def _ranked(
     probability = min(float(weights[inside].sum()), 1.0)
     without = max((e.log_posterior for e, i in zip(explanations, inside) if not i), default=-math.inf)
     with_it = max(e.log_posterior for e, i in zip(explanations, inside) if i)
-    return Ranked(chosen, members, probability, with_it - without)
+    margin = with_it - without
+    if len(inside) > int(inside.sum()):
+        # The smaller of the two: many weak sets without the class may outweigh the best of them.
+        margin = min(margin, math.log(max(probability, 1e-300)) - math.log(max(1.0 - probability, 1e-14)))
+    return Ranked(chosen, members, named_probability(margin), margin)

@@ -172,9 +172,8 @@ def _result(
     tell("fitting what was found")
     found, fits = _found(p, candidates, basis, ranking)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
-    unknown = Unknown(
-        ranking.unknown, describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
-    )
+    looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
+    unknown = Unknown(ranking.unknown, looks_like, ranking.log_odds)
     verdict = _verdict(found, unknown)
     if verdict == "unknown":
         found = ()
@@ -238,6 +237,7 @@ def _found(
                 stage=declared.stage,
                 members=r.members,
                 probability=r.probability,
+                margin=r.margin,
                 amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
                 parameters={
                     q.name: Estimate(value.shape[q.name], float(errors.get(f"{id}.{q.name}", 0.0)), q.unit)

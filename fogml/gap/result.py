@@ -55,6 +55,8 @@ class Found:
         In the card's unit.
     parameters
         Shape parameters by name.
+    margin
+        By how much the evidence falls without the class [nats].
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -69,6 +71,7 @@ class Found:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     by_run: tuple[RunAmplitude, ...] = ()
     consistent: bool = True
+    margin: float = 0.0
 
     @property
     def named(self) -> bool:
@@ -78,10 +81,14 @@ class Found:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What no candidate explains: its probability, and what it looks like in plain words."""
+    """What no candidate explains: its probability, and what it looks like in plain words.
+
+    ``log_odds`` are those of the evidence, before calibration.
+    """
 
     probability: float
     looks_like: str
+    log_odds: float = 0.0
 
 
 @dataclass(frozen=True)

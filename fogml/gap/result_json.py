@@ -55,6 +55,7 @@ def _found(found: Found) -> dict[str, Any]:
         "stage": found.stage,
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
+        "margin": found.margin,
     }
 
 

@@ -1,0 +1,68 @@
+"""Leaves out with a library effect what can't be told from it.
+
+A relative that stays a candidate would be named in its place, rightly, and nothing would be learned
+about how an unknown is met. The second reality knows no library, so this is a step of its own.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+
+from fogml.gap.blind.folders import BlindFolder, read_json
+from fogml.gap.blind.relatives import relatives_of
+from fogml.gap.blind.truth import Truth
+from fogml.outputs import whole_file
+
+OPTIONS = "options.json"
+RELATIVES = "relatives"
+
+
+def leave_out_relatives(
+    folder: BlindFolder, workers: int = 1, progress: Callable[[int, int], None] | None = None
+) -> int:
+    """Add relatives of left-out effects to every case's ``without``; returns how many cases were changed.
+
+    Cases that were seen before are left as they are.
+    """
+    from joblib import Parallel, delayed
+
+    names = [name for name in folder.names() if _is_open(folder, name)]
+    changed = 0
+    jobs = Parallel(n_jobs=workers, return_as="generator_unordered")(
+        delayed(_leave_out)(folder, name) for name in names
+    )
+    for done, more in enumerate(jobs, 1):
+        changed += bool(more)
+        if progress:
+            progress(done, len(names))
+    return changed
+
+
+def _is_open(folder: BlindFolder, name: str) -> bool:
+    """Whether something is left out of a case, and its relatives not yet."""
+    options = read_json(folder.cases / name / OPTIONS)
+    return bool(options.get("without")) and RELATIVES not in options
+
+
+def _leave_out(folder: BlindFolder, name: str) -> list[str]:
+    from fogml.twin.registry import effects
+
+    truth = Truth.model_validate(read_json(folder.truth / f"{name}.json"))
+    relative = relatives_of(folder, truth)
+    known = {e.id for e in truth.known}
+    found = [
+        id
+        for id, declared in effects().items()
+        if declared.candidate
+        and relative is not None
+        and id not in truth.left_out
+        and id not in known
+        and relative(id)
+    ]
+    path = folder.cases / name / OPTIONS
+    options = read_json(path)
+    options |= {"without": [*options["without"], *found], RELATIVES: found}
+    with whole_file(path) as partial:
+        partial.write_text(json.dumps(options) + "\n", encoding="utf-8")
+    return found
