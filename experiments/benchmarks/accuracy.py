@@ -13,6 +13,7 @@ import numpy as np
 from experiments.benchmarks.accuracy_cases import Case, cold_start, thermal_cycle, twin_runs
 from experiments.benchmarks.peer_model import Budget, PeerModel
 from experiments.benchmarks.peers import PEERS
+from experiments.benchmarks.reasons import winners
 from experiments.benchmarks.study import Study
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
@@ -126,10 +127,13 @@ def table(rows: Sequence[Row], by: str, figure: Callable[[Row], float] = over_fl
         columns = [mean([figure(row) for row, _ in own if row[by] == value]) for value in values]
         best = sum(figure(row) == least[case] for row, case in own)
         means[label] = (*columns, mean(found)), max(found), best
+    best_in_column = np.argmin([columns for columns, _, _ in means.values()], axis=0)
     lowest = np.min([columns for columns, _, _ in means.values()], axis=0)
     for label, (columns, worst, best) in means.items():
         cells = [f"**{v:.3g}**" if v == low else f"{v:.3g}" for v, low in zip(columns, lowest)]
         lines.append(f"| {label} | {' | '.join(cells)} | {worst:.3g} | {best} of {len(least)} |")
+    told = winners([list(means)[i] for i in best_in_column])
+    lines += ["", told] if told else []
     return "\n".join(lines)
 
 

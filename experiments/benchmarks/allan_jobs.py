@@ -63,10 +63,13 @@ def _work(
         found = allan_deviation(x, 1.0, taus)
         return found.taus_s, found.adev
 
+    # avar sums the samples with their mean, so it loses some digits of long series.
+    tolerance = 1e-7 if plain is _avar else 1e-9
+
     def check(a: Deviations, b: Deviations) -> str:
         shared, at_a, at_b = np.intersect1d(a[0], b[0], return_indices=True)
         assert len(shared) >= len(a[0]) - 1, (len(shared), len(a[0]))
-        np.testing.assert_allclose(a[1][at_a], b[1][at_b], rtol=1e-9)
+        np.testing.assert_allclose(a[1][at_a], b[1][at_b], rtol=tolerance)
         return f"{len(shared)} deviations to {np.max(np.abs(a[1][at_a] / b[1][at_b] - 1)):.1e}"
 
     return Work(ours, lambda: plain(x, taus), check)

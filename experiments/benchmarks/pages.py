@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from experiments.benchmarks.reasons import lost_pairs
+
 QUANTITIES = {"seconds": "s", "ratio": "×", "peak_mb": "MB"}
 
 
@@ -20,7 +22,7 @@ def results_page(results: Mapping[str, Any]) -> str:
         f"{_threads(machine)}{_note(results)}.",
         f"{versions}.",
     ]
-    lines += [line for entry in results.get("merged", []) for line in ("", _measured_later(entry, results))]
+    lines += [line for told in _measured_later(results) for line in ("", told)]
     for left in results["skipped"]:
         lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
     for study in results.get("studies", []):
@@ -38,19 +40,23 @@ def results_page(results: Mapping[str, Any]) -> str:
         "median of the pairs. The results of the two were compared first. Memory is the greatest "
         "resident memory of a process that does the job once.",
         "",
-        "| job | ours | plain | ratio | memory | limit |",
-        "|---|---|---|---|---|---|",
+        "| job | beside | ours | plain | ratio | memory | limit |",
+        "|---|---|---|---|---|---|---|",
     ]
     for job in results["jobs"]:
         memory = f"{job['peak_mb']:.0f} MB" if job["peak_mb"] is not None else ""
         lines.append(
-            f"| {job['title']} | {_seconds(job['ours_s'])} | {_seconds(job['plain_s'])} "
+            f"| {job['title']} | {job['plain'].split(',')[0]} "
+            f"| {_seconds(job['ours_s'])} | {_seconds(job['plain_s'])} "
             f"| {job['ratio']['median']:.3g} | {memory} | {_limits(job)} |"
         )
     lines += ["", "| job | ours | plain | compared |", "|---|---|---|---|"]
     lines += [
         f"| {job['name']} | {job['ours']} | {job['plain']} | {job['checked']} |" for job in results["jobs"]
     ]
+    lost = lost_pairs(results["jobs"])
+    if lost:
+        lines += ["", "Where the plain way is faster:", "", *lost]
     busiest = max((job["load"] for job in results["jobs"]), default=0.0)
     lines += ["", f"Greatest load of the machine before a job: {busiest:.1f}."]
     return "\n".join(lines) + "\n"
@@ -87,21 +93,25 @@ def _note(results: Mapping[str, Any]) -> str:
     return f"; {results['note']}" if results.get("note") else ""
 
 
-def _measured_later(entry: Mapping[str, Any], results: Mapping[str, Any]) -> str:
+def _measured_later(results: Mapping[str, Any]) -> list[str]:
     """How measurements that were merged in were made, where it differs from the rest."""
-    machine, versions = entry["machine"], results["machine"]["versions"]
-    differs = [
-        f"{name} {number}" for name, number in machine["versions"].items() if versions.get(name) != number
-    ]
-    if _threads(machine) != _threads(results["machine"]):
-        differs.append(_threads(machine))
-    if entry["repeats"] != results["repeats"]:
-        differs.append(f"{entry['repeats']} pairs")
-    told = f"; {', '.join(differs)}" if differs else ""
-    return (
-        f"{', '.join(entry['jobs'])}: `{entry['command']}` on the same machine, {machine['date']}{told}"
-        f"{_note(entry)}."
-    )
+    versions = results["machine"]["versions"]
+    names: dict[str, list[str]] = {}
+    for entry in results.get("merged", []):
+        machine = entry["machine"]
+        differs = [
+            f"{name} {number}" for name, number in machine["versions"].items() if versions.get(name) != number
+        ]
+        if _threads(machine) != _threads(results["machine"]):
+            differs.append(_threads(machine))
+        if entry["repeats"] != results["repeats"]:
+            differs.append(f"{entry['repeats']} pairs")
+        told = f"; {', '.join(differs)}" if differs else ""
+        quick = " --quick" if results["quick"] else ""
+        command = f"`python -m experiments.benchmarks{quick} --merge --only NAME`"
+        how = f"{command}, {machine['date']}{told}{_note(entry)}"
+        names.setdefault(how, []).extend(entry["jobs"])
+    return [f"Measured on the same machine by {how}: {', '.join(jobs)}." for how, jobs in names.items()]
 
 
 def _seconds(spread: Mapping[str, Any]) -> str:
@@ -113,5 +123,5 @@ def _limits(job: Mapping[str, Any]) -> str:
     for held in job["held"]:
         sign = "≥" if held["quantity"] == "ratio" else "≤"
         met = "met" if held["met"] else "**not met**"
-        words.append(f"{sign} {held['limit']:g} {QUANTITIES[held['quantity']]}: {met}")
+        words.append(f"{sign} {held['limit']:.3g} {QUANTITIES[held['quantity']]}: {met}")
     return ", ".join(words)

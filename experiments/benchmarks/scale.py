@@ -154,7 +154,7 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
         "## A month",
         "",
         f"- Worker hours: {hours:,.0f} core-hours. With workers busy {server.busy:.0%} of the month that is "
-        f"{workers:.2g} cores, so {math.ceil(workers)} of one core each; a backlog of a day "
+        f"{workers:.2g} cores, so {math.ceil(workers)} worker(s) of one core; a backlog of a day "
         f"({load.units / load.days:.0f} units) takes {hours / load.days:,.1f} core-hours.",
     ]
     size = bytes_per_sample(results)
