@@ -28,7 +28,7 @@ def judged(bench: Bench, id: str) -> dict[str, Any]:
     """One effect, as a candidate and left out."""
     case = bench.case(id)
     shown = case.share >= CONFIG["least_share"]
-    found = diagnose(bench.nominal, case.fit, [case.held_out], noise=bench.static)
+    found = diagnose(bench.nominal, case.fit, [case.held_out], noise=bench.static, plan=False)
     row: dict[str, Any] = {
         "effect": id,
         "stage": effect(id).stage,
@@ -70,7 +70,9 @@ def _right(row: dict[str, Any]) -> bool:
 
 def _without(bench: Bench, case: Case) -> dict[str, Any]:
     """What is named in its stead, and whether that is a relative and the doubt shows."""
-    found = diagnose(bench.nominal, case.fit, [case.held_out], noise=bench.static, without=[case.id])
+    found = diagnose(
+        bench.nominal, case.fit, [case.held_out], noise=bench.static, without=[case.id], plan=False
+    )
     named = {f.effect: round(bench.likeness(case, found.effects, f.effect), 3) for f in found.named}
     certain = [f for f in found.named if len(f.members) == 1 and found.unknown.probability < DOUBT]
     strange = [id for id, cosine in named.items() if cosine <= CONFIG["alike"]]
