@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
-NAMED = (-1.2, 0.45)
+NAMED = (0.1, 0.16)
 """Logistic constants of a class's probability over the margin of its evidence [nats]."""
-UNKNOWN = (0.0, 0.8)
+UNKNOWN = (-0.6, 0.3)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 LARGEST_MARGIN, LARGEST_LOG_ODDS = 30.0, 12.0
 
