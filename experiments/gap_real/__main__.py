@@ -92,19 +92,35 @@ def summary(rows: list[dict[str, Any]]) -> str:
     better = [r for r in named if (r["closed"] or 0.0) >= 0.5]
     harm = [r for r in named if r["after"] > r["recalibrated"]]
     return (
-        f"Something is named in {len(named)} of {len(rows)} diagnoses. On the leg held out it closes half of "
+        f"Something is named in {len(named)} of {len(rows)} diagnoses. On the leg held out it closes half of\n"
         f"the gap or more in {len(better)} of these and makes it larger in {len(harm)}."
     )
+
+
+def facts(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """The verdict's numbers."""
+    wide = [r for r in rows if r["noise"] == next(iter(PRIORS))]
+    last = [r for r in wide if r["held_out"] == LEGS[-1]]
+    told = "from {before:.0f} to {recalibrated:.0f} deg/h on {axis}"
+    named = [r for r in rows if r["named"]]
+    sure = [r for r in named if max(n["probability"] for n in r["named"]) >= 0.8]
+    return {
+        "closed": ", ".join(told.format(**row) for row in last),
+        "walk": max(r["walk"] for r in wide),
+        "most": max(r["after"] / r["floor"] for r in rows),
+        "named": len(named),
+        "better": len([r for r in named if (r["closed"] or 0.0) >= 0.5]),
+        "harm": len([r for r in named if r["after"] > r["recalibrated"]]),
+        "certain": max(n["probability"] for r in named for n in r["named"]),
+        "sure": len(sure),
+        "kept": len([r for r in sure if (r["closed"] or 0.0) >= 0.5]) or "none",
+    }
 
 
 def page(rows: list[dict[str, Any]]) -> str:
     """The result page."""
     by_prior = {label: [r for r in rows if r["noise"] == label] for label in PRIORS}
     wide, near = by_prior.values()
-    last = [r for r in wide if r["held_out"] == LEGS[-1]]
-    closed = ", ".join(
-        f"from {r['before']:.0f} to {r['recalibrated']:.0f} deg/h on {r['axis']}" for r in last
-    )
     borrowed = "\n".join(f"- `{id}`: {title[0].lower()}{title[1:]}" for id, title in BORROWED.items())
     return f"""# A laboratory's own simulator against a real thermal cycle
 
@@ -141,21 +157,21 @@ B and K within a factor of 1.3: a random walk of half a degree per hour in an ho
 
 {summary(near)}
 
-{VERDICT.format(walk=max(r["walk"] for r in wide), closed=closed)}"""
+{VERDICT.format(**facts(rows))}"""
 
 
 VERDICT = """## Verdict
 
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
-- **Not closed:** the rest, 3 to 60 times the floor. No candidate that needs the temperature alone closes
-  half of it on a leg that was held out, on any axis. The loop between the legs on x stays unknown, and the
-  diagnosis says so where it is asked for the last leg.
-- **Named, and not to be believed:** where a name is given, the leg held out does not confirm it, although
-  its probability is near 1. A probability is of the fit runs: one leg down and one up, in which
-  temperature, its rate and time go together, and a transition whose place and width are free bends a
-  polynomial wherever that helps. `after` beside `recalibrated` is what tells; the page of a diagnosis warns
-  where what was found does harm. Held-out figures are for that, and nothing else here could have told.
+- **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something, {better}
+  close half of the gap or more on the leg held out, and {harm} make it larger. The loop between the legs on x
+  is closed by no candidate; asked for the last leg, the diagnosis names nothing and says `unknown`.
+- **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure} diagnoses
+  that name something with 0.8 or more, {kept} close half of the gap or more. A probability is of the fit runs:
+  one leg down and one up, in which temperature, its rate and time go together, and a transition whose place
+  and width are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after`
+  beside `recalibrated`, are what tells; nothing on the two legs could.
 - **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
   for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
   With B and K pulled to a data sheet's more is named and no more is closed.
