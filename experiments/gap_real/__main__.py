@@ -92,8 +92,8 @@ def summary(rows: list[dict[str, Any]]) -> str:
     better = [r for r in named if (r["closed"] or 0.0) >= 0.5]
     harm = [r for r in named if r["after"] > r["recalibrated"]]
     return (
-        f"Something is named in {len(named)} of {len(rows)} diagnoses. On the leg held out it closes half of\n"
-        f"the gap or more in {len(better)} of these and makes it larger in {len(harm)}."
+        f"Something is named in {len(named)} of {len(rows)} diagnoses. On the leg held out it closes half\n"
+        f"of the gap or more in {len(better)} of these and makes it larger in {len(harm)}."
     )
 
 
@@ -164,13 +164,13 @@ VERDICT = """## Verdict
 
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
-- **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something, {better}
-  close half of the gap or more on the leg held out, and {harm} make it larger. The loop between the legs on x
-  is closed by no candidate; asked for the last leg, the diagnosis names nothing and says `unknown`.
+- **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something,
+  {better} close half of the gap or more on the leg held out, and {harm} make it larger. Asked for the last leg
+  of x, where the loop is widest, the diagnosis says `unknown` and names nothing.
 - **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure} diagnoses
-  that name something with 0.8 or more, {kept} close half of the gap or more. A probability is of the fit runs:
-  one leg down and one up, in which temperature, its rate and time go together, and a transition whose place
-  and width are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after`
+  with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit runs: one leg
+  down and one up, in which temperature, its rate and time go together, and a transition whose place and
+  width are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after`
   beside `recalibrated`, are what tells; nothing on the two legs could.
 - **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
   for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
