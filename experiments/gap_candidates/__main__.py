@@ -73,7 +73,7 @@ def _without(bench: Bench, case: Case) -> dict[str, Any]:
     found = diagnose(
         bench.nominal, case.fit, [case.held_out], noise=bench.static, without=[case.id], plan=False
     )
-    named = {f.effect: round(bench.likeness(case, found.effects, f.effect), 3) for f in found.named}
+    named = {f.effect: round(bench.likeness(case, f), 3) for f in found.named}
     certain = [f for f in found.named if len(f.members) == 1 and found.unknown.probability < DOUBT]
     strange = [id for id, cosine in named.items() if cosine <= CONFIG["alike"]]
     return {

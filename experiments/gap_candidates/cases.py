@@ -13,6 +13,7 @@ import yaml
 from fogml.gap.how_far import averages
 from fogml.gap.model import EffectValue
 from fogml.gap.observation import observe
+from fogml.gap.result import Found
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import FloatArray, Run
@@ -109,9 +110,10 @@ class Bench:
         gap = averages(o).of(o.recorded - o.averaged(o.model.output(self.values, (true,))))
         return float((recalibrated**2 - np.mean(gap**2)) / (recalibrated**2 - floor**2))
 
-    def likeness(self, case: Case, effects: Sequence[EffectValue], id: str) -> float:
+    def likeness(self, case: Case, found: Found) -> float:
         """Absolute cosine of a found effect with the true contribution, beside the constants."""
-        (named,) = (e for e in effects if e.id == id)
+        shape = effect(found.effect).default_shape() | {k: v.value for k, v in found.parameters.items()}
+        named = EffectValue(found.effect, found.amplitude.value, shape)
         parts = [
             o.averaged(o.model.output(self.values, (named,)) - o.model.output(self.values))[:, None]
             for o in self.observations

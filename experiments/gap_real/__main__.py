@@ -165,10 +165,10 @@ VERDICT = """## Verdict
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
 - **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something,
-  {better} close half of the gap or more on the leg held out, and {harm} make it larger. Asked for the last leg
-  of x, where the loop is widest, the diagnosis says `unknown` and names nothing.
-- **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure} diagnoses
-  with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit runs: one leg
+  {better} close half of the gap or more on the leg held out, and {harm} make it larger. Asked for the last
+  leg of x, where the loop is widest, the diagnosis says `unknown` and names nothing.
+- **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure}
+  diagnoses with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit runs: one leg
   down and one up, in which temperature, its rate and time go together, and a transition whose place and
   width are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after`
   beside `recalibrated`, are what tells; nothing on the two legs could.
