@@ -20,6 +20,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.nominal import PRIOR_SD
 from fogml.twin.programme import load_programme
+from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
@@ -84,9 +85,10 @@ class Bench:
     def case(self, id: str) -> Case:
         """The unit with an effect whose size is that of the configuration, or as near as limits allow."""
         declared = effect(id)
+        shape = {q.name: _typical(q, self.nominal.grade) for q in declared.shape}
         amplitude, held = declared.amplitude.typical(self.nominal.grade), 0.0
         for _ in range(_ROUNDS):
-            twin = self.unit.with_effect(id, amplitude)
+            twin = self.unit.with_effect(id, amplitude, **shape)
             runs = [self._run(twin, number) for number in range(2)]
             signal = self._signal(runs)
             raw, held = float(np.linalg.norm(signal)), float(np.linalg.norm(self._beside(signal)))
@@ -95,7 +97,7 @@ class Bench:
             if abs(held / CONFIG["d_prime"] - 1.0) < 0.02:
                 break
             amplitude = float(np.clip(amplitude * CONFIG["d_prime"] / held, *declared.amplitude.limits))
-        twin = self.unit.with_effect(id, amplitude)
+        twin = self.unit.with_effect(id, amplitude, **shape)
         runs = [self._run(twin, number) for number in range(3)]
         signal = self._signal(runs[:2])
         raw, held = float(np.linalg.norm(signal)), float(np.linalg.norm(self._beside(signal)))
@@ -146,6 +148,12 @@ class Bench:
 
     def _beside(self, signal: FloatArray) -> FloatArray:
         return np.asarray(signal - self._constants @ (self._constants.T @ signal))
+
+
+def _typical(quantity: Quantity, grade: Any) -> float:
+    """The usual value; where either sign is as usual half of the largest, since none is often nothing."""
+    low, high = quantity.range(grade)
+    return 0.5 * high if low == -high and quantity.default is None else quantity.typical(grade)
 
 
 def plain_values(mapping: Mapping[str, Any]) -> dict[str, Any]:
