@@ -170,8 +170,8 @@ VERDICT = """## Verdict
 - **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure}
   diagnoses with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit
   runs: one leg down and one up, in which temperature, its rate and time go together, and a transition whose
-  place and width are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after`
-  beside `recalibrated`, are what tells; nothing on the two legs could.
+  place and width are free bends a polynomial wherever that helps. That an unknown is likely as well, and
+  `after` beside `recalibrated`, are what tells; nothing on the two legs could.
 - **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
   for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
   With B and K pulled to a data sheet's more is named and no more is closed.
