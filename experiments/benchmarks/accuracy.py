@@ -10,7 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from experiments.benchmarks.accuracy_cases import Case, cold_start, thermal_cycle, twin_runs
+from experiments.benchmarks.accuracy_cases import (
+    Case,
+    cold_start,
+    quiet_twin_runs,
+    thermal_cycle,
+    twin_runs,
+)
 from experiments.benchmarks.peer_model import Budget, PeerModel
 from experiments.benchmarks.peers import PEERS
 from experiments.benchmarks.reasons import winners
@@ -189,6 +195,21 @@ def twin_page(found: Mapping[str, Any]) -> str:
     return "\n".join(parts)
 
 
+def quiet_page(found: Mapping[str, Any]) -> str:
+    """Table of the twin runs without slow noise."""
+    named = [{**row, "how": f"{row['trained']}, {row['test']}"} for row in found["rows"]]
+    words = (
+        "**Synthetic**, the same units, programmes and models with white noise alone: flicker, rate "
+        "random walk "
+        "and quantisation are off in training and test. What the errors lose against the section above "
+        "is the "
+        "training runs' slow noise, which any model takes for drift. Standard deviation of 100 s "
+        "averages from "
+        "the noise-free truth [deg/h]:"
+    )
+    return "\n".join([words, "", table(named, "how", lambda row: float(row["error"]))])
+
+
 def _real(quick: bool) -> Iterable[Case]:
     yield from thermal_cycle(quick)
     yield from cold_start(quick)
@@ -197,4 +218,10 @@ def _real(quick: bool) -> Iterable[Case]:
 ACCURACY_STUDIES = (
     Study("accuracy-real", "accuracy on held-out real runs", partial(measure, _real), real_page),
     Study("accuracy-twin", "accuracy on held-out twin runs", partial(measure, twin_runs), twin_page),
+    Study(
+        "accuracy-twin-quiet",
+        "accuracy on held-out twin runs, white noise only",
+        partial(measure, quiet_twin_runs),
+        quiet_page,
+    ),
 )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.run import Run
+from fogml.twin.twin import Twin
 
 FloatArray = NDArray[np.float64]
 PROGRAMMES = (
@@ -80,21 +81,33 @@ def cold_start(quick: bool = False) -> Iterator[Case]:
             yield Case("cold start", {"axis": axis, "test": f"third {held + 1}"}, train, parts[held], 30.0)
 
 
-def twin_runs(quick: bool = False) -> Iterator[Case]:
+def quiet_twin_runs(quick: bool = False) -> Iterator[Case]:
+    """As `twin_runs`, with white noise only: flicker, random walk and quantisation off."""
+    return twin_runs(quick, slow_noise=False)
+
+
+def twin_runs(quick: bool = False, *, slow_noise: bool = True) -> Iterator[Case]:
     """Source programmes on the tactical twin, trained at one rate and at three, judged at two others."""
+    from fogml.twin.twin_file import load_twin
+
+    twin = load_twin(TWIN)
+    if not slow_noise:
+        twin = twin.with_noise(B=0.0, K=0.0, Q=0.0)
     for name in PROGRAMMES[:1] if quick else PROGRAMMES:
         if name == NO_RAMP:
             continue
-        tests = {label: _simulated(name, factor, 100 + i) for i, (label, factor) in enumerate(TESTED.items())}
+        tests = {
+            label: _simulated(name, twin, factor, 100 + i) for i, (label, factor) in enumerate(TESTED.items())
+        }
         for trained, factors in list(TRAINED.items())[: 1 if quick else None]:
-            train = tuple(_simulated(name, factor, i)[0] for i, factor in enumerate(factors))
+            train = tuple(_simulated(name, twin, factor, i)[0] for i, factor in enumerate(factors))
             for label, (run, noise) in tests.items():
                 yield Case(
                     "twin", {"programme": name, "trained": trained, "test": label}, train, run, 100.0, noise
                 )
 
 
-def _simulated(name: str, factor: float, seed: int) -> tuple[Run, FloatArray]:
+def _simulated(name: str, twin: Twin, factor: float, seed: int) -> tuple[Run, FloatArray]:
     """A run of a programme with its ramp rates times a factor, and the noise in it [deg/h]."""
     from fogml.twin.programme import load_programme
     from fogml.twin.simulate import simulate
@@ -106,7 +119,7 @@ def _simulated(name: str, factor: float, seed: int) -> tuple[Run, FloatArray]:
     ]
     made = simulate(
         replace(programme, steps=tuple(steps)),
-        TWIN,
+        twin,
         sample_s=5.0,
         seed=seed,
         columns=("T_in", "T_out", "rate"),

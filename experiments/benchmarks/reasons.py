@@ -33,8 +33,8 @@ MODELS = {
     "random-forest": "away from its training rows it stays at the last leaf's constant",
     "boosting": "away from its training rows it stays at the last leaf's constant",
     "perceptron": "away from its training rows it goes on by itself, for better or worse",
-    "gru": "its state remembers: hysteresis and warm-up depend on the past, and no function of T, dT and "
-    "T·dT at one instant holds them",
+    "gru": "its state can follow hysteresis and warm-up, which no function of T, dT and T·dT at one instant "
+    "holds; and a hundred steps of Adam may take less of the training runs' slow noise for drift",
     "rbf-interpolator": "away from its training rows its linear part goes on",
 }
 """What in a model may explain that it comes off best on held-out runs."""

@@ -82,19 +82,18 @@ def _warm_up(model: str, unit: int) -> None:
     (make_model("rbf") if model == OURS else PeerModel(peer_of(model), budget)).fit(small)
 
 
-def measure(size: str, quick: bool, repeats: int, folder: Path) -> dict[str, Any]:
+def measure(size: str, rates: str, quick: bool, repeats: int, folder: Path) -> dict[str, Any]:
     """Every model in processes of its own, turn about; each turn is another unit."""
     samples = 2_000 if quick else SIZES[size]
     names = QUICK_MODELS[:2] if quick else (OURS, *(peer.name for peer in PEERS))
     found: list[dict[str, Any]] = []
-    for rates in list(RATES)[: 1 if quick else None]:
-        for turn in range(repeats):
-            for name in names if turn % 2 == 0 else names[::-1]:
-                words = [name, str(samples), rates, str(_FIRST_UNIT + turn), *(["--quick"] if quick else [])]
-                ran = run_python(["-m", "experiments.benchmarks.training", *words])
-                row = {"model": name, "rates": rates, "turn": turn, **json.loads(ran.output)}
-                print(name, rates, turn, round(row["seconds"], 2), row["errors"], file=sys.stderr, flush=True)
-                found.append(row)
+    for turn in range(repeats):
+        for name in names if turn % 2 == 0 else names[::-1]:
+            words = [name, str(samples), rates, str(_FIRST_UNIT + turn), *(["--quick"] if quick else [])]
+            ran = run_python(["-m", "experiments.benchmarks.training", *words])
+            row = {"model": name, "rates": rates, "turn": turn, **json.loads(ran.output)}
+            print(name, rates, turn, round(row["seconds"], 2), row["errors"], file=sys.stderr, flush=True)
+            found.append(row)
     return {"samples": samples, "rows": found, "budget": {"settings": FULL.settings, "folds": FULL.folds}}
 
 
@@ -171,8 +170,14 @@ def page(found: Mapping[str, Any]) -> str:
 
 
 TRAINING_STUDIES = tuple(
-    Study(f"training-{size}", f"training, {SIZES[size]:,} samples", partial(measure, size), page)
+    Study(
+        f"training-{size}-{rates}",
+        f"training, {SIZES[size]:,} samples, {rates} ramp rate{'s' if len(RATES[rates]) > 1 else ''}",
+        partial(measure, size, rates),
+        page,
+    )
     for size in SIZES
+    for rates in RATES
 )
 
 

@@ -174,7 +174,7 @@ def test_training_in_turn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
         return Ran(json.dumps(told), 1.0, 0.0)
 
     monkeypatch.setattr(training, "run_python", here)
-    found = training.measure("1e4", True, 2, tmp_path)
+    found = training.measure("1e4", "one", True, 2, tmp_path)
     assert [words[0] for words in asked] == [training.OURS, "cubic", "cubic", training.OURS]
     assert [words[3] for words in asked] == ["500", "500", "501", "501"]
     assert found["rows"][1]["rows"] == training.QUICK.most_rows
