@@ -31,7 +31,7 @@ format: $(READY)
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-## Speed and memory beside plain alternatives; writes experiments/benchmarks/results.*
+## Accuracy, speed and memory beside other ways; writes experiments/benchmarks/results.* and scale.md
 benchmarks: $(READY)
 	$(BIN)/python -m experiments.benchmarks
 
