@@ -35,8 +35,8 @@ _WORTH_UNITS = 2.0
 LEAST_UNITS = 3
 COVERED = 0.25
 """Least share of the fleet's temperatures in a unit's runs if the fleet is followed beyond them."""
-ODD = 4.0
-"""Factor of a unit's covariance from which it counts as odd."""
+ODD = 0.05
+"""A unit is odd if one of the fleet would lie as far out with less than this probability."""
 
 
 @dataclass(frozen=True)
@@ -227,17 +227,18 @@ class SharedModel(FeatureModel):
         """Fit to training runs, as `FeatureModel.fit`."""
         super().fit(runs)
         own = self.features_.box
-        spread = getattr(self.regressor_, "spread_", 1.0)
-        if spread >= ODD:
-            return self._alone(
-                runs,
-                f"this unit is odd: its constants lie about {np.sqrt(spread):.2g} times as far out",
-            )
         covered = min((_span(own[name]) / _span(self.box[name]) for name in self._levels()), default=1.0)
         if covered < COVERED:
             return self._alone(
                 runs,
                 f"the runs cover {covered:.0%} of the fleet's temperatures, too little to tell an odd unit",
+            )
+        agreement = getattr(self.regressor_, "agreement_", 0.0)
+        if agreement < ODD:
+            return self._alone(
+                runs,
+                f"this unit is odd: of units like the fleet's, {agreement:.1%} would lie as far out "
+                f"(odd below {ODD:.0%})",
             )
         wider = {
             name: (min(low, self.box[name][0]), max(high, self.box[name][1]))

@@ -8,6 +8,7 @@ from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.special import chdtrc
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
@@ -20,6 +21,8 @@ _SPREADS = np.logspace(0.0, 8.0, 33)
 _FREEDOM = 4.0
 # Degrees of freedom of the t distribution that the factors make of the prior.
 _ROUNDS = 5
+_TOLD = 0.1
+# Least that rows tell of a direction, against what the fleet tells, for the direction to be checked.
 
 
 @dataclass(frozen=True)
@@ -74,7 +77,8 @@ class PriorRegressor(LinearRegressor):
     The prior's covariance is multiplied by a factor of at least one, whose distribution makes the
     prior a t distribution; it is averaged over, weighed by the evidence. A unit like its fleet is
     drawn to the fleet's mean where its own rows tell little; an odd one makes wide priors likely,
-    and is left to least squares.
+    and is drawn less. How well the unit agrees with the fleet is told beside, as where rows tell
+    little even an odd unit is drawn far.
 
     Rows that are alike count as fewer: residuals' precision is multiplied by one over their
     integrated autocorrelation.
@@ -88,6 +92,8 @@ class PriorRegressor(LinearRegressor):
     ----------
     spread_ : float
         Factor of the prior's covariance with the greatest weight; 1 for a unit like its fleet.
+    agreement_ : float
+        Probability of a unit of the fleet lying at least as far out, see `agreement`.
     """
 
     def __init__(self, prior: dict[str, Any] | None = None) -> None:
@@ -117,10 +123,10 @@ class PriorRegressor(LinearRegressor):
         for _ in range(_ROUNDS):
             left = target - columns @ solution
             variance = max(float(left @ left) / freedom, 1e-24)
-            precision = independent_share(left) / variance
-            solution, covariance, self.spread_ = posterior(
-                precision * columns.T @ columns, precision * columns.T @ target, prior
-            )
+            weighed = independent_share(left) / variance * columns.T
+            seen = weighed @ columns, weighed @ target
+            solution, covariance, self.spread_ = posterior(*seen, prior)
+        self.agreement_ = agreement(*seen, prior)
         to_raw = _to_raw(prior)
         raw, raw_covariance = to_raw @ solution, to_raw @ covariance @ to_raw.T
         self.intercept_, self.coef_ = float(raw[0]), raw[1:]
@@ -137,7 +143,7 @@ class PriorRegressor(LinearRegressor):
     def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
         """The fitted regressor as JSON-ready values and arrays."""
         values, arrays = super().to_saved()
-        return {**values, "prior": self.prior, "spread": self.spread_}, arrays
+        return {**values, "prior": self.prior, "spread": self.spread_, "agreement": self.agreement_}, arrays
 
     @classmethod
     def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
@@ -148,6 +154,7 @@ class PriorRegressor(LinearRegressor):
             if name.endswith("_"):
                 setattr(model, name, value)
         model.spread_ = float(values["spread"])
+        model.agreement_ = float(values.get("agreement", np.nan))
         return model
 
 
@@ -165,15 +172,11 @@ def posterior(
     spreads
         Factors to average over.
     """
-    root = np.linalg.cholesky(prior.covariance)
-    inner = root.T @ information @ root
-    values, vectors = np.linalg.eigh(inner)
-    values = np.maximum(values, 0.0)
-    seen = vectors.T @ (root.T @ (image - information @ prior.mean))
+    root, values, seen = _directions(information, image, prior)
     means, weights = [], []
     for spread in spreads:
         gain = spread / (1.0 + spread * values)
-        means.append(prior.mean + root @ (vectors @ (gain * seen)))
+        means.append(prior.mean + root @ (gain * seen))
         # The t distribution as a mixture of normals: its factor is inverse gamma.
         factor = -(0.5 * _FREEDOM) * np.log(spread) - 0.5 * _FREEDOM / spread
         weights.append(factor + 0.5 * float(gain @ seen**2) - 0.5 * float(np.log1p(spread * values).sum()))
@@ -182,8 +185,49 @@ def posterior(
     best = int(np.argmax(share))
     mean = np.einsum("i,ij->j", share, np.array(means))
     spread = float(np.asarray(spreads)[best])
-    half = root @ vectors * np.sqrt(spread / (1.0 + spread * values))
+    half = root * np.sqrt(spread / (1.0 + spread * values))
     return mean, half @ half.T, spread
+
+
+def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float:
+    """Probability that a unit of the fleet would lie as far from its mean as these rows do, or farther.
+
+    The unit's own estimate is compared with the fleet's mean under the covariance of both together
+    (a prior-predictive check: G. Box, J. R. Stat. Soc. A 143 (1980) 383), in the directions of
+    which the rows tell something: all jointly, by the sum of squares, and each for itself, by the
+    largest one times their number. The lesser of the two is returned; 0 if the rows tell nothing,
+    as then an odd unit would look the same.
+
+    Parameters
+    ----------
+    information, image
+        As for `posterior`.
+    prior
+        What the fleet tells.
+    """
+    _, values, seen = _directions(information, image, prior)
+    told = values > _TOLD
+    if not told.any():
+        return 0.0
+    squares = seen[told] ** 2 / (values[told] * (1.0 + values[told]))
+    count = len(squares)
+    return float(min(chdtrc(count, squares.sum()), count * chdtrc(1, squares.max())))
+
+
+def _directions(
+    information: FloatArray, image: FloatArray, prior: Prior
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Directions in which rows and prior are both independent.
+
+    Returns
+    -------
+    The directions as columns, of unit variance in the prior; what the rows tell of each, its inverse
+    variance; and that times their estimate's distance from the prior's mean.
+    """
+    root = np.linalg.cholesky(prior.covariance)
+    values, vectors = np.linalg.eigh(root.T @ information @ root)
+    directions = root @ vectors
+    return directions, np.maximum(values, 0.0), directions.T @ (image - information @ prior.mean)
 
 
 def _to_raw(prior: Prior) -> FloatArray:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.stats import chi2
 
 from fogml.errors import InputError
-from fogml.fleet.shared import UnitConstants, fleet_constants, shared_model
+from fogml.fleet.shared import ODD, UnitConstants, fleet_constants, shared_model
 from fogml.models.names import make_model
-from fogml.models.prior import Prior, PriorRegressor, posterior
+from fogml.models.prior import Prior, PriorRegressor, agreement, posterior
 from fogml.models.saved import load_model, save_model
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
@@ -70,6 +71,49 @@ def test_the_posterior_is_the_textbooks_for_one_spread():
     np.testing.assert_allclose(spread, np.linalg.inv(rows.T @ rows), rtol=1e-10)
 
 
+def _information(rng: np.random.Generator) -> np.ndarray:
+    """Rows that tell much of one direction, a little of a second, and nothing of the third."""
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    return turn @ np.diag([50.0, 2.0, 0.0]) @ turn.T
+
+
+def test_agreement_is_the_distance_of_the_two_estimates_under_both_covariances():
+    rng = np.random.default_rng(1)
+    half = rng.normal(size=(3, 3))
+    prior = Prior(rng.normal(size=3), half @ half.T + np.eye(3), np.zeros(2), np.ones(2))
+    information = _information(rng) + 5.0 * np.eye(3)
+    own = prior.mean + 1.5 * rng.normal(size=3)
+    apart = own - prior.mean
+    both = np.linalg.inv(information) + prior.covariance
+    joint = chi2.sf(apart @ np.linalg.solve(both, apart), 3)
+    found = agreement(information, information @ own, prior)
+    assert found <= joint * (1 + 1e-9)
+    # The largest direction alone cannot lie farther out than all together.
+    assert found >= min(joint, 3 * chi2.sf(apart @ np.linalg.solve(both, apart), 1)) * (1 - 1e-9)
+
+
+def test_units_of_the_fleet_are_called_odd_as_seldom_as_stated():
+    rng = np.random.default_rng(2)
+    prior = Prior(np.zeros(3), np.diag([1.0, 4.0, 0.25]), np.zeros(2), np.ones(2))
+    information = _information(rng)
+    values, vectors = np.linalg.eigh(information)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    found = []
+    for far in (1.0, 6.0):
+        units = far * rng.normal(size=(2000, 3)) * np.sqrt(np.diag(prior.covariance))
+        images = units @ information + rng.normal(size=(2000, 3)) @ root.T
+        found.append(np.mean([agreement(information, image, prior) < ODD for image in images]))
+    # The lesser of two probabilities is below 5 % with between 5 % and 10 %.
+    assert 0.04 < found[0] < 0.1
+    assert found[1] > 0.8
+
+
+def test_what_rows_do_not_tell_can_agree_with_nothing():
+    prior = Prior(np.zeros(3), np.eye(3), np.zeros(2), np.ones(2))
+    assert agreement(1e-3 * np.eye(3), np.zeros(3), prior) == 0.0
+    assert agreement(np.diag([10.0, 0.0, 0.0]), np.zeros(3), prior) == 1.0
+
+
 def test_a_unit_like_its_fleet_needs_a_shorter_run(fleet):
     gains = []
     for seed in range(100, 110):
@@ -92,6 +136,19 @@ def test_an_odd_unit_is_left_to_its_own_run(fleet):
     np.testing.assert_array_equal(model.predict(odd), plain.predict(odd))
 
 
+def test_the_fleet_does_no_harm_to_odd_units(fleet):
+    ratios = []
+    for seed in range(500, 520):
+        constants = draw(seed, far=6.0)
+        short, other = unit_run(seed, constants, hours=2.0), unit_run(seed + 1, constants, phase=2.0)
+        errors = [
+            np.sqrt(np.mean((model.fit(short).predict(other) - other.gyro) ** 2))
+            for model in (shared_model(fleet), make_model("polynomial", FORM))
+        ]
+        ratios.append(errors[0] / errors[1])
+    assert max(ratios) <= 1.05
+
+
 def test_too_short_a_run_is_not_carried_beyond_itself(fleet):
     model = shared_model(fleet).fit(unit_run(300, draw(300), hours=0.3))
     assert any("cover" in note for note in model.card_.notes)
@@ -105,6 +162,7 @@ def test_a_shared_model_is_saved_and_loaded(fleet, tmp_path):
     loaded = load_model(tmp_path / "model")
     run = unit_run(401, draw(400), phase=1.0)
     np.testing.assert_array_equal(loaded.predict(run), model.predict(run))
+    assert loaded.regressor_.agreement_ == model.regressor_.agreement_
     assert loaded.card_.box["T"] == pytest.approx(model.card_.box["T"])
 
 
