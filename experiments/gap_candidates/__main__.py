@@ -24,9 +24,9 @@ LEAST_CLOSED = 0.95
 DOUBT = 0.05
 
 
-def judged(bench: Bench, id: str) -> dict[str, Any]:
-    """One effect, as a candidate and left out."""
-    case = bench.case(id)
+def judged(bench: Bench, case: Case) -> dict[str, Any]:
+    """One effect as a candidate."""
+    id = case.id
     shown = case.share >= CONFIG["least_share"]
     found = diagnose(bench.nominal, case.fit, [case.held_out], noise=bench.static, plan=False)
     row: dict[str, Any] = {
@@ -46,8 +46,6 @@ def judged(bench: Bench, id: str) -> dict[str, Any]:
     }
     row |= _closed(bench, case, found)
     row["ok"] = _right(row) if shown else row["undetectable"] and not row["named"]
-    if shown:
-        row["without"] = _without(bench, case)
     return plain_values(row)
 
 
@@ -68,7 +66,7 @@ def _right(row: dict[str, Any]) -> bool:
     return alone and row["closed"] >= LEAST_CLOSED * row["true_closed"]
 
 
-def _without(bench: Bench, case: Case) -> dict[str, Any]:
+def left_out(bench: Bench, case: Case) -> dict[str, Any]:
     """What is named in its stead, and whether that is a relative and the doubt shows."""
     found = diagnose(
         bench.nominal, case.fit, [case.held_out], noise=bench.static, without=[case.id], plan=False
@@ -77,6 +75,7 @@ def _without(bench: Bench, case: Case) -> dict[str, Any]:
     certain = [f for f in found.named if len(f.members) == 1 and found.unknown.probability < DOUBT]
     strange = [id for id, cosine in named.items() if cosine <= CONFIG["alike"]]
     return {
+        "without": case.id,
         "verdict": found.verdict,
         "named": named,
         "classes": {f.effect: list(f.members) for f in found.named},
@@ -161,14 +160,20 @@ def _mark(right: bool) -> str:
     return "yes" if right else "**no**"
 
 
+def _said(row: dict[str, Any]) -> dict[str, Any]:
+    print(json.dumps(row), flush=True)
+    return row
+
+
 def main(wanted: list[str]) -> None:
     """Diagnose, print, and write where all were asked for."""
     bench = Bench()
     ids = wanted or [id for id in bench.model.candidates() if not isinstance(effect(id), NoiseEffect)]
-    rows = []
-    for id in ids:
-        rows.append(judged(bench, id))
-        print(json.dumps(rows[-1]), flush=True)
+    cases = {id: bench.case(id) for id in ids}
+    rows = [_said(judged(bench, case)) for case in cases.values()]
+    for row in rows:
+        if row["shown"]:
+            row["without"] = _said(left_out(bench, cases[row["effect"]]))
     if not wanted:
         write_results(HERE, rows, page(rows))
 

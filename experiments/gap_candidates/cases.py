@@ -92,16 +92,12 @@ class Bench:
             runs = [self._run(twin, number) for number in range(2)]
             signal = self._signal(runs)
             raw, held = float(np.linalg.norm(signal)), float(np.linalg.norm(self._beside(signal)))
-            if raw == 0.0 or held <= CONFIG["least_share"] * raw:
-                break
-            if abs(held / CONFIG["d_prime"] - 1.0) < 0.02:
+            share = held / raw if raw > 0.0 else 0.0
+            if share < CONFIG["least_share"] or abs(held / CONFIG["d_prime"] - 1.0) < 0.02:
                 break
             amplitude = float(np.clip(amplitude * CONFIG["d_prime"] / held, *declared.amplitude.limits))
-        twin = self.unit.with_effect(id, amplitude, **shape)
-        runs = [self._run(twin, number) for number in range(3)]
-        signal = self._signal(runs[:2])
-        raw, held = float(np.linalg.norm(signal)), float(np.linalg.norm(self._beside(signal)))
-        share = held / raw if raw > 0.0 else 0.0
+        runs.append(self._run(twin, 2))
+        amplitude = twin.settings[id].amplitude
         return Case(id, tuple(runs[:2]), runs[2], amplitude, held, share, twin)
 
     def closed_by_truth(self, case: Case, recalibrated: float, floor: float) -> float:
