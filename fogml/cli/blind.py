@@ -34,6 +34,13 @@ def make(
         bool | None,
         typer.Option("--leave-one-out", help="Only cases with an effect left out, each effect in turn."),
     ] = None,
+    relatives_stay: Annotated[
+        bool | None,
+        typer.Option(
+            "--relatives-stay/--relatives-out",
+            help="Keep relatives of an effect that is left out among the candidates.",
+        ),
+    ] = None,
     workers: Workers = None,
     seed: options.Seed = None,
     config: options.Config = None,
@@ -52,6 +59,7 @@ def make(
         "sample": sample,
         "kinds": kinds,
         "leave_one_out": leave_one_out,
+        "relatives_stay": relatives_stay,
         "workers": workers,
         "seed": seed,
     }

@@ -47,6 +47,7 @@ class MakeSettings(SuiteSettings):
     sample: float = 10.0
     kinds: list[str] = []
     leave_one_out: bool = False
+    relatives_stay: bool = False
     workers: int = 2
 
 
@@ -122,14 +123,15 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             kinds=kinds,
             progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
         )
-    from fogml.gap.blind.without import leave_out_relatives
+    if not settings.relatives_stay:
+        from fogml.gap.blind.without import leave_out_relatives
 
-    with terminal.work("leaving out relatives") as work:
-        leave_out_relatives(
-            folder,
-            settings.workers,
-            lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
-        )
+        with terminal.work("leaving out relatives") as work:
+            leave_out_relatives(
+                folder,
+                settings.workers,
+                lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
+            )
     config = settings.in_full().yaml("blind make")
     (folder.path / "make.yaml").write_text(config, encoding="utf-8")
     terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})

@@ -37,4 +37,4 @@ def plausible_lengths(candidate: Candidate, size: float) -> FloatArray:
     decades = np.log10(LENGTHS * size)
     outside = np.maximum(np.maximum(decades - np.log10(high), np.log10(low) - decades), 0.0)
     weights = np.log(LENGTH_WEIGHTS) - 0.5 * (outside / FURTHER_DECADES) ** 2
-    return np.where(outside > ABSURD_DECADES, ABSURD, weights)
+    return np.where(outside > ABSURD_DECADES, weights + ABSURD, weights)

@@ -85,7 +85,7 @@ def test_two_that_are_alike_form_a_class_whose_probability_is_of_both():
     ranking, _ = ranked(searched((BEND,), ids=("bend", "bend_again", "cube", "line")))
     (one,) = (r for r in ranking.effects if r.probability >= 0.5)
     assert set(one.members) == {"bend", "bend_again"} and one.members[0] == one.chosen.candidate
-    assert one.probability > 0.9 and one.margin > 5.0
+    assert one.probability > 0.7 and one.margin > 5.0
 
 
 def test_one_that_nothing_else_is_like_stands_alone():
