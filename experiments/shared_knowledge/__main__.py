@@ -65,6 +65,7 @@ def case(fleet: FleetConstants, seed: int, hours: float, far: float) -> dict:
         "far": far,
         "hours": hours,
         "left": any("left to its own runs" in note for note in drawn.card_.notes),
+        "agreement": getattr(drawn.regressor_, "agreement_", None),
         "before": judged[0].before.bias_stability,
         "alone": judged[0].after.bias_stability,
         "drawn": judged[1].after.bias_stability,
@@ -132,12 +133,20 @@ def _said(rows: list[dict]) -> list[str]:
             f"alone left; above {NOISE:g} in {np.sum(ratio > NOISE)} of {len(ratio)} cases, below "
             f"{1 / NOISE:.2f} in {np.sum(ratio < 1 / NOISE)}."
         )
+    harmed = [row["agreement"] for row in rows if row["drawn"] > NOISE * row["alone"]]
+    looked = (
+        f" In the cases above {NOISE:g}, {min(harmed):.0%} to {max(harmed):.0%} of the fleet's own units "
+        "would look as odd in that run, or odder."
+        if harmed
+        else ""
+    )
     return [
         *said,
         "",
         "A unit whose rows lie where fewer than 5 % of the fleet's units would is left to its run, and so is "
-        "any whose run covers less than a quarter of the fleet's temperatures. What remains are units whose "
-        "constants are odd only where their short run does not go: no check of that run can tell them.",
+        "any whose run covers less than a quarter of the fleet's temperatures. What remains are mostly units whose "
+        "constants are odd only where their short run does not go, which no check of that run can tell."
+        f"{looked}",
     ]
 
 
