@@ -144,8 +144,8 @@ def _said(rows: list[dict]) -> list[str]:
         *said,
         "",
         "A unit whose rows lie where fewer than 5 % of the fleet's units would is left to its run, and so is "
-        "any whose run covers less than a quarter of the fleet's temperatures. What remains are mostly units whose "
-        "constants are odd only where their short run does not go, which no check of that run can tell."
+        "any whose run covers less than a quarter of the fleet's temperatures. What remains are mostly units "
+        "whose constants are odd only where their short run does not go, which no check of that run can tell."
         f"{looked}",
     ]
 
