@@ -148,8 +148,8 @@ def measure(quick: bool, repeats: int, folder: Path) -> dict[str, Any]:
 
 
 FIGURES = {
-    "one_top": "one effect: top-1",
-    "one_exact": "one effect: class exact",
+    "one_top": "one effect, d' > 10: top-1",
+    "one_exact": "one effect, d' > 10: class exact",
     "two_exact": "two effects: class exact",
     "nothing_named": "nothing missing: named",
     "false_discovery": "named that are false",
