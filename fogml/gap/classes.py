@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import expit, logsumexp
@@ -18,6 +18,8 @@ FORM_SHARE = 0.01
 """Share of an effect's gain that may hang on details of its form."""
 UNEVEN = 0.03
 """Prior probability of an unknown in the noise."""
+NOT_IN_BEST = 0.49
+"""Largest probability of an effect that the best explanation does without."""
 LEAST_PROBABILITY = 0.1
 """Effects less probable than this are not listed."""
 
@@ -96,6 +98,8 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
         other = _ranked(chosen, (id,), explanations, weights)
+        # Named is what the best explanation holds, and what is fitted.
+        other = replace(other, probability=min(other.probability, NOT_IN_BEST))
         if other.probability >= LEAST_PROBABILITY:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)

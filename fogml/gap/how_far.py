@@ -97,7 +97,7 @@ def how_far(
         if after.effects:
             base = gap(after)
             moved = [_mean_square(gap(c, e) - base) for c, e in after.draws(rng, DRAWS)]
-            deviation = float(np.hypot(deviation, np.mean(moved) / denominator))
+            deviation = float(np.hypot(deviation, np.median(moved) / denominator))
         deviation = widen(deviation)
         interval = (closed - _Z90 * deviation, closed + _Z90 * deviation)
     return HowFar(

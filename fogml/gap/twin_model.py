@@ -148,6 +148,8 @@ class TwinOnRun:
         # Responses to rates of temperature would be blurred by the readings' noise.
         smooth = {name: _smoothed(run, t) for name, t in {**nodes, **self._recorded.temperatures}.items()}
         self._full = replace(self._recorded, temperatures=smooth, cache={})
+        # What sensors do to readings is in the readings as they are.
+        self._raw = replace(self._recorded, temperatures={**nodes, **self._recorded.temperatures}, cache={})
         self._outputs: dict[tuple[float, ...], tuple[FloatArray, Mapping[str, FloatArray]]] = {}
 
     def columns(self) -> Mapping[str, FloatArray]:
@@ -163,7 +165,8 @@ class TwinOnRun:
         declared = effect(id)
         if isinstance(declared, NoiseEffect):
             return noise_response(id, shape, self._recorded.time)
-        inputs = self._met(constants) if self._meets_output(declared) else self._full.afresh()
+        inputs = self._raw if declared.stage == "sensor" else self._full
+        inputs = self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh()
         return np.asarray(declared.response(inputs, **shape), dtype=np.float64)
 
     def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
@@ -198,7 +201,7 @@ class TwinOnRun:
     def _meets_output(self, declared: Effect) -> bool:
         return bool({"output", "slopes"} & set(declared.needs))
 
-    def _met(self, constants: Mapping[str, float]) -> Inputs:
+    def _met(self, constants: Mapping[str, float], inputs: Inputs) -> Inputs:
         """Inputs with the output and the slopes at given constants."""
         key = tuple(constants.get(name, 0.0) for name in NAMES)
         if key not in self._outputs:
@@ -210,7 +213,7 @@ class TwinOnRun:
                 temperature_slopes(self._recorded.afresh(), nominal),
             )
         output, slopes = self._outputs[key]
-        return replace(self._full.afresh(), output=output, slopes=slopes)
+        return replace(inputs.afresh(), output=output, slopes=slopes)
 
 
 def _smoothed(run: Run, temperature: FloatArray) -> FloatArray:

@@ -80,7 +80,6 @@ def test_a_response_is_what_a_small_amplitude_changes(on):
     assert checked >= 25
 
 
-@pytest.mark.xfail(reason="its response takes smoothed temperatures, in which no steps are left")
 def test_the_response_of_a_coarse_sensor_is_what_its_steps_change(on):
     assert left_share(on, on.output(VALUES), "sensor_quantisation") <= 0.3
 
