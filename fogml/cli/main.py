@@ -23,19 +23,25 @@ COMMANDS = {
     "train": ("fogml.cli.train", "Fit a drift model on some runs and judge it on others."),
     "compare": ("fogml.cli.compare", "Judge every model and baseline on the same split, in one table."),
     "compensate": ("fogml.cli.compensate", "Apply a model to a run of any length, in bounded memory."),
-    "export": ("fogml.cli.export", "Compact weights or C code, checked against the model."),
+    "export": ("fogml.cli.export", "Write a model's compact form, once it has been compared with the model."),
     "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
     "sweep": ("fogml.cli.sweep", "Search features, models and sizes on held-out parts of the training runs."),
-    "lab": ("fogml.cli.lab", "Procedures of a laboratory: misalignment, north seeking."),
-    "fleet": ("fogml.cli.fleet", "The same job for every unit of a manifest, here or on a cluster."),
+    "lab": ("fogml.cli.lab", "Procedures of a laboratory: misalignment on a rate table, north seeking."),
+    "fleet": (
+        "fogml.cli.fleet",
+        "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",
+    ),
     "effects": ("fogml.cli.effects", "The catalogue of effects that a twin can have, or the card of one."),
     "simulate": ("fogml.cli.simulate", "A synthetic run from a programme and a twin."),
     "replay": ("fogml.cli.replay", "A twin's output for a run's inputs, or what one effect changes."),
     "diagnose": (
         "fogml.cli.diagnose",
-        "Where the twin's gap lies, which effect causes it, how far it closes.",
+        "Where the gap between twin and recordings lies, which effect causes it, how far it closes.",
     ),
-    "plan": ("fogml.cli.plan", "A chamber programme that makes wanted parameters or effects identifiable."),
+    "plan": (
+        "fogml.cli.plan",
+        "Programmes that make wanted parameters identifiable, with expected standard errors.",
+    ),
     "blind": ("fogml.cli.blind", "The check on withheld effects: make cases, answer them, score."),
 }
 """Name of each command: its module, and its help in one line."""

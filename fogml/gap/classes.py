@@ -20,8 +20,8 @@ UNEVEN = 0.03
 """Prior probability of an unknown in the noise."""
 NOT_IN_BEST = 0.49
 """Largest probability of an effect that the best explanation does without."""
-LEAST_PROBABILITY = 0.1
-"""Effects less probable than this are not listed."""
+LEAST_MARGIN = -1.5
+"""Effects whose evidence has a smaller margin [nats] are not listed."""
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
         other = _ranked(chosen, (id,), explanations, weights)
         # Named is what the best explanation holds, and what is fitted.
         other = replace(other, probability=min(other.probability, NOT_IN_BEST))
-        if other.probability >= LEAST_PROBABILITY:
+        if other.margin >= LEAST_MARGIN:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
     log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))

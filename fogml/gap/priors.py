@@ -17,7 +17,7 @@ LENGTHS = np.array([5.0, 10.0, 20.0, 40.0, 100.0, 300.0, 1000.0])
 LENGTH_WEIGHTS = np.array([0.2, 0.2, 0.2, 0.15, 0.12, 0.08, 0.05])
 FURTHER_DECADES = 0.6
 """Standard deviation of the size of an amplitude outside its ranges, in decades."""
-ABSURD_DECADES, ABSURD = 1.75, -1e4
+ABSURD_DECADES, ABSURD = 1.5, -1e4
 """So far outside its ranges an amplitude is absurd: no evidence makes up for it."""
 SLACK = 0.2
 """How much of an effect's length its true form may differ from the catalogue's."""

@@ -47,10 +47,11 @@ def nominal_slope(inputs: Inputs, name: str = "T") -> FloatArray:
     return inputs.slopes[name] if name in inputs.slopes else np.zeros(len(inputs))
 
 
-def unseen(inputs: Inputs, missed: Callable[[str], FloatArray]) -> FloatArray:
+def unseen(inputs: Inputs, key: str, missed: Callable[[str], FloatArray]) -> FloatArray:
     """What the output owes to temperatures that the sensors miss [deg/h], shape (n,).
 
-    `missed` gives, by a sensor's name, its place's temperature less what it shows [degC].
+    `key` is the effect's, for what it remembers; `missed` gives, by a sensor's name, its place's
+    temperature less what it shows [degC].
     """
     total = np.zeros(len(inputs))
     held: dict[str, FloatArray] = {}
@@ -60,7 +61,7 @@ def unseen(inputs: Inputs, missed: Callable[[str], FloatArray]) -> FloatArray:
         held[name] = missed(name)
         total += slope * held[name]
     if DELTA in inputs.slopes and "T" in held:
-        change = inputs.memory.difference("unseen delta", inputs.time, held["T"], DELTA_WINDOW_S)
+        change = inputs.memory.difference(f"{key} unseen", inputs.time, held["T"], DELTA_WINDOW_S)
         total += inputs.slopes[DELTA] * change
     return total
 

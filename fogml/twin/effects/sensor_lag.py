@@ -39,7 +39,7 @@ class SensorLag(SensorEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per second [deg/h], shape (n,)."""
-        return unseen(inputs, lambda name: inputs.dT(name) / 60.0)
+        return unseen(inputs, self.id, lambda name: inputs.dT(name) / 60.0)
 
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float

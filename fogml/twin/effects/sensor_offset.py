@@ -41,7 +41,7 @@ class SensorOffset(SensorEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per degC [deg/h], shape (n,)."""
-        return unseen(inputs, lambda name: -(1.0 + shape["gain"] * inputs.u(name)))
+        return unseen(inputs, self.id, lambda name: -(1.0 + shape["gain"] * inputs.u(name)))
 
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float

@@ -38,7 +38,7 @@ class SensorPlacement(SensorEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per share of 1 [deg/h], shape (n,)."""
-        return unseen(inputs, lambda name: inputs.temperature(name) - inputs.temperature("T_case"))
+        return unseen(inputs, self.id, lambda name: inputs.temperature(name) - inputs.temperature("T_case"))
 
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float

@@ -44,7 +44,7 @@ class SensorQuantisation(SensorEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per degC of the step [deg/h], shape (n,)."""
-        return unseen(inputs, lambda name: self._hidden(name, inputs))
+        return unseen(inputs, self.id, lambda name: self._hidden(name, inputs))
 
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
