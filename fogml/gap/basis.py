@@ -32,8 +32,10 @@ class Basis:
         The columns side by side, shape (n, p): residual, constants, unknown, candidates.
     constants
         Columns of the constants, each scaled by its prior's standard deviation.
+    kinds
+        Groups of the unknown.
     groups
-        Columns of each group of the unknown.
+        Columns of each group.
     transforms
         What makes each group's own columns into those of the basis, shape (k, columns).
     nodes
@@ -45,6 +47,7 @@ class Basis:
     frame: Frame
     rows: FloatArray
     constants: NDArray[np.intp]
+    kinds: Mapping[str, Group]
     groups: Mapping[str, NDArray[np.intp]]
     transforms: Mapping[str, FloatArray]
     nodes: tuple[NodeColumns, ...]
@@ -102,4 +105,5 @@ def build_basis(
             first += width
     rows = np.concatenate(blocks, axis=1)
     constants = np.arange(1, 1 + frame.fixed.shape[1])
-    return Basis(frame, rows, constants, places, transforms, tuple(nodes), tuple(within))
+    kinds = {group.name: group for group in groups if group.name in places}
+    return Basis(frame, rows, constants, kinds, places, transforms, tuple(nodes), tuple(within))

@@ -38,12 +38,18 @@ class Ranked:
         That a member of the class acts, by the evidence.
     margin
         How much the evidence falls without the class [nats].
+    form_share
+        Share of the explanation's gain that needs other forms than the catalogue's.
+    rest
+        Length of what acts beside the set over that of the effect; 0 where nothing does.
     """
 
     chosen: Chosen
     members: tuple[str, ...]
     probability: float
     margin: float
+    form_share: float = 0.0
+    rest: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -92,12 +98,12 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
     taken: set[str] = set()
     for chosen in best.effects:
         members = classes[chosen.candidate]
-        ranked.append(_ranked(chosen, members, explanations, weights))
+        ranked.append(_ranked(search, best, chosen, members, explanations, weights))
         taken |= set(members)
-    for id in sorted({i for e in explanations[:40] for i in e.ids} - taken):
+    for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
-        other = _ranked(chosen, (id,), explanations, weights)
+        other = _ranked(search, with_it, chosen, (id,), explanations, weights)
         # Named is what the best explanation holds, and what is fitted.
         other = replace(other, probability=min(other.probability, NOT_IN_BEST))
         if other.margin >= LEAST_MARGIN:
@@ -115,7 +121,7 @@ def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
 def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
     """The effect and those that take its place at less than `SAME_CLASS_NATS` of evidence."""
     others = tuple(c for c in best.effects if c.candidate != id)
-    held = search.field_.condition(search._terms(others, best.unknown))
+    held = search.field_.condition(search._terms(others, best.group))
     gains = held.node_gains()
     members = {id: best.log_evidence}
     # No form is known to the last per cent: of a large effect more nats hang on that.
@@ -127,7 +133,7 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
         quick = float(logsumexp(gains[search.places[other]])) - float(logsumexp(gains[search.places[id]]))
         if quick < -nats - 3.0:
             continue
-        swapped = search.explanation((*others, search._best(other, gains)), unknown=best.unknown is not None)
+        swapped = search.explanation((*others, search._best(other, gains)), best.rest)
         if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
     rest = sorted((m for m in members if m != id), key=lambda m: -members[m])
@@ -135,7 +141,12 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
 
 
 def _ranked(
-    chosen: Chosen, members: tuple[str, ...], explanations: Sequence[Explanation], weights: np.ndarray
+    search: Search,
+    held: Explanation,
+    chosen: Chosen,
+    members: tuple[str, ...],
+    explanations: Sequence[Explanation],
+    weights: np.ndarray,
 ) -> Ranked:
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
     probability = min(float(weights[inside].sum()), 1.0)
@@ -145,4 +156,5 @@ def _ranked(
     if len(inside) > int(inside.sum()):
         # The smaller of the two: many weak sets without the class may outweigh the best of them.
         margin = min(margin, math.log(max(probability, 1e-300)) - math.log(max(1.0 - probability, 1e-14)))
-    return Ranked(chosen, members, named_probability(margin), margin)
+    rest = held.group[1] / chosen.length if held.unknown is not None and held.group is not None else 0.0
+    return Ranked(chosen, members, named_probability(margin), margin, search.form_share(held), rest)

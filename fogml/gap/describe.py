@@ -16,8 +16,7 @@ def describe_unknown(p: Prepared, search: Search, ranking: Ranking) -> str:
     best = ranking.best
     if best.unknown is None and ranking.noise.gain > 3.0:
         return ranking.noise.looks_like
-    shown = best if best.unknown is not None else search.explanation(best.effects, unknown=True)
+    shown = best if best.unknown is not None else search.explanation(best.effects, "unknown")
     if shown.unknown is None:
         return ""
-    group = next(g for g in p.groups if g.name == shown.unknown[0])
-    return group.looks_like
+    return search.field_.basis.kinds[shown.unknown[0]].looks_like

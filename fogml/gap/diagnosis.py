@@ -11,11 +11,13 @@ from fogml.gap.assumptions import assumptions
 from fogml.gap.basis import Basis, build_basis
 from fogml.gap.classes import Ranked, Ranking, rank
 from fogml.gap.describe import describe_unknown
+from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field
 from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, EffectValue, GyroModel
+from fogml.gap.near_library import near_library
 from fogml.gap.next_run import next_run
 from fogml.gap.noise import Noise
 from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
@@ -129,7 +131,7 @@ def _explained(p: Prepared, basis: Basis, ranking: Ranking) -> list[FloatArray]:
         ]
         rows.append(np.column_stack(columns))
         if ranking.best.unknown is not None:
-            group = next(g for g in p.groups if g.name == ranking.best.unknown[0])
+            group = basis.kinds[ranking.best.unknown[0]]
             rows[-1] = np.concatenate([rows[-1], group.columns[r]], axis=1)
     return rows
 
@@ -150,10 +152,12 @@ def _act_on_inputs(candidates: Mapping[str, Candidate], ranking: Ranking) -> boo
 def _basis(
     p: Prepared, candidates: Mapping[str, Candidate], values: Mapping[str, float], tell: Progress
 ) -> Basis:
+    frame = Frame(p.fit, p.whiteners, p.model.constants, values)
+    near = near_library(p.fit, candidates, values, p.model.grade)
     return build_basis(
-        Frame(p.fit, p.whiteners, p.model.constants, values),
+        frame,
         candidates,
-        p.groups,
+        (*p.groups, *near, *event_groups(frame)),
         p.model.grade,
         lambda id: tell(f"whitening candidates: {id}"),
     )
@@ -255,7 +259,8 @@ def _rough(ranked: Ranked, basis: Basis, candidates: Mapping[str, Candidate]) ->
     declared = candidates[ranked.chosen.candidate]
     amplitude = ranked.chosen.length * node.size
     low, high = declared.amplitude.limits
-    return EffectValue(declared.id, float(np.clip(amplitude, low, high)), node.node.shape)
+    shape = {q.name: node.node.shape[q.name] for q in declared.shape if q.name in node.node.shape}
+    return EffectValue(declared.id, float(np.clip(amplitude, low, high)), shape)
 
 
 def _verdict(found: Sequence[Found], unknown: Unknown) -> Verdict:

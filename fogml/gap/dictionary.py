@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -21,6 +22,8 @@ DECAYS_S = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
 SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
 """Shortest half-period of each group of cosines in time [s]."""
 EDGES_S = (30.0, 120.0, 600.0, 2400.0)
+BANDS_S = (30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0)
+"""Time constants between which past temperatures are told apart [s]."""
 KNOTS = 9
 WAVES = 40
 MIXED = ("start", "time", "temperature", "temperature_rate", "direction", "past", "gradient", "table_rate")
@@ -39,11 +42,14 @@ class Group:
         In plain words.
     columns
         For each run the columns [deg/h], shape (m, k); of no particular size.
+    price
+        What having looked for it in the data costs its evidence [nats].
     """
 
     name: str
     looks_like: str
     columns: tuple[FloatArray, ...]
+    price: float = 0.0
 
 
 def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
@@ -67,13 +73,21 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
             ("temperature_rate", "follows the rate of temperature", _rates(observations, u)),
             ("direction", "follows the direction of temperature change", _directions(observations, u)),
             ("past", "remembers past temperatures", [_past(o, half) for o in observations]),
+            ("heat_flow", "follows how heat flows through the gyro", _heat_flow(observations)),
         ]
     if all(_differences(o) for o in observations):
         groups.append(
             ("gradient", "follows differences between sensors or their rates", _gradients(observations))
         )
     if any(np.any(o.run.rate) for o in observations):
-        groups.append(("table_rate", "follows the table's rate", _table(observations, temperatures)))
+        groups += [
+            ("table_rate", "follows the table's rate", _table(observations, temperatures)),
+            (
+                "scale_factor",
+                "is a scale factor that goes with past temperatures or other places",
+                _scale_factor(observations),
+            ),
+        ]
     held = [Group(name, words, tuple(columns)) for name, words, columns in groups]
     mixed = [g for g in held if g.name in MIXED]
     together = tuple(np.concatenate([g.columns[r] for g in mixed], axis=1) for r in range(len(observations)))
@@ -89,14 +103,18 @@ def _own(observations: Sequence[Observation], half_period_s: float) -> list[Floa
         count = max(1, min(int(span / half_period_s), len(o) // 4))
         angle = np.pi * (o.time - o.time[0]) / span
         parts.append(np.cos(np.outer(angle, np.arange(1, count + 1))))
-    total = sum(part.shape[1] for part in parts)
-    blocks, first = [], 0
-    for part in parts:
-        block = np.zeros((len(part), total))
+    return list(side_by_side(parts))
+
+
+def side_by_side(parts: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
+    """Columns of each run by itself, zero on the others, shape (m_r, all columns) each."""
+    starts = np.cumsum([0, *(part.shape[1] for part in parts)])
+    blocks = []
+    for part, first in zip(parts, starts):
+        block = np.zeros((len(part), int(starts[-1])))
         block[:, first : first + part.shape[1]] = part
-        first += part.shape[1]
         blocks.append(block)
-    return blocks
+    return tuple(blocks)
 
 
 def _decays(o: Observation) -> FloatArray:
@@ -153,7 +171,7 @@ def _differences(o: Observation) -> list[str]:
 
 
 def _gradients(observations: Sequence[Observation]) -> list[FloatArray]:
-    names = [n for n in _differences(observations[0]) if all(n in _differences(o) for o in observations)]
+    names = _shared_differences(observations)
     blocks = []
     for o in observations:
         columns = [np.zeros(len(o))]
@@ -162,6 +180,38 @@ def _gradients(observations: Sequence[Observation]) -> list[FloatArray]:
             quick = difference - _lag(o, difference, 100.0)
             columns += [difference / 10.0, quick, difference * o.temperature / 500.0]
         blocks.append(np.column_stack(columns))
+    return blocks
+
+
+def _shared_differences(observations: Sequence[Observation]) -> list[str]:
+    held = [_differences(o) for o in observations]
+    return [name for name in held[0] if all(name in names for names in held)]
+
+
+def _heat_flow(observations: Sequence[Observation]) -> list[FloatArray]:
+    """Every temperature in bands of its past: what any linear heat flow is made of."""
+    names = _shared_differences(observations)
+    blocks = []
+    for o in observations:
+        columns = []
+        for t in (o.temperature, *(o.averaged(o.run.temperature(name)) for name in names)):
+            lagged = [t, *(_lag(o, t, tau) for tau in BANDS_S)]
+            columns += [(a - b) / 10.0 for a, b in pairwise(lagged)]
+        blocks.append(np.column_stack(columns))
+    return blocks
+
+
+def _scale_factor(observations: Sequence[Observation]) -> list[FloatArray]:
+    names = _shared_differences(observations)
+    top = max(float(np.abs(o.run.rate).max()) for o in observations)
+    blocks = []
+    for o in observations:
+        rate, t = o.averaged(o.run.rate) / top, o.temperature
+        held = [(_lag(o, t, tau) - t) / 10.0 for tau in BANDS_S[::2]]
+        held += [(o.averaged(o.run.temperature(name)) - t) / 10.0 for name in names]
+        plays = Memory()
+        held += [(plays.play(f"{w}", t, w) - t) / 10.0 for w in (4.0, 16.0)]
+        blocks.append(np.column_stack([rate * h for h in held]))
     return blocks
 
 

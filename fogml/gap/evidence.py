@@ -54,9 +54,9 @@ class Field:
         gram = basis.rows.T @ basis.rows
         inner = np.eye(len(fixed)) + gram[np.ix_(fixed, fixed)]
         self._factor = np.linalg.cholesky(inner)
-        self._half = solve_triangular(self._factor, gram[fixed], lower=True)
-        self.gram: FloatArray = gram - self._half.T @ self._half
-        self.rows = basis.rows
+        half = solve_triangular(self._factor, gram[fixed], lower=True)
+        self.gram: FloatArray = gram - half.T @ half
+        self._blocks_of_rows: list[tuple[FloatArray, FloatArray]] = [(basis.rows, half)]
         self._slacks: dict[int, tuple[int, ...]] = {}
         width = max((len(n.columns) for n in basis.nodes), default=1)
         self.rank = width
@@ -85,12 +85,26 @@ class Field:
             return ()
         fixed = self.basis.rows[:, self.basis.constants]
         half = solve_triangular(self._factor, fixed.T @ columns, lower=True)
-        across = self.rows.T @ columns - self._half.T @ half
-        own = columns.T @ columns - half.T @ half
-        self.gram = np.block([[self.gram, across], [across.T, own]])
-        self._half = np.concatenate([self._half, half], axis=1)
-        self.rows = np.concatenate([self.rows, columns], axis=1)
-        return tuple(range(first, first + width))
+        self._blocks_of_rows.append((columns, half))
+        total = first + width
+        gram = np.empty((total, total))
+        gram[:first, :first] = self.gram
+        across = [rows.T @ columns - other.T @ half for rows, other in self._blocks_of_rows]
+        gram[:, first:] = np.concatenate(across)
+        gram[first:, :first] = gram[:first, first:].T
+        self.gram = gram
+        return tuple(range(first, total))
+
+    def columns(self, places: Sequence[int]) -> FloatArray:
+        """Whitened columns by their indices, shape (n, len(places))."""
+        first = 0
+        wanted = np.asarray(places, dtype=np.intp)
+        out = np.empty((len(self.basis.rows), len(wanted)))
+        for rows, _ in self._blocks_of_rows:
+            inside = (wanted >= first) & (wanted < first + rows.shape[1])
+            out[:, inside] = rows[:, wanted[inside] - first]
+            first += rows.shape[1]
+        return out
 
     def condition(self, terms: Sequence[Term]) -> Conditioned:
         """The field with terms integrated out as well."""
@@ -132,14 +146,18 @@ class Conditioned:
         covariance = self._scale[:, None] * cho_solve(factor, np.diag(self._scale))
         return mean, covariance
 
-    def node_gains(self) -> FloatArray:
-        """Gain in log evidence of each node at each length, weights included, shape (nodes, lengths)."""
+    def node_gains(self, nodes: NDArray[np.intp] | None = None) -> FloatArray:
+        """Gain in log evidence of each node at each length, weights included, shape (nodes, lengths).
+
+        Of the nodes stated, or of all; minus infinity for the others.
+        """
         field = self.field
-        index = field._index
+        places = np.arange(len(field.basis.nodes)) if nodes is None else nodes
+        index = field._index[places]
         half = np.concatenate([self.half, np.zeros((len(self.half), 1))], axis=1)
         across = half[:, index]
-        blocks = field._blocks - np.einsum("kni,knj->nij", across, across)
-        fits = field._fits - np.einsum("kni,k->ni", across, self.half[:, 0])
+        blocks = field._blocks[places] - np.einsum("kni,knj->nij", across, across)
+        fits = field._fits[places] - np.einsum("kni,k->ni", across, self.half[:, 0])
         sizes, axes = np.linalg.eigh(0.5 * (blocks + blocks.transpose(0, 2, 1)))
         sizes = np.maximum(sizes, 0.0)
         along = np.einsum("nij,ni->nj", axes, fits)
@@ -147,13 +165,17 @@ class Conditioned:
         wider = 1.0 + squares * sizes[:, None, :]
         gains = 0.5 * (squares * along[:, None, :] ** 2 / wider - np.log(wider)).sum(axis=2)
         # The half of the prior of the wrong sign is cut away.
-        self.sign_gains = np.zeros_like(gains)
-        one = field.signs > 0
+        sign_gains = np.zeros_like(gains)
+        one = field.signs[places] > 0
         if one.any():
             fit, size = fits[one, 0][:, None], np.maximum(blocks[one, 0, 0], 0.0)[:, None]
             z = LENGTHS * fit / np.sqrt(1.0 + LENGTHS**2 * size)
-            self.sign_gains[one] = log_ndtr(z) + np.log(2.0)
-        return np.asarray(gains + self.sign_gains + field.log_weights)
+            sign_gains[one] = log_ndtr(z) + np.log(2.0)
+        out = np.full((len(field.basis.nodes), len(LENGTHS)), -np.inf)
+        self.sign_gains = np.zeros_like(out)
+        self.sign_gains[places] = sign_gains
+        out[places] = gains + sign_gains + field.log_weights[places]
+        return out
 
 
 def by_candidate(nodes: Sequence[NodeColumns]) -> dict[str, NDArray[np.intp]]:

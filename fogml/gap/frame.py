@@ -94,9 +94,10 @@ class Frame:
     def beside(self, columns: FloatArray, *, flat: bool = False) -> FloatArray:
         """Inner products of whitened columns beside the constants, shape (k, k).
 
-        With the constants' own priors, or with flat ones.
+        With the priors of constants and nuisances, or beside freely varying constants alone.
         """
-        cross = self.fixed.T @ columns
+        held = self.fixed[:, : len(self.constants)] if flat else self.fixed
+        cross = held.T @ columns
         inverse = self._inverses[1 if flat else 0]
         return np.asarray(columns.T @ columns - cross.T @ inverse @ cross)
 
@@ -104,7 +105,8 @@ class Frame:
     def _inverses(self) -> tuple[FloatArray, FloatArray]:
         gram = self.fixed.T @ self.fixed
         own = np.linalg.inv(gram + np.eye(len(gram)))
-        flat = np.linalg.inv(gram + np.eye(len(gram)) / _FLAT)
+        count = len(self.constants)
+        flat = np.linalg.inv(gram[:count, :count] + np.eye(count) / _FLAT)
         return np.asarray(own, dtype=np.float64), np.asarray(flat, dtype=np.float64)
 
 

@@ -18,7 +18,17 @@ from fogml.signals.noise_model import NoiseModel
 
 UNIT_FACTOR = 1.3
 """Noise of a unit from one run to another, as a factor."""
-BESIDE = ("temperature", "temperature_rate", "past", "start", "time", "direction", "gradient", "table_rate")
+BESIDE = (
+    "temperature",
+    "temperature_rate",
+    "past",
+    "heat_flow",
+    "start",
+    "time",
+    "direction",
+    "gradient",
+    "table_rate",
+)
 """Groups of the unknown that are kept out of the noise."""
 MOST_ROWS = 1500
 SAFE_SIDE = 0.6

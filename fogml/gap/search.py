@@ -1,5 +1,8 @@
 """Which sets of effects explain the runs, with the unknown competing in every set.
 
+Beside a set there may be nothing more, an unknown, or a small rest in the direction of an unknown that
+is no more than what the effects' true forms differ from the catalogue's by.
+
 Sets grow from the best ones by one effect at a time, up to four. In each set every effect's shape and
 size are averaged over their priors with the others at their best, and best ones are found in turns.
 """
@@ -10,6 +13,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.special import logsumexp
@@ -22,9 +26,13 @@ SIZES = (0.4, 0.4, 0.15, 0.04, 0.01)
 """Prior probability of 0, 1, ... effects; all effects are equally likely."""
 UNKNOWN = 0.25
 """Prior probability that something unknown acts besides."""
+FORM, FORM_ROOM = 0.3, 0.25
+"""Prior probability of a rest of form where it can be seen, and its largest length over the effects'."""
 BEAM = (8, 6, 4)
 """Sets that grow further, by their size."""
 BRANCHES = 5
+Rest = Literal["nothing", "form", "unknown"]
+"""What acts beside a set of effects."""
 
 
 @dataclass(frozen=True)
@@ -38,14 +46,16 @@ class Chosen:
 
 @dataclass(frozen=True)
 class Explanation:
-    """A set of effects, with or without the unknown.
+    """A set of effects, and what acts beside it.
 
     Attributes
     ----------
     effects
         The effects at their best shapes.
-    unknown
-        The best group of the unknown and its length; None without it.
+    rest
+        What acts besides.
+    group
+        The best group of columns for the rest, and its length; None where nothing acts.
     log_evidence
         Over that of no effect and no unknown, shapes and sizes averaged.
     log_posterior
@@ -53,7 +63,8 @@ class Explanation:
     """
 
     effects: tuple[Chosen, ...]
-    unknown: tuple[str, float] | None
+    rest: Rest
+    group: tuple[str, float] | None
     log_evidence: float
     log_posterior: float
 
@@ -61,6 +72,11 @@ class Explanation:
     def ids(self) -> frozenset[str]:
         """Ids of the effects."""
         return frozenset(c.candidate for c in self.effects)
+
+    @property
+    def unknown(self) -> tuple[str, float] | None:
+        """The unknown's group and length; None where it does not act."""
+        return self.group if self.rest == "unknown" else None
 
 
 @dataclass
@@ -74,7 +90,7 @@ class Search:
     """
 
     field_: Field
-    _held: dict[tuple[frozenset[str], bool], Explanation] = field(default_factory=dict)
+    _held: dict[tuple[frozenset[str], Rest], Explanation] = field(default_factory=dict)
 
     @cached_property
     def places(self) -> dict[str, np.ndarray]:
@@ -87,8 +103,7 @@ class Search:
 
     def run(self) -> list[Explanation]:
         """Every explanation that was tried, the most probable first."""
-        front = [self.explanation(())]
-        self.explanation((), unknown=True)
+        front = [self._best_of(())]
         for size in range(MOST_EFFECTS):
             grown: dict[frozenset[str], Explanation] = {}
             for found in front:
@@ -96,7 +111,7 @@ class Search:
                     grown[explained.ids] = explained
             if not grown:
                 break
-            ranked = sorted(grown.values(), key=lambda e: -max(e.log_posterior, self._with(e).log_posterior))
+            ranked = sorted(grown.values(), key=lambda e: -e.log_posterior)
             front = ranked[: BEAM[min(size, len(BEAM) - 1)]]
             if size >= 2 and ranked[0].log_posterior < self.best.log_posterior - 6.0:
                 break
@@ -107,13 +122,18 @@ class Search:
         """The most probable explanation so far."""
         return max(self._held.values(), key=lambda e: e.log_posterior)
 
-    def _with(self, found: Explanation) -> Explanation:
-        return self._held[(found.ids, True)]
+    def _best_of(self, effects: Sequence[Chosen]) -> Explanation:
+        """The most probable explanation by a set, whatever acts beside it."""
+        plain = self.explanation(effects)
+        tried = [plain, self.explanation(effects, "unknown")]
+        if _form_room(plain.effects) >= LENGTHS[0]:
+            tried.append(self.explanation(effects, "form"))
+        return max(tried, key=lambda e: e.log_posterior)
 
     def _grow(self, found: Explanation) -> Iterable[Explanation]:
         """Sets of one effect more: the best beside the set, and beside the set and the unknown."""
         more: dict[str, Chosen] = {}
-        for held in (found, self._with(found)):
+        for held in (self._held[(found.ids, "nothing")], self._held[(found.ids, "unknown")]):
             gains = self.field_.condition(self.terms(held)).node_gains()
             scores = {
                 id: float(logsumexp(gains[nodes])) for id, nodes in self.places.items() if id not in found.ids
@@ -121,44 +141,43 @@ class Search:
             for id in sorted(scores, key=scores.__getitem__, reverse=True)[:BRANCHES]:
                 more.setdefault(id, self._best(id, gains))
         for chosen in more.values():
-            yield self.explanation((*found.effects, chosen))
-            self.explanation((*found.effects, chosen), unknown=True)
+            yield self._best_of((*found.effects, chosen))
 
-    def explanation(self, effects: Sequence[Chosen], *, unknown: bool = False) -> Explanation:
-        """The explanation of a set, shapes found in turns from those given."""
-        key = (frozenset(c.candidate for c in effects), unknown)
+    def explanation(self, effects: Sequence[Chosen], rest: Rest = "nothing") -> Explanation:
+        """The explanation of a set and a rest, shapes found in turns from those given."""
+        key = (frozenset(c.candidate for c in effects), rest)
         if key not in self._held:
-            self._held[key] = self._explained(list(effects), unknown)
+            self._held[key] = self._explained(list(effects), rest)
         return self._held[key]
 
-    def _explained(self, effects: list[Chosen], unknown: bool) -> Explanation:
-        group = self._best_group(effects)[0] if unknown else None
-        rounds = 1 if len(effects) < 2 and not unknown else 2
-        averaged = 0.0
+    def _explained(self, effects: list[Chosen], rest: Rest) -> Explanation:
+        group = self._best_group(effects, rest)[0]
+        rounds = 1 if len(effects) < 2 and rest == "nothing" else 2
+        averaged = averaged_rest = 0.0
         for _ in range(rounds):
             averaged = 0.0
             for i, chosen in enumerate(effects):
                 others = effects[:i] + effects[i + 1 :]
                 held = self.field_.condition(self._terms(others, group))
-                gains = held.node_gains()
+                gains = held.node_gains(self.places[chosen.candidate])
                 effects[i] = self._best(chosen.candidate, gains)
                 own = gains[self.places[chosen.candidate]]
                 averaged += float(logsumexp(own) - own.max()) + self._weight(effects[i], held)
-            if unknown:
-                group, gain = self._best_group(effects)
-                averaged_unknown = gain
-            else:
-                averaged_unknown = 0.0
-        evidence = (
-            self.field_.condition(self._terms(effects, group)).log_evidence
-            - self._empty
-            + averaged
-            + averaged_unknown
-        )
+            group, averaged_rest = self._best_group(effects, rest)
+        terms = self._terms(effects, group)
+        evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
+        prior = self._log_prior(effects, rest)
+        return Explanation(tuple(effects), rest, group, evidence, evidence + prior)
+
+    def _log_prior(self, effects: Sequence[Chosen], rest: Rest) -> float:
         count, size = len(self.places), len(effects)
         prior = math.log(SIZES[size]) - math.log(math.comb(max(count, size), size))
-        prior += math.log(UNKNOWN if unknown else 1.0 - UNKNOWN)
-        return Explanation(tuple(effects), group, evidence, evidence + prior)
+        if rest == "unknown":
+            return prior + math.log(UNKNOWN)
+        prior += math.log(1.0 - UNKNOWN)
+        if _form_room(effects) >= LENGTHS[0]:
+            prior += math.log(FORM if rest == "form" else 1.0 - FORM)
+        return prior
 
     def _best(self, id: str, gains: np.ndarray) -> Chosen:
         nodes = self.places[id]
@@ -171,20 +190,33 @@ class Search:
         place = int(np.flatnonzero(chosen.length == LENGTHS)[0])
         return float(node.log_weights[place] + held.sign_gains[chosen.node, place])
 
-    def _best_group(self, effects: Sequence[Chosen]) -> tuple[tuple[str, float], float]:
-        """The best group of the unknown and length beside a set, and what averaging adds to its evidence."""
-        held = self.field_.condition(self._terms(effects, None))
+    def _best_group(self, effects: Sequence[Chosen], rest: Rest) -> tuple[tuple[str, float] | None, float]:
+        """The best group for a rest beside a set and its length, and what averaging adds to its evidence."""
         names = list(self.field_.basis.groups)
-        gains = np.array([group_gains(held, name) for name in names])
-        gains += np.log(LENGTH_WEIGHTS) - math.log(len(names))
+        small = LENGTHS <= _form_room(effects)
+        fit = small if rest == "form" else ~small
+        if rest == "nothing" or not names or not fit.any():
+            return None, 0.0
+        held = self.field_.condition(self._terms(effects, None))
+        gains = np.array([group_gains(held, name)[fit] for name in names])
+        prices = np.array([self.field_.basis.kinds[name].price for name in names]) + math.log(len(names))
+        weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
+        gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        weight = math.log(LENGTH_WEIGHTS[column]) - math.log(len(names))
-        averaged = float(logsumexp(gains) - gains.max()) + weight
-        return (names[row], float(LENGTHS[column])), averaged
+        averaged = float(logsumexp(gains) - gains.max() + weights[row, column])
+        return (names[row], float(LENGTHS[fit][column])), averaged
+
+    def form_share(self, found: Explanation) -> float:
+        """Share of what the effects of an explanation gain that needs other forms than the catalogue's."""
+        nodes = self.field_.basis.nodes
+        bare = [Term(nodes[c.node].columns, c.length) for c in found.effects]
+        whole = self._terms(found.effects, found.group if found.rest == "form" else None)
+        gain = self.field_.condition(whole).log_evidence - self._empty
+        return 1.0 - (self.field_.condition(bare).log_evidence - self._empty) / max(gain, 1e-9)
 
     def terms(self, found: Explanation) -> list[Term]:
         """An explanation's terms."""
-        return self._terms(found.effects, found.unknown)
+        return self._terms(found.effects, found.group)
 
     def _terms(self, effects: Iterable[Chosen], group: tuple[str, float] | None) -> list[Term]:
         nodes, groups = self.field_.basis.nodes, self.field_.basis.groups
@@ -198,13 +230,24 @@ class Search:
         return terms
 
 
+def _form_room(effects: Sequence[Chosen]) -> float:
+    """Largest whitened length of a rest that is no more than a matter of form."""
+    return FORM_ROOM * max((c.length for c in effects), default=0.0)
+
+
 def group_gains(held: Conditioned, name: str) -> np.ndarray:
     """Gain in log evidence of a group of the unknown at each length, shape (lengths,)."""
     places = held.field.basis.groups[name]
-    gram = held.field.gram[np.ix_(places, places)] - held.half[:, places].T @ held.half[:, places]
-    fit = held.field.gram[places, 0] - held.half[:, places].T @ held.half[:, 0]
-    sizes, axes = np.linalg.eigh(0.5 * (gram + gram.T))
-    sizes, along = np.maximum(sizes, 0.0), axes.T @ fit
+    # A group's columns stand on their main axes: its inner products beside the constants are diagonal.
+    sizes = np.diagonal(held.field.gram)[places]
+    across = held.half[:, places]
+    fit = held.field.gram[places, 0] - across.T @ held.half[:, 0]
     squares = LENGTHS[:, None] ** 2
-    wider = 1.0 + squares * sizes
-    return np.asarray(0.5 * (squares * along**2 / wider - np.log(wider)).sum(axis=1))
+    weights = squares / (1.0 + squares * sizes)
+    weighed = across[None] * weights[:, None, :]
+    factor = np.linalg.cholesky(np.eye(len(across)) - weighed @ across.T)
+    half = np.linalg.solve(factor, (weighed @ fit)[:, :, None])[:, :, 0]
+    squared = (weights * fit**2).sum(axis=1) + (half**2).sum(axis=1)
+    log_det = np.log1p(squares * sizes).sum(axis=1)
+    log_det += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
+    return np.asarray(0.5 * (squared - log_det))

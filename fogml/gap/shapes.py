@@ -23,7 +23,9 @@ NODES = {1: 9, 2: 5, 3: 4}
 """Nodes for each parameter that needs a grid, by how many there are."""
 CYCLES_BETWEEN_NODES = 0.3
 """A line's frequency is known to this many cycles over the longest run."""
-MOST_LINES = 1500
+MOST_LINES = 6000
+AT_AMPLITUDE = "at_amplitude"
+"""Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
 PLACE_DEGC = 4.0
 """Spacing of places on the temperature scale [degC]."""
 
@@ -63,12 +65,27 @@ def grid(
     spans
         ``"s"``: longest run [s]; ``"degC"``: widest span of temperature [degC]; ``"sample"``: row [s].
     """
+    amplitudes = getattr(candidate, "amplitudes", ())
+    if amplitudes:
+        about = [{AT_AMPLITUDE: float(a)} for a in amplitudes]
+        nodes = _grid(candidate, grade, response, spans)
+        return tuple(
+            Node({**node.shape, **at}, tuple({**draw, **at} for draw in node.draws))
+            for node in nodes
+            for at in about
+        )
+    return _grid(candidate, grade, response, spans)
+
+
+def _grid(
+    candidate: Candidate, grade: str, response: Response, spans: Mapping[str, float]
+) -> tuple[Node, ...]:
     if not candidate.shape:
         return (Node({}, ({},)),)
     usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
-    turning = [q for q in candidate.shape if _is_angle(q)]
+    turning = [q for q in candidate.shape if is_angle(q)]
     rest = [q for q in candidate.shape if q not in turning]
-    linear = [q for q in rest if not _is_line(q) and _in_proportion(q, grade, response, usual)]
+    linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
     bent = [q for q in rest if q not in linear]
     axes = [_axis(q, grade, NODES[min(len(bent), 3)], spans) for q in bent]
     nodes = []
@@ -81,17 +98,19 @@ def grid(
 
 def _frequency(bent: Sequence[Quantity], values: Sequence[float]) -> float | None:
     for quantity, value in zip(bent, values):
-        if _is_line(quantity) and quantity.unit in ("s", "Hz"):
+        if is_line(quantity) and quantity.unit in ("s", "Hz"):
             return 1.0 / value if quantity.unit == "s" else value
     return None
 
 
-def _is_angle(quantity: Quantity) -> bool:
+def is_angle(quantity: Quantity) -> bool:
+    """Whether a shape parameter is a direction all round."""
     low, high = quantity.tactical
     return quantity.unit == "deg" and high - low >= 180.0
 
 
-def _is_line(quantity: Quantity) -> bool:
+def is_line(quantity: Quantity) -> bool:
+    """Whether a shape parameter is a period or a frequency."""
     return "period" in quantity.name or "frequency" in quantity.name
 
 
@@ -104,7 +123,7 @@ def _in_proportion(quantity: Quantity, grade: str, response: Response, usual: Ma
 
 def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]) -> Sequence[float]:
     low, high = quantity.range(grade)  # type: ignore[arg-type]
-    if _is_line(quantity):
+    if is_line(quantity):
         return _lines(quantity, low, high, spans)
     if quantity.name == "harmonic":
         return [float(x) for x in np.arange(math.ceil(low), math.floor(high) + 1)]

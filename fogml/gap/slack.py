@@ -2,7 +2,7 @@
 
 No gyro follows a catalogue's equation to the last per cent. Without room for that, the rest of a
 large effect would be given another effect's name. The room is made of the response times powers of
-temperature, of the response lagged, and of the candidate's other shapes.
+temperature and time, of the response later or earlier, and of the candidate's other shapes.
 """
 
 from __future__ import annotations
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from fogml.gap.basis import Basis
 
 LAGS_S = (60.0, 300.0, 1200.0)
+EARLY_S = 30.0
+"""A response that smoothed readings make late may truly be earlier by so much [s]."""
 MOST_COLUMNS = 8
 MOST_DRAWS = 4
 
@@ -47,4 +49,6 @@ def _varied(o: Observation, response: FloatArray) -> list[FloatArray]:
     half = max(0.5 * float(np.ptp(t)), 1.0)
     u = (t - 0.5 * (float(t.max()) + float(t.min()))) / half
     lagged = [Memory().lag("lag", o.time, response, tau) - response for tau in LAGS_S]
-    return [response * u, response * u**2, *lagged]
+    early = np.interp(o.time + EARLY_S, o.time, response) - response
+    late = (o.time - o.time[0]) / (o.time[-1] - o.time[0])
+    return [response * u, response * u**2, response * late, early, *lagged]

@@ -11,6 +11,7 @@ import numpy as np
 from fogml.gap.model import Candidate, Constant, EffectValue
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.run import FloatArray
 
 MOST_TRIED = 48
@@ -68,6 +69,7 @@ def starting_values(
         if best is None:
             continue
         _, tried, amplitude, column = best
+        tried = {name: value for name, value in tried.items() if name != AT_AMPLITUDE}
         left = left - amplitude * column
         taken.append(column / math.sqrt(float(column @ column)))
         found.append(EffectValue(id, amplitude if amplitude != 0.0 else _least(candidates[id]), tried))

@@ -66,7 +66,7 @@ def unknown_parts(p: Prepared, search: Search, ranking: Ranking) -> list[FloatAr
     mean, _ = search.field_.condition(search.terms(ranking.best)).coefficients()
     basis = search.field_.basis
     own = mean[len(mean) - len(basis.groups[name]) :]
-    group = next(g for g in p.groups if g.name == name)
+    group = basis.kinds[name]
     return [columns @ (basis.transforms[name] @ own) for columns in group.columns]
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
-from fogml.gap.noise_effects import Line, noise_response
+from fogml.gap.seen_as import AS_CANDIDATE, noise_response
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.inputs import STAND_INS, Inputs
@@ -67,7 +68,7 @@ class TwinModel:
         """Candidates of the catalogue that are not on yet and don't conflict with what is."""
         on = set(self.twin.settings)
         return {
-            id: Line(declared) if id == "sinusoidal" else declared
+            id: AS_CANDIDATE[id](declared) if id in AS_CANDIDATE else declared
             for id, declared in effects().items()
             if declared.candidate and id not in on and not on & set(declared.conflicts)
         }
@@ -165,6 +166,11 @@ class TwinOnRun:
         declared = effect(id)
         if isinstance(declared, NoiseEffect):
             return noise_response(id, shape, self._recorded.time)
+        if AT_AMPLITUDE in shape:
+            about = EffectValue(
+                id, shape[AT_AMPLITUDE], {k: v for k, v in shape.items() if k != AT_AMPLITUDE}
+            )
+            return (self.output(constants, (about,)) - self.output(constants)) / about.amplitude
         inputs = self._raw if declared.stage == "sensor" else self._full
         inputs = self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh()
         return np.asarray(declared.response(inputs, **shape), dtype=np.float64)

@@ -67,7 +67,7 @@ def test_no_set_beats_the_one_that_the_search_ends_on():
     for size in (0, 1, 2):
         for ids in combinations(every.places, size):
             for unknown in (False, True):
-                found = every.explanation([first[id] for id in ids], unknown=unknown)
+                found = every.explanation([first[id] for id in ids], "unknown" if unknown else "nothing")
                 assert found.log_posterior <= best.log_posterior + 0.5, found
 
 

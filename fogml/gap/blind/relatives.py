@@ -7,7 +7,7 @@ the nominal constants can make up for taken out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache, cached_property
 from pathlib import Path
 
@@ -38,12 +38,19 @@ class Likeness:
         What withheld effects truly add to the output [deg/h], a list of one array per run each.
     noise
         The noise to whiten by.
+    constants
+        The unit's nominal constants, about which effects that falsify an input are taken.
     """
 
     def __init__(
-        self, runs: Sequence[Path], contributions: Sequence[Sequence[FloatArray]], noise: NoiseModel
+        self,
+        runs: Sequence[Path],
+        contributions: Sequence[Sequence[FloatArray]],
+        noise: NoiseModel,
+        constants: Mapping[str, float] | None = None,
     ) -> None:
         self._runs, self._contributions, self._noise = runs, contributions, noise
+        self._constants = constants
 
     def cosine(self, id: str) -> float:
         """The largest absolute cosine that an effect reaches with one of the contributions."""
@@ -74,7 +81,7 @@ class Likeness:
 
     @cached_property
     def _stack(self) -> Stack:
-        return Stack(self._runs)
+        return Stack(self._runs, self._constants)
 
     @cached_property
     def _nominal(self) -> FloatArray:
@@ -113,7 +120,7 @@ def relatives_of(folder: BlindFolder, truth: Truth) -> Callable[[str], bool] | N
         contributions = [[given[run.name, i] for run in runs] for i in places]
         value = {name: amount.value for name, amount in truth.noise.items()}
         noise = NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
-        return Likeness(runs, contributions, noise)
+        return Likeness(runs, contributions, noise, truth.nominal)
 
     @cache
     def relative(id: str) -> bool:

@@ -43,7 +43,7 @@ class ShupeShells(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Cubic part of the weights over the thickness."""
-        return {"cubic": rng.uniform(0.0, 1.0)}
+        return {"cubic": rng.uniform(0.0, 0.4)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Outer half's rate less inner half's, weighted; scaled to faces' rates for a straight profile."""
@@ -61,7 +61,7 @@ class MohrCurved(Additive):
     def draw(self, rng: np.random.Generator) -> Shape:
         """Slope and curvature of the sensitivity's logarithm."""
         sign = 1.0 if rng.random() < 0.5 else -1.0
-        return {"slope": sign * rng.uniform(0.004, 0.016), "curvature": rng.uniform(-1e-4, 1e-4)}
+        return {"slope": sign * rng.uniform(0.008, 0.016), "curvature": rng.uniform(-3e-5, 3e-5)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """exp(a u + c u**2) dT/dt of the winding's mean."""
@@ -116,8 +116,8 @@ class Leads(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Ratio of the lengths, share of the hub in what the first lead feels, lag of its jacket [s]."""
-        ratio, share = rng.uniform(0.3, 3.0), rng.uniform(0.0, 0.06)
-        return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(30.0, 90.0)}
+        ratio, share = rng.uniform(0.3, 2.0), rng.uniform(0.0, 0.03)
+        return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(10.0, 40.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """n c_T (l_1 dT_1/dt - l_2 dT_case/dt) / D."""
@@ -137,7 +137,7 @@ class SideWind(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Direction of the air."""
-        return {"phase": rng.uniform(0.0, 360.0), "cubic": rng.uniform(0.0, 1.0)}
+        return {"phase": rng.uniform(0.0, 360.0), "cubic": rng.uniform(0.0, 0.4)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """cos(angle - phase) d(T_out - T_in)/dt."""

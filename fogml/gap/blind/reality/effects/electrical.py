@@ -56,7 +56,7 @@ class MachinePickup(Additive):
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Exponent over the duty, delay [s]."""
-        return {"exponent": rng.uniform(0.95, 1.05), "delay": rng.uniform(0.5, 10.0)}
+        return {"exponent": rng.uniform(0.95, 1.05), "delay": rng.uniform(0.5, 3.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """heater**p + compressor, lagged."""

@@ -1,4 +1,4 @@
-"""Random errors that a diagnosis can see as a response: a ramp, and a line of any phase on each run."""
+"""Effects that a diagnosis sees in another way than a simulation: lines of any phase, ramps, delays."""
 
 from __future__ import annotations
 
@@ -30,6 +30,21 @@ class Line:
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.declared, name)
+
+
+@dataclass(frozen=True)
+class Delay:
+    """A delay of the record as a candidate: its response is not in proportion to its size."""
+
+    declared: Effect
+    amplitudes: tuple[float, ...] = (-200.0, -60.0, -10.0, 10.0, 60.0, 200.0)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.declared, name)
+
+
+AS_CANDIDATE = {"sinusoidal": Line, "logger_skew": Delay}
+"""Effects that a diagnosis sees in another way than a simulation does."""
 
 
 def noise_response(id: str, shape: Mapping[str, float], time: FloatArray) -> FloatArray:
