@@ -10,6 +10,7 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from fogml.gap.confidence import named_probability, unknown_probability
+from fogml.gap.evidence import log_sum_exp
 from fogml.gap.search import Chosen, Explanation, Search
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
@@ -77,7 +78,7 @@ class Ranking:
     noise: UnevenNoise
 
 
-def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
+def rank(search: Search, explanations: Sequence[Explanation], tension: float = -math.inf) -> Ranking:
     """Classes and probabilities.
 
     Parameters
@@ -86,13 +87,15 @@ def rank(search: Search, explanations: Sequence[Explanation]) -> Ranking:
         For swapping one effect for another.
     explanations
         What was tried, the most probable first.
+    tension
+        Evidence for an unknown that was taken for noise [nats]; see `fogml.gap.noise.tension`.
     """
     best = explanations[0]
     classes = {c.candidate: _members(search, best, c.candidate) for c in best.effects}
     weights = _weights(explanations)
     unknown = float(sum(w for e, w in zip(explanations, weights) if e.unknown is not None))
     noise = uneven_noise(search, best)
-    uneven = expit(noise.gain + math.log(UNEVEN / (1.0 - UNEVEN)))
+    uneven = expit(float(np.logaddexp(noise.gain, tension)) + math.log(UNEVEN / (1.0 - UNEVEN)))
     unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
     ranked = []
     taken: set[str] = set()
@@ -125,12 +128,12 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
     gains = held.node_gains()
     members = {id: best.log_evidence}
     # No form is known to the last per cent: of a large effect more nats hang on that.
-    nats = SAME_CLASS_NATS + FORM_SHARE * max(float(logsumexp(gains[search.places[id]])), 0.0)
+    nats = SAME_CLASS_NATS + FORM_SHARE * max(log_sum_exp(gains[search.places[id]]), 0.0)
     for other in search.places:
         if other in best.ids:
             continue
         # A quick look first: with the others held, a swap only gets better by a few nats.
-        quick = float(logsumexp(gains[search.places[other]])) - float(logsumexp(gains[search.places[id]]))
+        quick = log_sum_exp(gains[search.places[other]]) - log_sum_exp(gains[search.places[id]])
         if quick < -nats - 3.0:
             continue
         swapped = search.explanation((*others, search._best(other, gains)), best.rest)
@@ -157,4 +160,5 @@ def _ranked(
         # The smaller of the two: many weak sets without the class may outweigh the best of them.
         margin = min(margin, math.log(max(probability, 1e-300)) - math.log(max(1.0 - probability, 1e-14)))
     rest = held.group[1] / chosen.length if held.unknown is not None and held.group is not None else 0.0
-    return Ranked(chosen, members, named_probability(margin), margin, search.form_share(held), rest)
+    share = search.form_share(held)
+    return Ranked(chosen, members, named_probability(margin, share, rest), margin, share, rest)

@@ -1,32 +1,54 @@
 """Probabilities that hold: the evidence mapped to how often such findings are right.
 
-Evidence takes the forms of effects and of noise for known. How often a finding of a given margin is
-right was fitted on a development suite of the check on withheld effects, by
-``python -m experiments.gap_blind.calibrate DIR``.
+Evidence takes the forms of effects and of noise for known. How often a finding is right that has a
+given margin, needs so much of another form and leaves so much beside it was fitted on a development
+suite of the check on withheld effects, by ``python -m experiments.gap_blind.calibrate DIR``.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
-NAMED = (0.1, 0.16)
-"""Logistic constants of a class's probability over the margin of its evidence [nats]."""
-UNKNOWN = (-0.6, 0.3)
+SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
+LEAST_MARGIN = -3.0
+LARGEST_LOG_ODDS = 12.0
+NAMED = (0.5, 0.5, 0.03, -3.0, -1.2)
+"""Logistic constants of a class's probability: constant, then one for each of `named_features`."""
+UNKNOWN = (-0.65, 0.28)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
-LARGEST_MARGIN, LARGEST_LOG_ODDS = 30.0, 12.0
 
 
-def named_probability(margin: float) -> float:
-    """Probability that a class is right whose loss costs `margin` nats."""
-    constant, slope = NAMED
-    return _logistic(constant + slope * min(max(margin, -LARGEST_MARGIN), LARGEST_MARGIN))
+def named_features(margin: float, form_share: float, rest: float) -> tuple[float, ...]:
+    """What a finding's probability follows.
+
+    Parameters
+    ----------
+    margin
+        Evidence that is lost without its class [nats].
+    form_share
+        Share of the gain that needs other forms than the catalogue's.
+    rest
+        Length of what acts beside it over its own.
+    """
+    return (
+        min(max(margin, LEAST_MARGIN), SMALL_MARGIN),
+        max(min(margin, LARGEST_MARGIN) - SMALL_MARGIN, 0.0),
+        min(max(form_share, 0.0), 1.0),
+        math.log1p(min(rest, 20.0)),
+    )
+
+
+def named_probability(margin: float, form_share: float = 0.0, rest: float = 0.0) -> float:
+    """Probability that a class is right; for the parameters see `named_features`."""
+    return _logistic(NAMED, named_features(margin, form_share, rest))
 
 
 def unknown_probability(log_odds: float) -> float:
     """Probability of an unknown that has these odds by the evidence."""
-    constant, slope = UNKNOWN
-    return _logistic(constant + slope * min(max(log_odds, -LARGEST_LOG_ODDS), LARGEST_LOG_ODDS))
+    return _logistic(UNKNOWN, (min(max(log_odds, -LARGEST_LOG_ODDS), LARGEST_LOG_ODDS),))
 
 
-def _logistic(x: float) -> float:
+def _logistic(constants: Sequence[float], features: Sequence[float]) -> float:
+    x = constants[0] + sum(c * f for c, f in zip(constants[1:], features))
     return 1.0 / (1.0 + math.exp(-x))

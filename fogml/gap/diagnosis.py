@@ -9,17 +9,17 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.assumptions import assumptions
 from fogml.gap.basis import Basis, build_basis
-from fogml.gap.classes import Ranked, Ranking, rank
+from fogml.gap.classes import Ranking, rank
 from fogml.gap.describe import describe_unknown
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field
-from fogml.gap.fitting import Fit, fit_model
+from fogml.gap.found import found_effects
 from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
-from fogml.gap.model import Candidate, EffectValue, GyroModel
+from fogml.gap.model import Candidate, GyroModel
 from fogml.gap.near_library import near_library
 from fogml.gap.next_run import next_run
-from fogml.gap.noise import Noise
+from fogml.gap.noise import Noise, tension
 from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
 from fogml.gap.reports import (
     candidate_evidence,
@@ -29,9 +29,8 @@ from fogml.gap.reports import (
     weighed_by_runs,
     with_run_amplitudes,
 )
-from fogml.gap.result import Diagnosis, Estimate, Found, HowFar, Unknown, Verdict
+from fogml.gap.result import Diagnosis, Found, HowFar, Unknown, Verdict
 from fogml.gap.search import Search
-from fogml.gap.starting import starting_values
 from fogml.gap.structure import gaps_on_runs, stage_energies
 from fogml.gap.where import where
 from fogml.runs.run import FloatArray, Run
@@ -101,23 +100,23 @@ def _diagnosed(
     candidates = _candidates(model, without)
     prepared = prepare(model, fit, held_out, noise, tell)
     basis = _basis(prepared, candidates, prepared.recalibrated.constants, tell)
-    search, ranking = _searched(basis, tell)
+    search, ranking = _searched(prepared, basis, tell)
     if ranking.best.effects:
         # What was taken for noise may have been the effect, and the constants may have made up for it.
         tell("fitting the noise beside what was found")
-        values = _found(prepared, candidates, basis, ranking)[1].constants
+        values = found_effects(prepared, candidates, search, ranking)[1].constants
         again = with_noise_beside(prepared, _explained(prepared, basis, ranking))
         if _differ(prepared.noise, again.noise) or _act_on_inputs(candidates, ranking):
             prepared = again
             basis = _basis(prepared, candidates, values, tell)
-            search, ranking = _searched(basis, tell)
+            search, ranking = _searched(prepared, basis, tell)
     return _result(prepared, candidates, basis, search, ranking, seed, plan, tell)
 
 
-def _searched(basis: Basis, tell: Progress) -> tuple[Search, Ranking]:
+def _searched(p: Prepared, basis: Basis, tell: Progress) -> tuple[Search, Ranking]:
     tell("searching sets of effects")
     search = Search(Field(basis))
-    return search, rank(search, search.run())
+    return search, rank(search, search.run(), tension(p.noise, p.noise_prior))
 
 
 def _explained(p: Prepared, basis: Basis, ranking: Ranking) -> list[FloatArray]:
@@ -174,7 +173,7 @@ def _result(
     tell: Progress,
 ) -> Diagnosis:
     tell("fitting what was found")
-    found, fits = _found(p, candidates, basis, ranking)
+    found, fits = found_effects(p, candidates, search, ranking)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
     looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
     unknown = Unknown(ranking.unknown, looks_like, ranking.log_odds)
@@ -208,59 +207,6 @@ def _result(
         assumed=assumptions(p, basis),
         model=p.model.name,
     )
-
-
-def _found(
-    p: Prepared, candidates: Mapping[str, Candidate], basis: Basis, ranking: Ranking
-) -> tuple[tuple[Found, ...], Fit]:
-    """Effects with numbers, and the fit with those that are named."""
-    named = [r for r in ranking.effects if r.probability >= 0.5 and r.chosen.candidate in ranking.best.ids]
-    starts = starting_values(
-        p.fit,
-        p.whiteners,
-        p.model.constants,
-        p.recalibrated.constants,
-        [(r.chosen.candidate, basis.nodes[r.chosen.node].node.shape) for r in named],
-        candidates,
-    )
-    fit = p.recalibrated
-    if starts:
-        fit = fit_model(
-            p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
-        )
-    fitted = {e.id: e for e in fit.effects}
-    errors = fit.standard_errors
-    found = []
-    for r in ranking.effects:
-        id, declared = r.chosen.candidate, candidates[r.chosen.candidate]
-        value = fitted.get(id) or _rough(r, basis, candidates)
-        se = float(errors.get(f"{id}.amplitude", abs(value.amplitude)))
-        found.append(
-            Found(
-                effect=id,
-                stage=declared.stage,
-                members=r.members,
-                probability=r.probability,
-                margin=r.margin,
-                amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
-                parameters={
-                    q.name: Estimate(value.shape[q.name], float(errors.get(f"{id}.{q.name}", 0.0)), q.unit)
-                    for q in declared.shape
-                    if q.name in value.shape
-                },
-            )
-        )
-    return tuple(found), fit
-
-
-def _rough(ranked: Ranked, basis: Basis, candidates: Mapping[str, Candidate]) -> EffectValue:
-    """An effect that is not fitted: its best node, and the size that goes with its length."""
-    node = basis.nodes[ranked.chosen.node]
-    declared = candidates[ranked.chosen.candidate]
-    amplitude = ranked.chosen.length * node.size
-    low, high = declared.amplitude.limits
-    shape = {q.name: node.node.shape[q.name] for q in declared.shape if q.name in node.node.shape}
-    return EffectValue(declared.id, float(np.clip(amplitude, low, high)), shape)
 
 
 def _verdict(found: Sequence[Found], unknown: Unknown) -> Verdict:

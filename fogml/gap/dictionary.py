@@ -88,6 +88,9 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
                 _scale_factor(observations),
             ),
         ]
+    for name, words, columns in (_angles(observations), _drives(observations)):
+        if columns:
+            groups.append((name, words, columns))
     held = [Group(name, words, tuple(columns)) for name, words, columns in groups]
     mixed = [g for g in held if g.name in MIXED]
     together = tuple(np.concatenate([g.columns[r] for g in mixed], axis=1) for r in range(len(observations)))
@@ -213,6 +216,44 @@ def _scale_factor(observations: Sequence[Observation]) -> list[FloatArray]:
         held += [(plays.play(f"{w}", t, w) - t) / 10.0 for w in (4.0, 16.0)]
         blocks.append(np.column_stack([rate * h for h in held]))
     return blocks
+
+
+def _angles(observations: Sequence[Observation]) -> tuple[str, str, list[FloatArray]]:
+    """Harmonics of the table's angle, recorded or followed from its rate, steady or over temperature."""
+    blocks = []
+    for o in observations:
+        recorded = o.run.columns.get("angle")
+        steps = np.diff(o.run.time, prepend=o.run.time[0])
+        turned = np.radians(np.cumsum(o.run.rate * steps) if recorded is None else recorded)
+        u = (o.temperature - 25.0) / 50.0
+        waves = [o.averaged(of(k * turned)) for k in (1, 2, 3) for of in (np.cos, np.sin)]
+        blocks.append(np.column_stack([*waves, *(w * u for w in waves[:2]), *(w * u**2 for w in waves[:2])]))
+    moved = any(np.ptp(block[:, :2], axis=0).max() > 1e-3 for block in blocks)
+    return "angle", "goes with the table's angle", blocks if moved else []
+
+
+def _drives(observations: Sequence[Observation]) -> tuple[str, str, list[FloatArray]]:
+    """Every other recorded column, its square, its past and its product with temperature."""
+    names = [name for name in observations[0].run.columns if _is_drive(name, observations)]
+    spans = {name: max(float(np.ptp(o.run.columns[name])) for o in observations) or np.inf for name in names}
+    names = [name for name in names if np.isfinite(spans[name])]
+    if not names:
+        return "drives", "", []
+    blocks = []
+    for o in observations:
+        columns = []
+        for name in names:
+            held = o.averaged((o.run.columns[name] - o.run.columns[name][0]) / spans[name])
+            u = (o.temperature - 25.0) / 50.0
+            columns += [held, held**2, held * u, *(_lag(o, held, tau) - held for tau in EDGES_S[1:3])]
+        blocks.append(np.column_stack(columns))
+    return "drives", f"follows the recorded {', '.join(names)}", blocks
+
+
+def _is_drive(name: str, observations: Sequence[Observation]) -> bool:
+    if name in ("time", "gyro", "rate", "angle") or name.startswith("T"):
+        return False
+    return all(name in o.run.columns for o in observations)
 
 
 def _past(o: Observation, half: float) -> FloatArray:

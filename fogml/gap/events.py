@@ -20,6 +20,8 @@ FEWEST_CYCLES = 4.0
 """Cycles over the longest run from which on an oscillation is no drift."""
 APART_S = 600.0
 """Least time between two steps [s]."""
+LOOKED_THROUGH = 3.0
+"""Price of the places that were looked through, in their logarithm."""
 _FINER = 4
 
 
@@ -44,7 +46,7 @@ def _beside_constants(frame: Frame) -> list[FloatArray]:
 
 
 def _lines(frame: Frame, left: Sequence[FloatArray]) -> Group | None:
-    """The strongest lines, of any phase on each run, steady or growing with temperature or the table's rate."""
+    """The strongest lines, of any phase on each run, steady or growing with temperature or turns."""
     longest = max(o.row_s * len(o) for o in frame.observations)
     finest = max(o.row_s for o in frame.observations)
     step_hz = 1.0 / (_FINER * longest)
@@ -59,9 +61,9 @@ def _lines(frame: Frame, left: Sequence[FloatArray]) -> Group | None:
         power += np.interp(frequencies, own, spectrum)
     places = _highest(power, MOST_LINES, _FINER)
     found = frequencies[places]
-    rows = [_modulated(o, found) for o in frame.observations]
+    columns = [_modulated(o, found) for o in frame.observations]
     words = f"is periodic in time with a period of {1.0 / found[0]:.3g} s"
-    return Group("line", words, side_by_side(rows), 2.0 * math.log(len(frequencies) / _FINER))
+    return Group("line", words, side_by_side(columns), LOOKED_THROUGH * math.log(len(frequencies) / _FINER))
 
 
 def _modulated(o: Observation, frequencies: FloatArray) -> FloatArray:
@@ -99,13 +101,15 @@ def _steps(frame: Frame, left: Sequence[FloatArray]) -> Group | None:
         run = int(np.searchsorted(edges, place, side="right")) - 1
         o, row = frame.observations[run], place - int(edges[run])
         for r, other in enumerate(frame.observations):
-            columns[r].append(np.zeros(len(other)) if r != run else (np.arange(len(o)) >= row) * 1.0)
+            columns[r].append(
+                np.zeros(len(other)) if r != run else np.where(np.arange(len(o)) >= row, 1.0, 0.0)
+            )
         if not words:
             words = f"steps at {o.time[row] / 3600.0:.2f} h in {o.run.name}"
     if not words:
         return None
     rows_of = tuple(np.column_stack(held) for held in columns)
-    return Group("step", words, rows_of, 2.0 * math.log(float(edges[-1]) / max(apart)))
+    return Group("step", words, rows_of, LOOKED_THROUGH * math.log(float(edges[-1]) / max(apart)))
 
 
 def _highest(values: FloatArray, count: int, apart: int) -> list[int]:

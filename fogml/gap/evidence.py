@@ -178,6 +178,12 @@ class Conditioned:
         return out
 
 
+def log_sum_exp(values: FloatArray) -> float:
+    """Logarithm of the sum of exponentials; SciPy's takes longer to be called than to sum up."""
+    top = float(values.max())
+    return top + float(np.log(np.exp(values - top).sum())) if np.isfinite(top) else top
+
+
 def by_candidate(nodes: Sequence[NodeColumns]) -> dict[str, NDArray[np.intp]]:
     """Indices of each candidate's nodes."""
     places: dict[str, list[int]] = {}

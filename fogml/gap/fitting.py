@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate, Constant, EffectValue
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
@@ -173,18 +174,7 @@ class _Problem:
                 self.limits.append(_usable(quantity, low, high))
         self.names, self.scale = tuple(names), np.array(scale)
         self._mean = np.array([c.mean / c.sd for c in constants])
-        self._fixed = self._white(
-            [
-                np.column_stack(
-                    [
-                        o.averaged(columns[c.name]) * c.sd if c.name in columns else np.zeros(len(o))
-                        for c in constants
-                    ]
-                )
-                for o in observations
-                for columns in [o.model.columns()]
-            ]
-        )
+        self._fixed = self._white([constant_rows(o, constants) for o in observations])
         self._middle = self._packed(self.first)[len(constants) :]
 
     def start(self, constants: Mapping[str, float] | None) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -10,10 +11,11 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.gap.dictionary import Group
+from fogml.gap.frame import constant_rows
 from fogml.gap.model import Constant, GyroModel
 from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray, Run
-from fogml.signals.noise_fit import NoiseFit, NoisePrior, fit_noise
+from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel
 
 UNIT_FACTOR = 1.3
@@ -31,6 +33,9 @@ BESIDE = (
 )
 """Groups of the unknown that are kept out of the noise."""
 MOST_ROWS = 1500
+FREE_DEG_H = 5.0
+"""Prior standard deviation of what smooth unknowns add [deg/h]."""
+LEAST_SHARE_OF_WHITE = 0.02
 SAFE_SIDE = 0.6
 """Standard errors that slow noise is taken larger by."""
 
@@ -92,21 +97,22 @@ def noise_of(
 
     `explained` are rows of what effects that were found can do on each run, shape (m_r, k).
     """
-    series, times, columns, deviations = [], [], [], np.empty(0)
+    series, times, fixed, free = [], [], [], []
     means = {c.name: c.mean for c in constants}
     smooth = [g for g in groups if g.name in BESIDE]
     for r, o in enumerate(observations):
-        held = o.model.columns()
-        fixed = [o.averaged(held[c.name]) * c.sd if c.name in held else np.zeros(len(o)) for c in constants]
-        free = [column for g in smooth for column in g.columns[r].T]
+        used = _quiet(o)
+        fixed.append(constant_rows(o, constants)[used])
+        columns = [column for g in smooth for column in g.columns[r].T]
         if explained is not None:
             # Scaled so that one prior standard deviation is plenty.
-            free += [column / max(float(np.abs(column).max()), 1e-300) for column in explained[r].T]
-        used = _quiet(o)
-        columns.append(np.column_stack(fixed + free)[used])
+            columns += [column / max(float(np.abs(column).max()), 1e-300) for column in explained[r].T]
+        free.append(np.column_stack(columns)[used])
         series.append((o.recorded - o.averaged(o.model.output(means)))[used])
         times.append(o.time[used])
-        deviations = np.concatenate([np.ones(len(fixed)), np.full(len(free), 5.0)])
+    axes = _plain_axes(free, prior.centre.N * np.sqrt(3600.0 / observations[0].row_s))
+    columns = [np.concatenate([a, b @ axes], axis=1) for a, b in zip(fixed, free)]
+    deviations = np.concatenate([np.ones(len(constants)), np.full(axes.shape[1], FREE_DEG_H)])
     fit = fit_noise(
         times,
         series,
@@ -117,6 +123,27 @@ def noise_of(
         most=MOST_ROWS,
     )
     return Noise(_on_the_safe_side(fit), fit, source)
+
+
+def tension(noise: Noise, prior: NoisePrior) -> float:
+    """Evidence that something unknown was taken for noise: noise far above what was known of it [nats].
+
+    That of a coefficient that is free to be larger, against the prior; at the price of being asked.
+    """
+    above = [
+        math.log(getattr(noise.fit.model, name) / getattr(prior.centre, name)) / deviation
+        for name, deviation in zip(NAMES, prior.deviations)
+        if getattr(prior.centre, name) > 0.0
+    ]
+    return 0.5 * max(0.0, *above) ** 2 - math.log(10.0)
+
+
+def _plain_axes(free: Sequence[FloatArray], white_deg_h: float) -> FloatArray:
+    """Main axes of columns with equal priors, shape (k, axes); those far under white noise left out."""
+    rows = sum(map(len, free))
+    squares, axes = np.linalg.eigh(sum(block.T @ block for block in free))
+    size = FREE_DEG_H * np.sqrt(np.maximum(squares, 0.0) / rows)
+    return np.asarray(axes[:, size > LEAST_SHARE_OF_WHITE * white_deg_h])
 
 
 def _on_the_safe_side(fit: NoiseFit) -> NoiseModel:

@@ -52,11 +52,15 @@ class Found:
     probability
         That one of the members acts.
     amplitude
-        In the card's unit.
+        In the card's unit; its standard error holds what the true form may differ by.
     parameters
         Shape parameters by name.
     margin
         By how much the evidence falls without the class [nats].
+    form_share
+        Share of the gain that needs another form than the catalogue's.
+    rest
+        Length of what acts beside it over its own.
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -72,6 +76,8 @@ class Found:
     by_run: tuple[RunAmplitude, ...] = ()
     consistent: bool = True
     margin: float = 0.0
+    form_share: float = 0.0
+    rest: float = 0.0
 
     @property
     def named(self) -> bool:

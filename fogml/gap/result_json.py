@@ -56,6 +56,8 @@ def _found(found: Found) -> dict[str, Any]:
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
         "margin": found.margin,
+        "form_share": found.form_share,
+        "rest": found.rest,
     }
 
 

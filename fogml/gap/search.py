@@ -16,9 +16,8 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from scipy.special import logsumexp
 
-from fogml.gap.evidence import Conditioned, Field, Term, by_candidate
+from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 
 MOST_EFFECTS = 4
@@ -136,7 +135,7 @@ class Search:
         for held in (self._held[(found.ids, "nothing")], self._held[(found.ids, "unknown")]):
             gains = self.field_.condition(self.terms(held)).node_gains()
             scores = {
-                id: float(logsumexp(gains[nodes])) for id, nodes in self.places.items() if id not in found.ids
+                id: log_sum_exp(gains[nodes]) for id, nodes in self.places.items() if id not in found.ids
             }
             for id in sorted(scores, key=scores.__getitem__, reverse=True)[:BRANCHES]:
                 more.setdefault(id, self._best(id, gains))
@@ -162,7 +161,7 @@ class Search:
                 gains = held.node_gains(self.places[chosen.candidate])
                 effects[i] = self._best(chosen.candidate, gains)
                 own = gains[self.places[chosen.candidate]]
-                averaged += float(logsumexp(own) - own.max()) + self._weight(effects[i], held)
+                averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest)
         terms = self._terms(effects, group)
         evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
@@ -193,7 +192,7 @@ class Search:
     def _best_group(self, effects: Sequence[Chosen], rest: Rest) -> tuple[tuple[str, float] | None, float]:
         """The best group for a rest beside a set and its length, and what averaging adds to its evidence."""
         names = list(self.field_.basis.groups)
-        small = LENGTHS <= _form_room(effects)
+        small = _form_room(effects) >= LENGTHS
         fit = small if rest == "form" else ~small
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
@@ -203,7 +202,7 @@ class Search:
         weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
         gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
-        averaged = float(logsumexp(gains) - gains.max() + weights[row, column])
+        averaged = log_sum_exp(gains) - float(gains.max() - weights[row, column])
         return (names[row], float(LENGTHS[fit][column])), averaged
 
     def form_share(self, found: Explanation) -> float:

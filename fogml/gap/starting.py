@@ -8,6 +8,7 @@ from itertools import product
 
 import numpy as np
 
+from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate, Constant, EffectValue
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
@@ -38,7 +39,7 @@ def starting_values(
     candidates
         Their declarations.
     """
-    fixed = _stacked(whiteners, [_constant_columns(o, constants) for o in observations])
+    fixed = _stacked(whiteners, [constant_rows(o, constants) for o in observations])
     data = _stacked(
         whiteners, [(o.recorded - o.averaged(o.model.output(values)))[:, None] for o in observations]
     )
@@ -93,13 +94,6 @@ def _shapes(candidate: Candidate, shape: Mapping[str, float]) -> list[dict[str, 
 
 def _least(candidate: Candidate) -> float:
     return 1e-3 * abs(candidate.amplitude.tactical[1])
-
-
-def _constant_columns(o: Observation, constants: Sequence[Constant]) -> FloatArray:
-    held = o.model.columns()
-    return np.column_stack(
-        [c.sd * o.averaged(held[c.name]) if c.name in held else np.zeros(len(o)) for c in constants]
-    )
 
 
 def _stacked(whiteners: Sequence[RunWhitener], columns: Sequence[FloatArray]) -> FloatArray:

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fogml.gap.fitting import Fit
+from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate
+from fogml.gap.observation import Observation
 from fogml.gap.search import Search
 from fogml.gap.where import GapOnRun
 from fogml.runs.run import FloatArray
@@ -28,8 +30,15 @@ def gaps_on_runs(p: Prepared, after: Fit, search: Search, ranking: Ranking) -> l
     for o, more in zip(p.fit, unknown):
         recalibrated = o.averaged(o.model.output(p.recalibrated.constants, p.recalibrated.effects))
         explained = o.averaged(o.model.output(after.constants, after.effects)) - recalibrated
-        gaps.append(GapOnRun(o, o.recorded - recalibrated, explained + more))
+        gaps.append(GapOnRun(o, o.recorded - recalibrated, explained + more, _taken(p, o)))
     return gaps
+
+
+def _taken(p: Prepared, o: Observation) -> float:
+    """Mean square of what the noise moves the recalibrated constants by, on a run [(deg/h)^2]."""
+    count = len(p.model.constants)
+    rows = constant_rows(o, p.model.constants) / [c.sd for c in p.model.constants]
+    return float(np.mean(np.sum((rows @ p.recalibrated.covariance[:count, :count]) * rows, axis=1)))
 
 
 def stage_energies(
@@ -76,13 +85,7 @@ def _beside_constants(p: Prepared, parts: list[FloatArray]) -> list[FloatArray]:
         return parts
     fixed, columns = [], []
     for o, whitener in zip(p.fit, p.whiteners):
-        held = o.model.columns()
-        own = np.column_stack(
-            [
-                o.averaged(held[c.name]) * c.sd if c.name in held else np.zeros(len(o))
-                for c in p.model.constants
-            ]
-        )
+        own = constant_rows(o, p.model.constants)
         fixed.append(own)
         columns.append(whitener.whiten(own))
     white = np.concatenate([w.whiten(part) for w, part in zip(p.whiteners, parts)])

@@ -38,11 +38,14 @@ class GapOnRun:
         Recorded less recalibrated replay, shape (m,) [deg/h].
     systematic
         The part of it that effects found and the unknown make up, noise-free, shape (m,).
+    taken
+        Mean square of what the fitted constants take up of the noise [(deg/h)^2].
     """
 
     observation: Observation
     gap: FloatArray
     systematic: FloatArray
+    taken: float = 0.0
 
 
 def where(gaps: Sequence[GapOnRun], stages: Mapping[str, float], noise: Noise) -> Where:
@@ -95,12 +98,14 @@ class _Averaged:
         o = g.observation
         windows = averages(o)
         temperature = windows.of(o.temperature)
+        white = 3600.0 * noise.fit.model.N**2 / windows.window_s
+        floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s) - g.taken
         return cls(
             o.run.name,
             windows,
             windows.of(g.gap),
             windows.of(g.systematic),
-            expected_mean_square(noise.fit.model, windows.time, windows.window_s),
+            max(floor, white),
             o.regime[windows.starts[windows.full]].astype(np.float64),
             temperature,
             np.gradient(temperature) if len(temperature) > 1 else np.zeros(len(temperature)),

@@ -76,6 +76,20 @@ class Likeness:
             best = max(best, -float(fitted.fun))
         return best
 
+    def left(self, shapes: Mapping[str, Mapping[str, float]]) -> float:
+        """Squared whitened length that effects of given shapes leave of the first contribution.
+
+        Amplitudes and nominal constants are at their best.
+        """
+        target = self._stack.averaged(self._contributions[0])[:, None]
+        columns = [self._stack.column(Atom(id, shape))[:, None] for id, shape in shapes.items()]
+        white = self._stack.whitened(self._noise, np.concatenate([target, *columns], axis=1))
+        white = white - self._nominal @ (self._nominal.T @ white)
+        length = np.linalg.norm(white, axis=0)
+        used = white[:, 1:][:, length[1:] > 0.0] / length[1:][length[1:] > 0.0]
+        residual = white[:, 0] - used @ np.linalg.lstsq(used, white[:, 0], rcond=None)[0]
+        return float(residual @ residual)
+
     def _reached(self, atom: Atom) -> float:
         return float(np.abs(self._targets.T @ self._seen(self._stack.column(atom)[:, None])).max())
 

@@ -143,7 +143,7 @@ def test_no_invention_is_a_relative_of_an_effect(form: type[Form]) -> None:
 def test_effects_that_need_different_programmes_are_not_put_together() -> None:
     by_name = {form.name: form for form in KNOWN}
     assert not compatible([by_name["logger_skew"], by_name["sf_asymmetry"]])
-    assert not compatible([by_name["deadband"], by_name["mount_tilt"]])
+    assert not compatible([by_name["deadband"], by_name["magnetic"]])
     assert not compatible([by_name["thermal_hysteresis"], by_name["thermal_hysteresis"]])
     assert compatible([by_name["thermal_hysteresis"], by_name["sf_asymmetry"]])
 

@@ -20,7 +20,11 @@ KNOWN: tuple[type[Form], ...] = (
     *turning.FORMS,
     *sensing.FORMS,
 )
-"""Forms of effects that the catalogue holds; some effects have two."""
+"""Forms of effects that the catalogue holds; some effects have two.
+
+``mount_tilt`` has none: with Earth rate alone on a table that turns, a tilt that a fixture has stays
+far under the noise of every unit here.
+"""
 INVENTED: tuple[type[Form], ...] = (*invented.FORMS, *invented_rig.FORMS)
 """Effects that no library holds."""
 WRONG_STRUCTURE: type[Form] = memory.DeepPlate

@@ -43,6 +43,8 @@ class Form(ABC):
         Whether the input axis must lie east or west.
     quick_plant
         Whether the unit must be light.
+    largest
+        Amplitude beyond which no gyro has it; where it would take more to show, the unit can't show it.
     """
 
     name: ClassVar[str]
@@ -57,6 +59,7 @@ class Form(ABC):
     several_runs: ClassVar[bool] = False
     horizontal: ClassVar[bool] = False
     quick_plant: ClassVar[bool] = False
+    largest: ClassVar[float] = np.inf
 
     @abstractmethod
     def draw(self, rng: np.random.Generator) -> Shape:

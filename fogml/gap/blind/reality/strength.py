@@ -79,7 +79,7 @@ class Scales:
         Raises
         ------
         TooWeak
-            If no amplitude does, or the effect lies in the span of the nominal constants.
+            If no amplitude that a gyro can have does, or the effect lies in the span of the constants.
         """
         if isinstance(form, Additive):
             one = Acting(form, shape, 1.0)
@@ -88,6 +88,8 @@ class Scales:
             length = projected.length(series)
             whole = sum(float(s @ w.solve(s[:, None])[:, 0]) for s, w in zip(series, self.whitenings))
             if not length > _LEAST_OUTSIDE * np.sqrt(whole):
+                raise TooWeak(form.name)
+            if wanted / length > form.largest:
                 raise TooWeak(form.name)
             return replace(one, amplitude=sign * wanted / length, d_prime=wanted)
         return self._bisected(form, shape, wanted)

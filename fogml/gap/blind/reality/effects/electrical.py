@@ -147,6 +147,7 @@ class Rectification(Additive):
     """Vibration rectified by a power near two."""
 
     name, form, unit, records = "vibration_rectification", "power near two", "deg/h/g2", ("vibration",)
+    largest = 5.0
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """The power."""

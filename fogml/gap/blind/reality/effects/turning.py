@@ -113,22 +113,6 @@ def _pick_up(world: World, direction_deg: float) -> FloatArray:
     return north * world.mean_cosine(1.0, -direction_deg)
 
 
-class TiltBent(Additive):
-    """A fixture that tilts with the case's temperature, a little curved."""
-
-    name, stage, form, unit = "mount_tilt", "rig", "curved", "urad/degC"
-    records, demands = ("T_case", "angle"), Demands(slow_turns=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Direction, curvature [1/degC]."""
-        return {"direction": rng.uniform(0.0, 180.0), "bend": rng.uniform(-1.5e-3, 1.5e-3)}
-
-    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Pick-up times the tilt."""
-        u = world.nodes["T_case"] - 25.0
-        return 1e-6 * u * (1.0 + shape["bend"] * u) * _pick_up(world, shape["direction"])
-
-
 class Cone(Additive):
     """An input axis that goes round on a cone, the cone a little elliptic."""
 
@@ -171,7 +155,6 @@ FORMS = (
     Asymmetry,
     DeadZone,
     Skew,
-    TiltBent,
     Cone,
     UnevenTable,
 )
