@@ -205,16 +205,17 @@ def _heat_flow(observations: Sequence[Observation]) -> list[FloatArray]:
 
 
 def _scale_factor(observations: Sequence[Observation]) -> list[FloatArray]:
+    """The rate times past temperatures, free of the readings' noise that the nominal replay holds too."""
     names = _shared_differences(observations)
     top = max(float(np.abs(o.run.rate).max()) for o in observations)
     blocks = []
     for o in observations:
-        rate, t = o.averaged(o.run.rate) / top, o.temperature
-        held = [(_lag(o, t, tau) - t) / 10.0 for tau in BANDS_S[::2]]
-        held += [(o.averaged(o.run.temperature(name)) - t) / 10.0 for name in names]
+        rate, t = o.averaged(o.run.rate) / top, _lag(o, o.temperature, BANDS_S[1])
+        held = [_lag(o, o.temperature, tau) - t for tau in BANDS_S[2:]]
+        held += [_lag(o, o.averaged(o.run.temperature(name)), BANDS_S[1]) - t for name in names]
         plays = Memory()
-        held += [(plays.play(f"{w}", t, w) - t) / 10.0 for w in (4.0, 16.0)]
-        blocks.append(np.column_stack([rate * h for h in held]))
+        held += [plays.play(f"{w}", t, w) - t for w in (4.0, 16.0)]
+        blocks.append(np.column_stack([rate * h / 10.0 for h in held]))
     return blocks
 
 
@@ -276,7 +277,7 @@ def _table(observations: Sequence[Observation], temperatures: Sequence[FloatArra
         after = [_lag(o, rate, tau) - rate for tau in EDGES_S] + [
             _lag(o, size, tau) - size for tau in EDGES_S
         ]
-        blocks.append(np.column_stack([*direct, rate * _rate(o), rate * hours, *after]))
+        blocks.append(np.column_stack([*direct, rate * _lag(o, _rate(o), 100.0), rate * hours, *after]))
     return blocks
 
 

@@ -17,8 +17,10 @@ LENGTHS = np.array([5.0, 10.0, 20.0, 40.0, 100.0, 300.0, 1000.0])
 LENGTH_WEIGHTS = np.array([0.2, 0.2, 0.2, 0.15, 0.12, 0.08, 0.05])
 FURTHER_DECADES = 0.6
 """Standard deviation of the size of an amplitude outside its ranges, in decades."""
+LEAST_DECADES = 1.5
+"""From so far below its ranges on, a smaller amplitude is no less likely."""
 ABSURD_DECADES, ABSURD = 1.5, -1e4
-"""So far outside its ranges an amplitude is absurd: no evidence makes up for it."""
+"""So far above its ranges an amplitude is absurd: no evidence makes up for it."""
 SLACK = 0.2
 """How much of an effect's length its true form may differ from the catalogue's."""
 SLACK_FROM = 10.0
@@ -35,6 +37,8 @@ def plausible_lengths(candidate: Candidate, size: float) -> FloatArray:
     high = max(quantity.tactical[1], quantity.navigation[1])
     low = low if low > 0.0 else 1e-3 * high
     decades = np.log10(LENGTHS * size)
-    outside = np.maximum(np.maximum(decades - np.log10(high), np.log10(low) - decades), 0.0)
-    weights = np.log(LENGTH_WEIGHTS) - 0.5 * (outside / FURTHER_DECADES) ** 2
-    return np.where(outside > ABSURD_DECADES, weights + ABSURD, weights)
+    above = np.maximum(decades - np.log10(high), 0.0)
+    # A gyro may well have less of it than is usual.
+    below = np.minimum(np.maximum(np.log10(low) - decades, 0.0), LEAST_DECADES)
+    weights = np.log(LENGTH_WEIGHTS) - 0.5 * ((above + below) / FURTHER_DECADES) ** 2
+    return np.where(above > ABSURD_DECADES, weights + ABSURD, weights)

@@ -37,7 +37,7 @@ class Delay:
     """A delay of the record as a candidate: its response is not in proportion to its size."""
 
     declared: Effect
-    amplitudes: tuple[float, ...] = (-200.0, -60.0, -10.0, 10.0, 60.0, 200.0)
+    amplitudes: tuple[float, ...] = (-200.0, -60.0, -10.0, 0.1, 10.0, 60.0, 200.0)
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.declared, name)
