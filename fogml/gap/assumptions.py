@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fogml.gap.basis import Basis
+from fogml.gap.found import FORM_ERROR
 from fogml.gap.noise import SAFE_SIDE
 from fogml.gap.preparing import Prepared
 from fogml.gap.priors import SLACK
@@ -18,8 +19,10 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
         "the model can't know what came before.",
         "Noise is Gaussian: white noise, flicker and a random walk. It was fitted on "
         f"{p.noise.source}; for the search its slow terms are taken {SAFE_SIDE:g} standard errors larger.",
-        f"An effect's true form may differ from the catalogue's by {SLACK:.0%} of its size.",
-        "Amplitudes are taken to lie within the card's ranges, or a decade or so outside.",
+        f"An effect's true form may differ from the catalogue's by {SLACK:.0%} of its size; where a "
+        "temperature that it needs was not recorded, that holds other thermal orders as well.",
+        "Amplitudes are taken to lie within the card's ranges, or a decade or so above.",
+        f"An amplitude's standard error holds {FORM_ERROR:.0%} of it for the form of the effect.",
     ]
     widths = {o.run.name: o.row_s for o in p.fit if o.width > 1}
     if widths:

@@ -111,6 +111,16 @@ class ModelOnRun(Protocol):
         """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
 
 
+@runtime_checkable
+class OtherOrders(Protocol):
+    """A `ModelOnRun` that also knows how it would be with another thermal structure."""
+
+    def other_orders(
+        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
+    ) -> list[FloatArray]:
+        """A candidate's response with other thermal orders, shape (n,) each; empty where all are alike."""
+
+
 class GyroModel(Protocol):
     """A model of a gyro that can be diagnosed."""
 

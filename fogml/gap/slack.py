@@ -2,16 +2,19 @@
 
 No gyro follows a catalogue's equation to the last per cent. Without room for that, the rest of a
 large effect would be given another effect's name. The room is made of the response times powers of
-temperature and time, of the response later or earlier, and of the candidate's other shapes.
+temperature and time, of the response later or earlier, with other thermal orders, and of the
+candidate's other shapes.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fogml.gap.frame import main_axes
+from fogml.gap.model import OtherOrders
 from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray
 from fogml.twin.memory import Memory
@@ -34,14 +37,29 @@ def slack_columns(basis: Basis, node: int) -> FloatArray:
     parts = []
     for o in frame.observations:
         responses = [o.averaged(o.model.response(chosen.candidate, shape, frame.values)) for shape in draws]
-        parts.append(np.column_stack([column for r in responses for column in _varied(o, r)]))
+        varied = [column for r in responses for column in _varied(o, r)]
+        parts.append([*varied, *_other_orders(o, chosen.candidate, draws[0], frame.values, responses[0])])
+    most = max(map(len, parts))
+    # A run that recorded every node has no other orders.
+    stacked = [
+        np.column_stack([*part, *[np.zeros(len(o))] * (most - len(part))])
+        for o, part in zip(frame.observations, parts)
+    ]
     others = [n.columns for n in basis.nodes if n.candidate == chosen.candidate and n is not chosen]
     neighbours = basis.rows[:, [c for columns in others for c in columns]]
-    columns = np.concatenate([frame.white(parts), neighbours], axis=1)
+    columns = np.concatenate([frame.white(stacked), neighbours], axis=1)
     own = basis.rows[:, list(chosen.columns)]
     columns = columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0]
     axes = main_axes(frame.beside(columns), 1e-2)[:, :MOST_COLUMNS]
     return np.asarray(columns @ axes)
+
+
+def _other_orders(
+    o: Observation, id: str, shape: Mapping[str, float], values: Mapping[str, float], response: FloatArray
+) -> list[FloatArray]:
+    if not isinstance(o.model, OtherOrders):
+        return []
+    return [o.averaged(other) - response for other in o.model.other_orders(id, shape, values)]
 
 
 def _varied(o: Observation, response: FloatArray) -> list[FloatArray]:

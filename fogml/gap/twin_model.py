@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -25,6 +26,8 @@ from fogml.twin.nominal import (
     temperature_slopes,
 )
 from fogml.twin.plant.estimate import estimate_nodes
+from fogml.twin.plant.line import RadialLine
+from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.twin import Twin
@@ -32,6 +35,8 @@ from fogml.twin.twin_file import save_twin
 
 SMOOTHED_S = 150.0
 """Readings are smoothed over this time for the responses of candidates [s]."""
+LOW_ORDER = 4
+"""Nodes of a plant of a lower order: case, two faces of the coil, electronics."""
 USUAL_LAG_S = 2.0
 """Lag of a good sensor on the coil [s], as a standard deviation: part of any recording."""
 
@@ -135,23 +140,37 @@ class TwinOnRun:
         self._twin, self._run = twin, run
         self._recorded, windows = inputs_of_run(run)
         self._replayer = Replayer(run)
-        missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
-        nodes: Mapping[str, FloatArray] = {}
-        if missing:
-            nodes = estimate_nodes(
-                twin.network,
-                self._recorded.time,
-                self._recorded.temperatures,
-                powered=windows,
-                fan=self._recorded.drives.get("fan"),
-                table_rate=self._recorded.table_rate,
-            )
+        self._windows = windows
+        self._missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
+        nodes = self._nodes(twin.network)
         # Responses to rates of temperature would be blurred by the readings' noise.
-        smooth = {name: _smoothed(run, t) for name, t in {**nodes, **self._recorded.temperatures}.items()}
-        self._full = replace(self._recorded, temperatures=smooth, cache={})
+        self._full = self._smooth(nodes)
         # What sensors do to readings is in the readings as they are.
         self._raw = replace(self._recorded, temperatures={**nodes, **self._recorded.temperatures}, cache={})
         self._outputs: dict[tuple[float, ...], tuple[FloatArray, Mapping[str, FloatArray]]] = {}
+
+    def _nodes(self, network: ThermalNetwork) -> Mapping[str, FloatArray]:
+        """Temperatures that were not recorded, by a plant."""
+        if not self._missing:
+            return {}
+        return estimate_nodes(
+            network,
+            self._recorded.time,
+            self._recorded.temperatures,
+            powered=self._windows,
+            fan=self._recorded.drives.get("fan"),
+            table_rate=self._recorded.table_rate,
+        )
+
+    def _smooth(self, nodes: Mapping[str, FloatArray]) -> Inputs:
+        held = {**nodes, **self._recorded.temperatures}
+        smooth = {name: _smoothed(self._run, t) for name, t in held.items()}
+        return replace(self._recorded, temperatures=smooth, cache={})
+
+    @cached_property
+    def _others(self) -> list[Inputs]:
+        """Inputs whose nodes follow from plants of other orders."""
+        return [self._smooth(self._nodes(network)) for network in _other_networks(self._twin)]
 
     def columns(self) -> Mapping[str, FloatArray]:
         """Response to a unit of each nominal constant [deg/h], each of shape (n,)."""
@@ -174,6 +193,25 @@ class TwinOnRun:
         inputs = self._raw if declared.stage == "sensor" else self._full
         inputs = self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh()
         return np.asarray(declared.response(inputs, **shape), dtype=np.float64)
+
+    def other_orders(
+        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
+    ) -> list[FloatArray]:
+        """A candidate's response where nodes that were not recorded follow from other plants."""
+        declared = effect(id)
+        if isinstance(declared, NoiseEffect) or declared.stage == "sensor" or AT_AMPLITUDE in shape:
+            return []
+        if not self._missing & set(declared.needs):
+            return []
+        return [
+            np.asarray(
+                declared.response(
+                    self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh(), **shape
+                ),
+                dtype=np.float64,
+            )
+            for inputs in self._others
+        ]
 
     def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
         """What the noise of the temperature readings makes of the replay, as a standard deviation.
@@ -220,6 +258,16 @@ class TwinOnRun:
             )
         output, slopes = self._outputs[key]
         return replace(inputs.afresh(), output=output, slopes=slopes)
+
+
+def _other_networks(twin: Twin) -> list[ThermalNetwork]:
+    """Plants of a lower order, and with a line of conduction in the coil, or without one."""
+    plant = twin.plant
+    others = (
+        replace(plant, order=LOW_ORDER if plant.order != LOW_ORDER else plant.order + 1),
+        replace(plant, line=RadialLine() if plant.line is None else None),
+    )
+    return [replace(twin, plant=other).network for other in others]
 
 
 def _smoothed(run: Run, temperature: FloatArray) -> FloatArray:

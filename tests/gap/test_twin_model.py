@@ -10,6 +10,7 @@ from fogml.gap.model import Candidate, EffectValue, NoisePrior
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
+from fogml.twin.inputs import STAND_INS
 from fogml.twin.nominal import NAMES
 from fogml.twin.programme import load_programme
 from fogml.twin.registry import effect
@@ -143,3 +144,28 @@ def test_a_run_without_temperature_is_refused():
     run = Run.from_columns("bare", time=np.arange(900.0), gyro=np.zeros(900))
     with pytest.raises(InputError, match="bare: holds no temperature"):
         TwinModel(TWIN).on(run)
+
+
+def test_other_orders_differ_where_a_node_was_not_recorded_and_only_there(run):
+    kept = {name: c for name, c in run.columns.items() if name in ("time", "gyro", "T_in", "T_out", "rate")}
+    model = TwinModel(TWIN)
+    bare = model.on(Run(run.name, kept, run.facts, run.gyro_unit))
+    for id in ("shupe_mohr", "deadband", "sensor_lag", "rate_ramp"):
+        assert bare.other_orders(id, _usual(id), VALUES) == []
+    for id in ("pigtail_shupe", "polarization_nonreciprocity", "source_wavelength"):
+        own = bare.response(id, _usual(id), VALUES)
+        others = bare.other_orders(id, _usual(id), VALUES)
+        differ = [np.linalg.norm(other - own) / np.linalg.norm(own) for other in others]
+        assert len(differ) == 2
+        assert 1e-6 < max(differ) < 0.7, id
+    # Where all nodes are recorded there is nothing that another order could change.
+    whole = model.on(run.with_columns(**dict.fromkeys(_every_node(), run.columns["T_in"])))
+    assert whole.other_orders("pigtail_shupe", _usual("pigtail_shupe"), VALUES) == []
+
+
+def _every_node() -> tuple[str, ...]:
+    return tuple(name for name in STAND_INS if name != "T")
+
+
+def _usual(id: str) -> dict[str, float]:
+    return {q.name: q.typical("tactical") for q in effect(id).shape}
