@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fogml.report.blind_words import figure_text, kind_words, value_text, wanted_text
+from fogml.report.blind_words import REALITY, figure_text, kind_words, value_text, wanted_text
 from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
@@ -259,6 +259,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     runs = ", ".join(f"{n} with {count}" for count, n in values["fit_runs"].items())
     return [
         ("data", values["data"]),
+        ("second reality", REALITY),
         ("cases", str(values["cases"])),
         ("seed", f"{values['seed']} ({'final' if values['final'] else 'to develop on'})"),
         ("sample interval", ", ".join(f"{number(s)} s" for s in values["sample_s"])),
