@@ -16,7 +16,7 @@ from sklearn.linear_model import LogisticRegression
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.seeds import is_final
-from fogml.gap.blind.truth import RIGHT_FOR_WRONG_THERMAL, Truth
+from fogml.gap.blind.truth import Truth
 from fogml.gap.confidence import LARGEST_LOG_ODDS, named_features
 
 Row = tuple[tuple[float, ...], bool]
@@ -41,12 +41,9 @@ def main() -> None:
 
 
 def _read(gap: dict, truth: Truth, named: list[Row], unknown: list[Row]) -> None:
-    known = {e.id for e in truth.effects if e.id and e.id not in truth.left_out}
-    if truth.kind == "wrong_thermal":
-        known = {RIGHT_FOR_WRONG_THERMAL}
     for item in gap["which"]:
         features = named_features(item["margin"], item["form_share"], item["rest"])
-        named.append((features, bool(set(item["class"]) & known)))
+        named.append((features, bool(set(item["class"]) & truth.right_names)))
     if truth.kind != "wrong_thermal":
         odds = float(np.clip(gap["unknown"]["log_odds"], -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))
         unknown.append(((odds,), truth.kind.startswith("unknown")))

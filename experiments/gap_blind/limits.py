@@ -22,7 +22,7 @@ from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness
-from fogml.gap.blind.truth import RIGHT_FOR_WRONG_THERMAL, Truth, read_contributions
+from fogml.gap.blind.truth import Truth, read_contributions
 from fogml.outputs import whole_file
 from fogml.signals.noise_model import NoiseModel
 
@@ -55,12 +55,10 @@ def _measured(folder: BlindFolder, name: str) -> dict[str, Any] | None:
         return None
     truth = Truth.model_validate_json((folder.truth / f"{name}.json").read_text())
     known = {e.id for e in truth.known if e.id}
-    if truth.kind == "wrong_thermal":
-        known = {RIGHT_FOR_WRONG_THERMAL}
     gap = json.loads(path.read_text())
     named = [item for item in gap["which"] if item["probability"] >= 0.5]
-    wrong = [item["effect"] for item in named if not known & set(item["class"])]
-    missed = [] if truth.kind == "wrong_thermal" else sorted(known - {m for i in named for m in i["class"]})
+    wrong = [item["effect"] for item in named if not truth.right_names & set(item["class"])]
+    missed = sorted(known - {m for i in named for m in i["class"]})
     if not truth.effects or not (wrong or missed):
         return None
     return {

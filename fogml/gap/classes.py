@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 
 from fogml.gap.confidence import named_probability, unknown_probability
 from fogml.gap.evidence import log_sum_exp
@@ -118,7 +118,7 @@ def rank(search: Search, explanations: Sequence[Explanation], tension: float = -
 
 def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
     logs = np.array([e.log_posterior for e in explanations])
-    return np.asarray(np.exp(logs - logsumexp(logs)))
+    return np.asarray(np.exp(logs - log_sum_exp(logs)))
 
 
 def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:

@@ -235,20 +235,20 @@ def _angles(observations: Sequence[Observation]) -> tuple[str, str, list[FloatAr
 
 def _drives(observations: Sequence[Observation]) -> tuple[str, str, list[FloatArray]]:
     """Every other recorded column, its square, its past and its product with temperature."""
-    names = [name for name in observations[0].run.columns if _is_drive(name, observations)]
-    spans = {name: max(float(np.ptp(o.run.columns[name])) for o in observations) or np.inf for name in names}
-    names = [name for name in names if np.isfinite(spans[name])]
-    if not names:
+    held_by_all = [name for name in observations[0].run.columns if _is_drive(name, observations)]
+    widest = {name: max(float(np.ptp(o.run.columns[name])) for o in observations) for name in held_by_all}
+    spans = {name: span for name, span in widest.items() if span > 0.0}
+    if not spans:
         return "drives", "", []
     blocks = []
     for o in observations:
         columns = []
-        for name in names:
-            held = o.averaged((o.run.columns[name] - o.run.columns[name][0]) / spans[name])
+        for name, span in spans.items():
+            held = o.averaged((o.run.columns[name] - o.run.columns[name][0]) / span)
             u = (o.temperature - 25.0) / 50.0
             columns += [held, held**2, held * u, *(_lag(o, held, tau) - held for tau in EDGES_S[1:3])]
         blocks.append(np.column_stack(columns))
-    return "drives", f"follows the recorded {', '.join(names)}", blocks
+    return "drives", f"follows the recorded {', '.join(spans)}", blocks
 
 
 def _is_drive(name: str, observations: Sequence[Observation]) -> bool:

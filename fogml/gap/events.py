@@ -33,16 +33,9 @@ def event_groups(frame: Frame) -> list[Group]:
     frame
         The runs.
     """
-    left = _beside_constants(frame)
+    rows = frame.without_constants(frame.residual[:, 0])
+    left = [rows[run] for run in frame.runs]
     return [group for group in (_lines(frame, left), _steps(frame, left)) if group is not None]
-
-
-def _beside_constants(frame: Frame) -> list[FloatArray]:
-    """Whitened residuals beside the constants, of each run."""
-    fixed, residual = frame.fixed, frame.residual[:, 0]
-    inner = fixed.T @ fixed + np.eye(fixed.shape[1])
-    left = residual - fixed @ np.linalg.solve(inner, fixed.T @ residual)
-    return [left[run] for run in frame.runs]
 
 
 def _lines(frame: Frame, left: Sequence[FloatArray]) -> Group | None:

@@ -101,6 +101,11 @@ class Frame:
         inverse = self._inverses[1 if flat else 0]
         return np.asarray(columns.T @ columns - cross.T @ inverse @ cross)
 
+    def without_constants(self, rows: FloatArray) -> FloatArray:
+        """What the constants and nuisances, with their priors, leave of whitened rows, shape (n,)."""
+        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
+        return np.asarray(rows - self.fixed @ np.linalg.solve(inner, self.fixed.T @ rows))
+
     @cached_property
     def _inverses(self) -> tuple[FloatArray, FloatArray]:
         gram = self.fixed.T @ self.fixed

@@ -190,9 +190,9 @@ class TwinOnRun:
                 id, shape[AT_AMPLITUDE], {k: v for k, v in shape.items() if k != AT_AMPLITUDE}
             )
             return (self.output(constants, (about,)) - self.output(constants)) / about.amplitude
-        inputs = self._raw if declared.stage == "sensor" else self._full
-        inputs = self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh()
-        return np.asarray(declared.response(inputs, **shape), dtype=np.float64)
+        return self._responded(
+            declared, shape, constants, self._raw if declared.stage == "sensor" else self._full
+        )
 
     def other_orders(
         self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
@@ -203,15 +203,14 @@ class TwinOnRun:
             return []
         if not self._missing & set(declared.needs):
             return []
-        return [
-            np.asarray(
-                declared.response(
-                    self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh(), **shape
-                ),
-                dtype=np.float64,
-            )
-            for inputs in self._others
-        ]
+        return [self._responded(declared, shape, constants, inputs) for inputs in self._others]
+
+    def _responded(
+        self, declared: Effect, shape: Mapping[str, float], constants: Mapping[str, float], inputs: Inputs
+    ) -> FloatArray:
+        """An effect's response to inputs, with the output at the constants where it needs that."""
+        met = self._met(constants, inputs) if self._meets_output(declared) else inputs.afresh()
+        return np.asarray(declared.response(met, **shape), dtype=np.float64)
 
     def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
         """What the noise of the temperature readings makes of the replay, as a standard deviation.

@@ -92,6 +92,4 @@ def _residual(search: Search, best: Explanation) -> FloatArray:
     if held.terms:
         mean, _ = held.coefficients()
         left -= search.field_.columns([c for t in held.terms for c in t.columns]) @ mean
-    fixed = frame.fixed
-    inner = fixed.T @ fixed + np.eye(fixed.shape[1])
-    return np.asarray(left - fixed @ np.linalg.solve(inner, fixed.T @ left))
+    return frame.without_constants(left)

@@ -186,6 +186,12 @@ class Truth(_Part):
         return tuple(e for e in self.effects if e.id is not None and e.id not in self.left_out)
 
     @property
+    def right_names(self) -> frozenset[str]:
+        """Ids of which one in a named class makes the name right, relatives of what was left out apart."""
+        known = {e.id for e in self.known if e.id}
+        return frozenset(known | ({RIGHT_FOR_WRONG_THERMAL} if self.kind == "wrong_thermal" else set()))
+
+    @property
     def unknown(self) -> tuple[TrueEffect, ...]:
         """The missing effects that the diagnosis can't name."""
         return tuple(e for e in self.effects if e.id is None or e.id in self.left_out)

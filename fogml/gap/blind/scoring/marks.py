@@ -14,7 +14,7 @@ import numpy as np
 
 from fogml.gap.blind.scoring.answers import Answer, Gap, Listed
 from fogml.gap.blind.scoring.statistics import overlap
-from fogml.gap.blind.truth import RIGHT_FOR_WRONG_THERMAL, Truth
+from fogml.gap.blind.truth import Truth
 
 Relative = Callable[[str], bool]
 """Whether an effect's best-fitted signature can't be told from an unknown one's contribution."""
@@ -125,11 +125,10 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
             closed_ratios=_closed_ratios(truth, None),
             seconds=answer.seconds,
         )  # fmt: skip
-    allowed = known | ({RIGHT_FOR_WRONG_THERMAL} if truth.kind == "wrong_thermal" else set())
     asked = relative if any(effect.id is not None for effect in truth.unknown) else None
     items, relatives = [], []
     for item in gap.which:
-        right = bool(allowed & set(item.members))
+        right = bool(truth.right_names & set(item.members))
         if not right and asked is not None:
             near = [id for id in item.members if asked(id)]
             relatives += near
