@@ -92,6 +92,7 @@ def candidate_columns(
         rank = LARGEST_RANK * max(len(apart), 1)
         basis, length = _on_axes(part, frame.beside(part), widths[i], rank)
         weights = plausible_lengths(candidate, 1.0 / length) - np.log(count)
+        weights += getattr(candidate, "log_prior", 0.0)
         one_way = basis.shape[1] == 1 and not signed
         if one_way and basis[:, 0] @ part[:, 0] < 0.0:
             basis = -basis

@@ -21,6 +21,7 @@ from fogml.gap.near_library import near_library
 from fogml.gap.next_run import next_run
 from fogml.gap.noise import Noise, tension
 from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
+from fogml.gap.quieter import log_joint, quieter
 from fogml.gap.reports import (
     candidate_evidence,
     constant_fits,
@@ -101,6 +102,13 @@ def _diagnosed(
     prepared = prepare(model, fit, held_out, noise, tell)
     basis = _basis(prepared, candidates, prepared.recalibrated.constants, tell)
     search, ranking = _searched(prepared, basis, tell)
+    known = quieter(prepared)
+    if known is not None:
+        tell("searching with the noise as it is known")
+        other = _basis(known, candidates, known.recalibrated.constants, tell)
+        tried = _searched(known, other, tell)
+        if log_joint(known, *tried) > log_joint(prepared, search, ranking):
+            prepared, basis, (search, ranking) = known, other, tried
     if ranking.best.effects:
         # What was taken for noise may have been the effect, and the constants may have made up for it.
         tell("fitting the noise beside what was found")

@@ -16,7 +16,7 @@ from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray
 
 MOST_LINES, MOST_STEPS = 3, 4
-FEWEST_CYCLES = 4.0
+FEWEST_CYCLES = 2.5
 """Cycles over the longest run from which on an oscillation is no drift."""
 APART_S = 600.0
 """Least time between two steps [s]."""
@@ -35,17 +35,21 @@ def event_groups(frame: Frame) -> list[Group]:
     """
     rows = frame.without_constants(frame.residual[:, 0])
     left = [rows[run] for run in frame.runs]
-    return [group for group in (_lines(frame, left), _steps(frame, left)) if group is not None]
+    steps = _steps(frame, left)
+    return _lines(frame, left) + ([] if steps is None else [steps])
 
 
-def _lines(frame: Frame, left: Sequence[FloatArray]) -> Group | None:
-    """The strongest lines, of any phase on each run, steady or growing with temperature or turns."""
+def _lines(frame: Frame, left: Sequence[FloatArray]) -> list[Group]:
+    """The strongest lines, of any phase on each run.
+
+    One of any form, at times or always; or several, steady or growing with temperature or turns.
+    """
     longest = max(o.row_s * len(o) for o in frame.observations)
     finest = max(o.row_s for o in frame.observations)
     step_hz = 1.0 / (_FINER * longest)
     frequencies = np.arange(FEWEST_CYCLES / longest, 0.45 / finest, step_hz)
     if len(frequencies) < 16:
-        return None
+        return []
     power = np.zeros(len(frequencies))
     for o, rows in zip(frame.observations, left):
         length = round(1.0 / (step_hz * o.row_s))
@@ -54,9 +58,26 @@ def _lines(frame: Frame, left: Sequence[FloatArray]) -> Group | None:
         power += np.interp(frequencies, own, spectrum)
     places = _highest(power, MOST_LINES, _FINER)
     found = frequencies[places]
-    columns = [_modulated(o, found) for o in frame.observations]
     words = f"is periodic in time with a period of {1.0 / found[0]:.3g} s"
-    return Group("line", words, side_by_side(columns), LOOKED_THROUGH * math.log(len(frequencies) / _FINER))
+    price = math.log(len(frequencies) / _FINER)
+    one = side_by_side([_of_any_form(o, float(found[0])) for o in frame.observations])
+    several = side_by_side([_modulated(o, found) for o in frame.observations])
+    return [Group("line", words, one, price), Group("lines", words, several, LOOKED_THROUGH * price)]
+
+
+def _of_any_form(o: Observation, frequency_hz: float) -> FloatArray:
+    """An oscillation with its overtones, as large always, or only in turns, or going with temperature."""
+    phase = 2.0 * np.pi * frequency_hz * (o.time - o.time[0])
+    overtones = [
+        wave(k * phase) for k in (1, 2, 3) if k * frequency_hz * o.row_s < 0.5 for wave in (np.cos, np.sin)
+    ]
+    waves = np.column_stack(overtones)
+    first = waves[:, :2]
+    parts = [waves, first * ((o.temperature - 25.0) / 50.0)[:, None]]
+    rate = np.abs(o.averaged(o.run.rate))
+    if np.any(rate):
+        parts.append(first * (rate > 1e-3 * rate.max())[:, None])
+    return np.concatenate(parts, axis=1)
 
 
 def _modulated(o: Observation, frequencies: FloatArray) -> FloatArray:

@@ -72,6 +72,11 @@ class Field:
         self.signs = np.array([n.sign for n in basis.nodes])
         self.log_weights = np.array([n.log_weights for n in basis.nodes])
 
+    @property
+    def log_evidence(self) -> float:
+        """Of the whitened data with the constants alone."""
+        return float(-0.5 * self.gram[0, 0] - np.log(np.diagonal(self._factor)).sum())
+
     def slack(self, node: int) -> tuple[int, ...]:
         """Columns of what the form of a node's effect may differ by, a length of 1 in all."""
         if node not in self._slacks:

@@ -18,6 +18,8 @@ from fogml.signals.noise_expectation import expected_mean_square, mean_square_dr
 
 AVERAGING_S = 100.0
 DRAWS = 40
+FORM_LEFT = 0.07
+"""What of a closing may be missing because no form is known exactly, as a share of it."""
 _Z90 = 1.6448536269514722
 
 
@@ -98,6 +100,7 @@ def how_far(
             base = gap(after)
             moved = [_mean_square(gap(c, e) - base) for c, e in after.draws(rng, DRAWS)]
             deviation = float(np.hypot(deviation, np.median(moved) / denominator))
+            deviation = float(np.hypot(deviation, FORM_LEFT * closed))
         deviation = widen(deviation)
         interval = (closed - _Z90 * deviation, closed + _Z90 * deviation)
     return HowFar(

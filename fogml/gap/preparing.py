@@ -68,7 +68,7 @@ def prepare(
     tell("fitting the noise")
     prior, source = prior_of(model, noise)
     fitted_noise = noise_of(fit_rows, model.constants, groups, prior, source)
-    whiteners, recalibrated = _recalibrated(model, fit_rows, fitted_noise)
+    whiteners, recalibrated = recalibrated_constants(model, fit_rows, fitted_noise)
     return Prepared(
         model,
         tuple(fit_rows),
@@ -84,7 +84,7 @@ def prepare(
     )
 
 
-def _recalibrated(
+def recalibrated_constants(
     model: GyroModel, observations: Sequence[Observation], noise: Noise
 ) -> tuple[tuple[RunWhitener, ...], Fit]:
     """Constants fitted, and whiteners whose weights know them."""
@@ -99,7 +99,7 @@ def _recalibrated(
 def with_noise_beside(p: Prepared, explained: Sequence[FloatArray]) -> Prepared:
     """The same with the noise fitted again beside what effects that were found can do, shape (m_r, k)."""
     noise = noise_of(p.fit, p.model.constants, p.groups, p.noise_prior, p.noise.source, explained)
-    whiteners, recalibrated = _recalibrated(p.model, p.fit, noise)
+    whiteners, recalibrated = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=recalibrated)
 
 

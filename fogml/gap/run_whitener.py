@@ -38,6 +38,11 @@ class RunWhitener:
         reading = np.sqrt(o.averaged(o.model.reading_noise(constants) ** 2) / o.width)
         self.weights: FloatArray = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
 
+    @property
+    def log_det(self) -> float:
+        """Half the logarithm of the determinant of the rows' covariance, in (deg/h)^2."""
+        return self._whitener.log_det - float(np.sum(np.log(self.weights)))
+
     def whiten(self, values: FloatArray) -> FloatArray:
         """White rows of unit variance, shape as given: (m,) or (m, k)."""
         white = self._whitener.whiten(values)

@@ -19,6 +19,7 @@ import numpy as np
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
+from fogml.gap.unlike import Unlike
 
 MOST_EFFECTS = 4
 SIZES = (0.4, 0.4, 0.15, 0.04, 0.01)
@@ -30,6 +31,8 @@ FORM, FORM_ROOM = 0.3, 0.25
 BEAM = (8, 6, 4)
 """Sets that grow further, by their size."""
 BRANCHES = 5
+MATTERS = 8.0
+"""Groups that are so many nats behind the best one, or gain less, are not compared with candidates."""
 Rest = Literal["nothing", "form", "unknown"]
 """What acts beside a set of effects."""
 
@@ -100,6 +103,10 @@ class Search:
     def _empty(self) -> float:
         return self.field_.condition([]).log_evidence
 
+    @cached_property
+    def _unlike(self) -> Unlike:
+        return Unlike(self.field_)
+
     def run(self) -> list[Explanation]:
         """Every explanation that was tried, the most probable first."""
         front = [self._best_of(())]
@@ -153,7 +160,7 @@ class Search:
         group = self._best_group(effects, rest)[0]
         rounds = 1 if len(effects) < 2 and rest == "nothing" else 2
         averaged = averaged_rest = 0.0
-        for _ in range(rounds):
+        for turn in range(rounds):
             averaged = 0.0
             for i, chosen in enumerate(effects):
                 others = effects[:i] + effects[i + 1 :]
@@ -162,7 +169,7 @@ class Search:
                 effects[i] = self._best(chosen.candidate, gains)
                 own = gains[self.places[chosen.candidate]]
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
-            group, averaged_rest = self._best_group(effects, rest)
+            group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
         terms = self._terms(effects, group)
         evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
@@ -189,7 +196,9 @@ class Search:
         place = int(np.flatnonzero(chosen.length == LENGTHS)[0])
         return float(node.log_weights[place] + held.sign_gains[chosen.node, place])
 
-    def _best_group(self, effects: Sequence[Chosen], rest: Rest) -> tuple[tuple[str, float] | None, float]:
+    def _best_group(
+        self, effects: Sequence[Chosen], rest: Rest, *, last: bool = False
+    ) -> tuple[tuple[str, float] | None, float]:
         """The best group for a rest beside a set and its length, and what averaging adds to its evidence."""
         names = list(self.field_.basis.groups)
         small = _form_room(effects) >= LENGTHS
@@ -200,10 +209,30 @@ class Search:
         gains = np.array([group_gains(held, name)[fit] for name in names])
         prices = np.array([self.field_.basis.kinds[name].price for name in names]) + math.log(len(names))
         weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
+        if rest == "unknown" and last:
+            weights += self._unlike_shares(effects, names, gains, weights, LENGTHS[fit])[:, None]
         gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
         averaged = log_sum_exp(gains) - float(gains.max() - weights[row, column])
         return (names[row], float(LENGTHS[fit][column])), averaged
+
+    def _unlike_shares(
+        self,
+        effects: Sequence[Chosen],
+        names: Sequence[str],
+        gains: np.ndarray,
+        weights: np.ndarray,
+        lengths: np.ndarray,
+    ) -> np.ndarray:
+        """What each group's probability loses for signals that are a candidate's, shape (groups,)."""
+        shares = np.zeros(len(names))
+        weighed = gains + weights
+        near = weighed.max(axis=1) > weighed.max() - MATTERS
+        for i in np.flatnonzero(near & (gains.max(axis=1) > MATTERS)).tolist():
+            group = (names[i], float(lengths[int(np.argmax(weighed[i]))]))
+            held = self.field_.condition(self._terms(effects, group))
+            shares[i] = self._unlike.log_share(held, *group)
+        return shares
 
     def form_share(self, found: Explanation) -> float:
         """Share of what the effects of an explanation gain that needs other forms than the catalogue's."""

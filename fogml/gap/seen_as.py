@@ -1,7 +1,8 @@
-"""Effects that a diagnosis sees in another way than a simulation: lines of any phase, ramps, delays."""
+"""Effects that a diagnosis sees in another way than a simulation: lines of any phase, delays, steps."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +13,6 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Quantity
 
-RESPONDING = ("rate_ramp", "sinusoidal")
-"""Noise effects with a response; the others show in the noise alone."""
 _PHASE = Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), "at the first sample", default=0.0)
 
 
@@ -43,18 +42,25 @@ class Delay:
         return getattr(self.declared, name)
 
 
-AS_CANDIDATE = {"sinusoidal": Line, "logger_skew": Delay}
+@dataclass(frozen=True)
+class Steps:
+    """Coarse steps of the sensors as a candidate: where it responds, the record itself shows them."""
+
+    declared: Effect
+    log_prior: float = math.log(18.0)
+    """Of it over that of other candidates: as likely as not."""
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.declared, name)
+
+
+AS_CANDIDATE = {"sinusoidal": Line, "logger_skew": Delay, "sensor_quantisation": Steps}
 """Effects that a diagnosis sees in another way than a simulation does."""
 
 
-def noise_response(id: str, shape: Mapping[str, float], time: FloatArray) -> FloatArray:
-    """Response of a noise effect per unit of its amplitude [deg/h], shape (n,); zeros where it has none."""
+def line_response(shape: Mapping[str, float], time: FloatArray) -> FloatArray:
+    """Response of a line per unit of its amplitude [deg/h], from the first sample on; shape (n,)."""
     if len(time) == 0:
         return np.zeros(0)
-    since = time - time[0]
-    if id == "rate_ramp":
-        return since / 3600.0
-    if id == "sinusoidal":
-        angle = 2.0 * np.pi * shape["frequency"] * since + np.radians(shape.get("phase", 0.0))
-        return np.asarray(np.sin(angle))
-    return np.zeros(len(time))
+    angle = 2.0 * np.pi * shape["frequency"] * (time - time[0]) + np.radians(shape.get("phase", 0.0))
+    return np.asarray(np.sin(angle))

@@ -11,10 +11,12 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
-from fogml.gap.seen_as import AS_CANDIDATE, noise_response
+from fogml.gap.readings import LEAST_STEP_DEGC, USUAL_STEP_DEGC, reading_noise, smoothed
+from fogml.gap.seen_as import AS_CANDIDATE, line_response
 from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.run import FloatArray, Run
-from fogml.twin.effect import Effect, NoiseEffect
+from fogml.runs.steps import recorded_step
+from fogml.twin.effect import Effect, NoiseEffect, SensorEffect
 from fogml.twin.inputs import STAND_INS, Inputs
 from fogml.twin.nominal import (
     DELTA,
@@ -33,10 +35,9 @@ from fogml.twin.replay import Replayer, inputs_of_run
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
 
-SMOOTHED_S = 150.0
-"""Readings are smoothed over this time for the responses of candidates [s]."""
 LOW_ORDER = 4
 """Nodes of a plant of a lower order: case, two faces of the coil, electronics."""
+STEPS = "sensor_quantisation"
 USUAL_LAG_S = 2.0
 """Lag of a good sensor on the coil [s], as a standard deviation: part of any recording."""
 
@@ -164,8 +165,13 @@ class TwinOnRun:
 
     def _smooth(self, nodes: Mapping[str, FloatArray]) -> Inputs:
         held = {**nodes, **self._recorded.temperatures}
-        smooth = {name: _smoothed(self._run, t) for name, t in held.items()}
+        smooth = {name: smoothed(self._run, t) for name, t in held.items()}
         return replace(self._recorded, temperatures=smooth, cache={})
+
+    @cached_property
+    def _step_degC(self) -> float:
+        """The coarsest steps that a temperature was recorded in."""
+        return max(recorded_step(t) for t in self._recorded.temperatures.values())
 
     @cached_property
     def _others(self) -> list[Inputs]:
@@ -183,8 +189,12 @@ class TwinOnRun:
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Change of the output per unit of an effect's amplitude [deg/h], shape (n,)."""
         declared = effect(id)
+        if id == "sinusoidal":
+            return line_response(shape, self._recorded.time)
         if isinstance(declared, NoiseEffect):
-            return noise_response(id, shape, self._recorded.time)
+            return declared.signature(self._recorded.afresh(), **shape)
+        if isinstance(declared, SensorEffect) and declared.digitises and self._step_degC <= USUAL_STEP_DEGC:
+            return np.zeros(len(self._recorded))
         if AT_AMPLITUDE in shape:
             about = EffectValue(
                 id, shape[AT_AMPLITUDE], {k: v for k, v in shape.items() if k != AT_AMPLITUDE}
@@ -223,11 +233,14 @@ class TwinOnRun:
         for name, slope in slopes.items():
             place = self._recorded.place(name)
             if place is not None:
-                variance += (slope * _reading_noise(self._recorded.temperatures[place])) ** 2
+                variance += (slope * reading_noise(self._recorded.temperatures[place])) ** 2
         return np.sqrt(variance)
 
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
-        """What sensors of ordinary quality make of the replay [deg/h], shape (n,): each late by a little."""
+        """What sensors of ordinary quality make of the replay [deg/h], shape (n,).
+
+        Each is late by a little, and all read in whole steps.
+        """
         inputs = self._recorded.afresh()
         slopes = temperature_slopes(inputs, NominalConstants(**dict(constants)))
         late = {}
@@ -239,6 +252,9 @@ class TwinOnRun:
             if name == "T" and DELTA in slopes:
                 change = inputs.memory.difference("nuisance", inputs.time, missed, DELTA_WINDOW_S)
                 late[f"lag of {name}"] = late[f"lag of {name}"] + slopes[DELTA] * change
+        if LEAST_STEP_DEGC <= self._step_degC <= USUAL_STEP_DEGC:
+            hidden = effect(STEPS).response(replace(self._raw.afresh(), slopes=slopes))
+            late["steps of the sensors"] = self._step_degC * hidden
         return late
 
     def _meets_output(self, declared: Effect) -> bool:
@@ -267,32 +283,3 @@ def _other_networks(twin: Twin) -> list[ThermalNetwork]:
         replace(plant, line=RadialLine() if plant.line is None else None),
     )
     return [replace(twin, plant=other).network for other in others]
-
-
-def _smoothed(run: Run, temperature: FloatArray) -> FloatArray:
-    """A temperature without the noise of its readings: local parabolas over `SMOOTHED_S`, shape (n,).
-
-    Reference: A. Savitzky and M. J. E. Golay, Anal. Chem. 36 (1964) 1627.
-    """
-    from scipy.signal import savgol_filter
-
-    width = 2 * round(0.5 * SMOOTHED_S / max(run.sample_s, 1e-9)) + 1
-    if width < 5:
-        return temperature
-    smooth = temperature.copy()
-    for part in run.stretches:
-        if part.stop - part.start >= width:
-            smooth[part] = savgol_filter(temperature[part], width, 2)
-    return smooth
-
-
-def _reading_noise(temperature: FloatArray) -> float:
-    """Standard deviation of a temperature's readings [degC]."""
-    if len(temperature) < 16:
-        return 0.0
-    second = np.abs(np.diff(temperature, 2))
-    steps = np.abs(np.diff(temperature))
-    steps = steps[steps > 1e-9]
-    least = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
-    quantised = least / np.sqrt(12.0) if len(np.unique(temperature)) < len(temperature) / 2 else 0.0
-    return float(max(np.median(second) / 0.6745 / np.sqrt(6.0), quantised))

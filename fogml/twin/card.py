@@ -132,7 +132,11 @@ def _picture(declared: Effect, name: str) -> Picture:
     twin = _unit().with_effect(declared.id)
     true = simulate(programme, twin, sample_s=sample_s, facts=facts, columns=(), truth=True).truth
     assert true is not None
-    values = true.noise if isinstance(declared, NoiseEffect) else true.contributions[declared.id]
+    values = (
+        true.noise
+        if isinstance(declared, NoiseEffect) and not declared.steady
+        else true.contributions[declared.id]
+    )
     return Picture(name, true.time / 3600.0, true.nodes["T_chamber"], values)
 
 

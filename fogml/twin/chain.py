@@ -22,6 +22,7 @@ from fogml.twin.effect import (
     BiasEffect,
     Effect,
     LoopEffect,
+    NoiseEffect,
     ReadoutEffect,
     RigEffect,
     ScaleFactorEffect,
@@ -106,7 +107,7 @@ def through_chain(
             scale += 1e-6 * ppm
             if contributions:
                 parts[declared.id] = 1e-6 * ppm * table_rate
-        elif isinstance(declared, BiasEffect) or (isinstance(declared, ThermalEffect) and hidden(declared)):
+        elif _adds(declared):
             added = setting.amplitude * signature(declared, setting, inputs)
             bias += added
             if contributions:
@@ -127,6 +128,13 @@ def through_chain(
                 if contributions:
                     parts[declared.id] = output - before
     return ChainOutput(output, parts)
+
+
+def _adds(declared: Effect) -> bool:
+    """Whether an effect adds its signature to the bias."""
+    if isinstance(declared, NoiseEffect):
+        return declared.steady
+    return isinstance(declared, BiasEffect) or (isinstance(declared, ThermalEffect) and hidden(declared))
 
 
 def hidden(declared: ThermalEffect) -> bool:
@@ -176,8 +184,7 @@ def sensed(
     twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: np.random.Generator
 ) -> FloatArray:
     """What the sensor behind column `name` records [degC] at a place with `temperature`, shape (n,)."""
-    for declared, setting in twin.falsifying:
-        temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
+    temperature = _falsified(twin, name, temperature, inputs, digitising=False)
     errors = twin.sensors.of(name)
     if errors.lag > 0.0:
         temperature = inputs.memory.lag(f"sensor {name}", inputs.time, temperature, errors.lag)
@@ -185,6 +192,15 @@ def sensed(
         temperature = temperature + errors.noise * rng.standard_normal(len(temperature))
     if errors.resolution > 0.0:
         temperature = errors.resolution * np.rint(temperature / errors.resolution)
+    return _falsified(twin, name, temperature, inputs, digitising=True)
+
+
+def _falsified(
+    twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, *, digitising: bool
+) -> FloatArray:
+    for declared, setting in twin.falsifying:
+        if declared.digitises == digitising:
+            temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
     return temperature
 
 

@@ -81,9 +81,13 @@ class Effect(ABC):
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per unit of amplitude, shape (n,): ppm for scale factor effects, else deg/h."""
 
-    def response(self, inputs: Inputs, **shape: float) -> FloatArray:
-        """Change of the gyro's output [deg/h] per unit of amplitude, shape (n,)."""
+    def in_hindsight(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """The signature on a whole recorded run, where what came later may tell more; shape (n,)."""
         return self.signature(inputs, **shape)
+
+    def response(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Change of the gyro's output [deg/h] on a whole run per unit of amplitude, shape (n,)."""
+        return self.in_hindsight(inputs, **shape)
 
     def default_shape(self, grade: Grade = "tactical") -> dict[str, float]:
         """Shape parameters in the middle of a grade's range."""
@@ -168,6 +172,8 @@ class SensorEffect(Effect):
     """
 
     stage: ClassVar[Stage] = "sensor"
+    digitises: ClassVar[bool] = False
+    """Whether it acts on the number that is read, behind the sensor's lag and noise."""
 
     @abstractmethod
     def sense(
@@ -211,6 +217,8 @@ class NoiseEffect(Effect):
 
     stage: ClassVar[Stage] = "noise"
     candidate = False
+    steady: ClassVar[bool] = False
+    """Whether it is the same in every run: then its signature acts, in a replay too, and nothing is drawn."""
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Zeros: a noise has no mean response."""

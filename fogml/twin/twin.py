@@ -129,7 +129,7 @@ class Twin:
     @cached_property
     def random(self) -> tuple[tuple[NoiseEffect, EffectSetting], ...]:
         """Random errors beside `noise`."""
-        return tuple((d, s) for d, s in self.on if isinstance(d, NoiseEffect))
+        return tuple((d, s) for d, s in self.on if isinstance(d, NoiseEffect) and not d.steady)
 
     @cached_property
     def network(self) -> ThermalNetwork:

@@ -81,8 +81,23 @@ def test_a_response_is_what_a_small_amplitude_changes(on):
     assert checked >= 25
 
 
-def test_the_response_of_a_coarse_sensor_is_what_its_steps_change(on):
+def test_the_response_of_a_coarse_sensor_is_what_its_steps_change():
+    coarse = TWIN.with_effect("sensor_quantisation", 0.0625)
+    on = TwinModel(TWIN).on(coarse.simulate(load_programme(STEPS), sample_s=10.0, seed=1).run)
     assert left_share(on, on.output(VALUES), "sensor_quantisation") <= 0.3
+
+
+def test_good_sensors_are_no_coarse_ones_but_part_of_any_recording(run, on):
+    rounded = {name: 0.01 * np.rint(run.columns[name] / 0.01) for name in run.temperature_columns}
+    good = TwinModel(TWIN).on(Run.from_columns("good", **{**run.columns, **rounded}))
+    assert not good.response("sensor_quantisation", {}, VALUES).any()
+    assert not on.response("sensor_quantisation", {}, VALUES).any()
+    hidden = good.nuisances(VALUES)["steps of the sensors"]
+    assert 0.0 < np.abs(hidden).max() <= 0.02
+    coarse = {name: 0.05 * np.rint(run.columns[name] / 0.05) for name in run.temperature_columns}
+    coarse = TwinModel(TWIN).on(Run.from_columns("coarse", **{**run.columns, **coarse}))
+    assert "steps of the sensors" not in coarse.nuisances(VALUES)
+    assert coarse.response("sensor_quantisation", {}, VALUES).any()
 
 
 def test_candidates_are_those_that_are_not_on():

@@ -10,6 +10,7 @@ import pytest
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
+from fogml.twin.memory import Memory
 from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
 from fogml.twin.registry import effect
 
@@ -111,6 +112,21 @@ def test_quantisation_signature_recovers_what_recorded_steps_hide(step: float, s
     assert np.count_nonzero(moving) > 5000
     assert np.corrcoef(found[moving], hidden[moving])[0, 1] > 0.8
     assert np.polyfit(found[moving], hidden[moving], 1)[0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_hindsight_tells_more_of_what_steps_hide() -> None:
+    """In samples of 10 s a ramp of 1 degC/min takes two steps at a time."""
+    declared, given = sensor("sensor_quantisation"), truth()
+    time = np.arange(0.0, 36_000.0, 10.0)
+    true = 20.0 + 30.0 * np.sin(2.0 * np.pi * time / 14_400.0)
+    rounded = 0.0625 * np.rint(true / 0.0625)
+    inputs = replace(given, time=time, temperatures={"T": rounded}, slopes={"T": np.ones(len(time))})
+    inputs = replace(inputs, table_rate=np.zeros(len(time)), memory=Memory(), cache={})
+    hidden = true - rounded
+    causal = np.corrcoef(0.0625 * declared.signature(inputs), hidden)[0, 1]
+    found = 0.0625 * declared.in_hindsight(inputs.afresh())
+    assert np.corrcoef(found, hidden)[0, 1] > max(0.8, 1.5 * causal)
+    assert np.polyfit(found, hidden, 1)[0] == pytest.approx(1.0, abs=0.2)
 
 
 def test_unrounded_temperature_is_put_to_the_usual_step() -> None:

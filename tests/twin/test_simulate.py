@@ -95,7 +95,7 @@ def test_truth_adds_up():
     true, gyro = result.truth, result.run.gyro
     parts, stage = true.contributions, {id: declared.stage for id, declared in effects().items()}
     beside = {id for id in parts if stage.get(id) in ("thermal", "sensor") and id != "hidden_thermal_node"}
-    random = {id for id in parts if stage.get(id) == "noise"}
+    random = {id for id in parts if stage.get(id) == "noise" and id != "rate_ramp"}
     added = np.sum([values for id, values in parts.items() if id not in beside | random], axis=0)
     np.testing.assert_allclose(added, true.noise_free, rtol=0.0, atol=1e-8)
     assert set(parts) == {"nominal", *everything().settings}

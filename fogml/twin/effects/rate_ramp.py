@@ -6,6 +6,7 @@ import numpy as np
 
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
+from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 
 
@@ -16,7 +17,8 @@ class RateRamp(NoiseEffect):
 
         y = R t,      sigma(tau) = R tau / sqrt(2)
 
-    with t in hours, from the first sample on. A thermal ramp that is left looks exactly like it: not to
+    with t in hours, from the first sample on. It is the same in every run, and so in a
+    replay. A thermal ramp that is left looks exactly like it: not to
     be read from a run whose temperature moves.
 
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
@@ -35,6 +37,11 @@ class RateRamp(NoiseEffect):
         "stress_relaxation": "a soak of more than 6 h: relaxation dies away",
     }
     candidate = True
+    steady = True
+
+    def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Hours since the first sample, shape (n,)."""
+        return np.asarray((inputs.time - inputs.memory.first(f"{self.id} start", inputs.time)) / 3600.0)
 
     def draw(
         self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fogml.runs.run import FloatArray
+from fogml.runs.steps import recorded_step
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
+from fogml.twin.memory import Memory
 from fogml.twin.quantities import Quantity
 from fogml.twin.responses import unseen
 
 _USUAL_STEP_DEGC = 0.0625
 _FINEST_STEP_DEGC = 5e-4
+_SMOOTHED_S, _OF_A_STEP, _LONGEST_S = 24.0, 0.5, 600.0
+"""Time constant of the smoothing: at samples of 1 s, over the time between two steps, and the longest."""
+_RATE_S = 300.0
+_SMOOTHED_BOTH_WAYS_S = 14.0
 
 
 class SensorQuantisation(SensorEffect):
@@ -22,15 +30,18 @@ class SensorQuantisation(SensorEffect):
         T_s = q round(T / q)
 
     q is the amplitude: 0.0625 degC (DS18B20), 0.01 or 0.001 degC. The signature is what a step hides, times
-    the nominal output's slope. A rounded record tells it where steps can be told apart: half a step when it
-    changes, then on by the rate of temperature; its step is the smallest change so far. A record that is
-    not rounded is put to steps of 0.0625 degC.
+    the nominal output's slope. Of a rounded record it is told by double exponential smoothing, which follows
+    a steady ramp without delay; its step is the smallest change so far. In hindsight temperature goes
+    straight from one step's edge to the next, smoothed both ways. A record that is not rounded is put to
+    steps of 0.0625 degC.
 
-    Source: rounding (derived); data sheets of sensors (literature).
+    Source: rounding (derived); R. G. Brown, Smoothing, Forecasting and Prediction (1963), for the smoothing;
+    data sheets of sensors (literature).
     """
 
     id = "sensor_quantisation"
     code = "G8"
+    digitises = True
     title = "Resolution of the temperature sensors"
     amplitude = Quantity("amplitude", "degC", (1e-3, 0.0625), (1e-3, 0.0625), "q", (0.0, 10.0))
     needs = ("slopes", "T", "T_in", "T_out")
@@ -46,6 +57,10 @@ class SensorQuantisation(SensorEffect):
         """Response per degC of the step [deg/h], shape (n,)."""
         return unseen(inputs, self.id, lambda name: self._hidden(name, inputs))
 
+    def in_hindsight(self, inputs: Inputs, **shape: float) -> FloatArray:
+        """Response per degC of the step [deg/h], shape (n,), with what readings tell that came later."""
+        return unseen(inputs, self.id, lambda name: self._hidden_in_hindsight(name, inputs))
+
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
     ) -> FloatArray:
@@ -60,15 +75,34 @@ class SensorQuantisation(SensorEffect):
         change = np.abs(temperature - memory.previous(f"{self.id} {name}", temperature))
         change[change < 1e-9] = np.inf
         step = memory.least(f"{self.id} step {name}", change)
-        changed = -memory.least(f"{self.id} changed {name}", np.where(np.isfinite(change), -time, np.inf))
-        interval = time - memory.previous(f"{self.id} time {name}", time)
         known = np.isfinite(step)
-        rate = np.where(known, inputs.dT(name) / 60.0, 0.0) / np.where(known, step, 1.0)
-        # As the record changes, temperature is half of a step behind it, and goes on from there.
-        within = np.clip(np.abs(rate) * np.where(known, time - changed, 0.0) - 0.5, -0.5, 0.5)
-        # Not to be told from steps that are rarer than the window of the rate, or as dense as samples.
-        told = np.clip(np.abs(rate) * inputs.rate_window_s - 0.5, 0.0, 1.0)
-        # A hair below, so that rounding tells nothing of one step a sample.
-        told *= np.clip(2.0 - 2.0 * np.abs(rate) * interval - 1e-9, 0.0, 1.0)
+        interval = time - memory.previous(f"{self.id} time {name}", time)
+        jumped = np.divide(
+            np.where(known, change, 0.0), interval, out=np.zeros(len(time)), where=interval > 0.0
+        )
+        jumped[~np.isfinite(jumped)] = 0.0
+        rate = memory.lag(f"{self.id} rate {name}", time, jumped, _RATE_S)
+        between = np.where(known, step, 0.0) / np.maximum(rate, 1e-12)
+        smoothed_s = np.clip(_OF_A_STEP * between, _SMOOTHED_S * np.sqrt(interval), _LONGEST_S)
+        once = memory.lag(f"{self.id} once {name}", time, temperature, smoothed_s)
+        twice = memory.lag(f"{self.id} twice {name}", time, once, smoothed_s)
+        smooth = 2.0 * once - twice
+        within = np.clip(np.where(known, smooth - temperature, 0.0) / np.where(known, step, 1.0), -0.5, 0.5)
         usual = temperature / _USUAL_STEP_DEGC
-        return np.where(step < _FINEST_STEP_DEGC, usual - np.rint(usual), np.sign(rate) * within * told)
+        return np.where(step < _FINEST_STEP_DEGC, usual - np.rint(usual), within)
+
+    def _hidden_in_hindsight(self, name: str, inputs: Inputs) -> FloatArray:
+        """The same where the whole record is known."""
+        time, temperature = inputs.time, inputs.temperature(name)
+        step = recorded_step(temperature)
+        changed = np.flatnonzero(np.diff(temperature))
+        if step < _FINEST_STEP_DEGC or len(changed) < 2:
+            return self._hidden(name, inputs)
+        edges = 0.5 * (temperature[changed] + temperature[changed + 1])
+        between = np.interp(time, 0.5 * (time[changed] + time[changed + 1]), edges)
+        within = np.clip(between - temperature, -0.5 * step, 0.5 * step) + temperature
+        smoothed_s = _SMOOTHED_BOTH_WAYS_S * math.sqrt(float(np.median(np.diff(time))))
+        memory = Memory()
+        ahead = memory.lag("ahead", time, within, smoothed_s)
+        back = memory.lag("back", -time[::-1], within[::-1].copy(), smoothed_s)[::-1]
+        return np.clip((0.5 * (ahead + back) - temperature) / step, -0.5, 0.5)

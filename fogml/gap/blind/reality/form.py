@@ -39,6 +39,8 @@ class Form(ABC):
         Whether it acts by rates or small differences of temperature that take good sensors.
     several_runs
         Whether one run can't show it.
+    drawn_per_run
+        Whether each run has one of its own, which no other run tells.
     horizontal
         Whether the input axis must lie east or west.
     quick_plant
@@ -57,6 +59,7 @@ class Form(ABC):
     records: ClassVar[tuple[str, ...]] = ()
     fine_sensors: ClassVar[bool] = False
     several_runs: ClassVar[bool] = False
+    drawn_per_run: ClassVar[bool] = False
     horizontal: ClassVar[bool] = False
     quick_plant: ClassVar[bool] = False
     largest: ClassVar[float] = np.inf

@@ -77,14 +77,20 @@ class Reckoning:
         return found
 
     def closing(self) -> list[Closing]:
-        """What the true signatures, fitted on the fit runs with the nominal constants, close."""
+        """What the true signatures, fitted on the fit runs with the nominal constants, close.
+
+        Of an effect that each run draws anew, nobody knows a held-out run's.
+        """
         unit = self.unit
         gaps, plain, wide = {}, {}, {}
         for run in unit.runs:
             columns = unit.columns(run, recorded(unit, run, self.effects))
             gaps[run.name] = (recorded_output(unit, run, self.effects) - run.world.rate_deg_h)[unit.skipped :]
             plain[run.name] = columns
-            wide[run.name] = np.concatenate([columns, self._signatures(run)], axis=1)
+            signatures = self._signatures(run)
+            if run in unit.held_out:
+                signatures = signatures * [not effect.form.drawn_per_run for effect in self.effects]
+            wide[run.name] = np.concatenate([columns, signatures], axis=1)
         sd = np.array([nominal.PRIOR_SD[name] for name in unit.constant_names])
         loose = np.concatenate([sd, np.full(len(self.effects), np.inf)])
         fit = [gaps[r.name] for r in unit.fit]
@@ -107,7 +113,8 @@ class Reckoning:
         # The slow part of the noise has about two degrees of freedom in a run.
         spread = np.sqrt(2.0 * white**2 / blocks + (floor - white) ** 2)
         gained = recalibrated - floor
-        closed = (recalibrated - after) / gained if self.effects and gained > 1.645 * spread else None
+        foreseen = any(not effect.form.drawn_per_run for effect in self.effects)
+        closed = (recalibrated - after) / gained if foreseen and gained > 1.645 * spread else None
         return Closing(
             run.name, float(np.sqrt(recalibrated)), float(np.sqrt(after)), float(np.sqrt(floor)), closed
         )

@@ -19,6 +19,8 @@ from fogml.gap.blind.truth import Truth
 Relative = Callable[[str], bool]
 """Whether an effect's best-fitted signature can't be told from an unknown one's contribution."""
 _Z90 = 1.6448536269514722
+LEAST_CLOSED = 0.05
+"""Where the true effects close less, what an answer closes over that says nothing."""
 _RIGHT_VERDICTS = ("no_gap", "unknown")
 
 
@@ -176,7 +178,7 @@ def _closed_ratios(truth: Truth, gap: Gap | None) -> tuple[float, ...]:
     answered = {part.run: part for part in gap.how_far} if gap else {}
     ratios = []
     for true in truth.closed:
-        if true.closed is None or true.closed <= 0.0:
+        if true.closed is None or true.closed < LEAST_CLOSED:
             continue
         part = answered.get(true.run)
         ratios.append((part.closed or 0.0) / true.closed if part else 0.0)

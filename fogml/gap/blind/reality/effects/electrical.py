@@ -132,6 +132,7 @@ class TurnOn(Additive):
     """Another bias after each power-on, from Student's distribution."""
 
     name, form, several_runs = "turn_on_bias", "Student's distribution", True
+    drawn_per_run = True
     demands = Demands(power_on=True)
 
     def draw(self, rng: np.random.Generator) -> Shape:
@@ -176,6 +177,7 @@ class WanderingLine(Additive):
     """A line whose phase wanders a little."""
 
     name, stage, form, unit = "sinusoidal", "noise", "line of wandering phase", "deg/h"
+    drawn_per_run = True
 
     def draw(self, rng: np.random.Generator) -> Shape:
         """Frequency and phase."""

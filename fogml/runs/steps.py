@@ -1,0 +1,20 @@
+"""The steps that a recorded temperature comes in."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fogml.runs.run import FloatArray
+
+_WHOLE = 1e-2
+
+
+def recorded_step(values: FloatArray) -> float:
+    """The step that all readings are whole multiples apart of, in their unit; 0 where there is none."""
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 1e-9]
+    if len(steps) == 0:
+        return 0.0
+    least = float(steps.min())
+    whole = steps / least
+    return least if float(np.abs(whole - np.rint(whole)).max()) < _WHOLE else 0.0
