@@ -13,9 +13,10 @@ from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.settings import LimitSettings, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
+from fogml.fleet.constants import FORM
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
-from fogml.fleet.shared import FORM, shared_model
+from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
 from fogml.fleet.tasks import DONE, Task
 from fogml.outputs import whole_folder

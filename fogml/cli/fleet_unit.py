@@ -131,7 +131,7 @@ class UnitWork:
         return kind.model_validate({**known, **own, "out": str(folder)})
 
     def _constants(self, runs: Sequence[Run]) -> dict[str, Any] | None:
-        from fogml.fleet.shared import UnitConstants
+        from fogml.fleet.constants import UnitConstants
 
         try:
             return UnitConstants.of(runs, self.form).as_dict()

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.fleet.shared import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
+from fogml.fleet.constants import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
 from fogml.fleet.tasks import DONE
 
 FLEET_SCHEMA = "fogml.fleet/1"

@@ -7,7 +7,8 @@ import pytest
 from scipy.stats import chi2
 
 from fogml.errors import InputError
-from fogml.fleet.shared import ODD, UnitConstants, fleet_constants, shared_model
+from fogml.fleet.constants import UnitConstants, fleet_constants
+from fogml.fleet.shared import ODD, shared_model
 from fogml.models.names import make_model
 from fogml.models.prior import Prior, PriorRegressor, agreement, posterior
 from fogml.models.saved import load_model, save_model
@@ -146,6 +147,36 @@ def test_the_fleet_does_no_harm_to_odd_units(fleet):
             for model in (shared_model(fleet), make_model("polynomial", FORM))
         ]
         ratios.append(errors[0] / errors[1])
+    assert max(ratios) <= 1.05
+
+
+def test_what_rests_on_the_fleet_alone_is_told(fleet):
+    short = unit_run(600, draw(600), hours=2.0)
+    model = shared_model(fleet).fit(short)
+    (stretch,) = model.from_fleet_["T"]
+    # Two hours of the sine go from 20 degC over 55 and back to 50, the first window apart; the fleet to -15.
+    assert stretch == pytest.approx((-15.0, 20.0), abs=2.0)
+    (note,) = [note for note in model.card_.notes if "rests on the fleet alone" in note]
+    assert f"T from {stretch[0]:.1f} to {stretch[1]:.1f} degC" in note
+    whole = shared_model(fleet).fit(unit_run(601, draw(600)))
+    assert whole.from_fleet_ == {}
+    assert not any("rests on the fleet" in note for note in whole.card_.notes)
+    odd = shared_model(fleet).fit(unit_run(602, draw(602, far=20.0), hours=2.0))
+    assert odd.from_fleet_ == {}
+
+
+def test_where_a_unit_has_been_the_fleet_does_no_harm_to_odd_ones(fleet):
+    ratios = []
+    for seed in range(700, 730):
+        constants = draw(seed, far=3.0)
+        short, other = unit_run(seed, constants, hours=1.5), unit_run(seed + 1, constants, phase=2.0)
+        drawn, alone = shared_model(fleet).fit(short), make_model("polynomial", FORM).fit(short)
+        there = ~alone.evaluate(other).outside
+        errors = [
+            np.sqrt(np.mean((model.predict(other) - other.gyro)[there] ** 2)) for model in (drawn, alone)
+        ]
+        ratios.append(errors[0] / errors[1])
+    assert len(set(ratios)) > 5
     assert max(ratios) <= 1.05
 
 

@@ -1,0 +1,219 @@
+"""What the units of a fleet have in common: their constants, and the prior that these make for the next.
+
+Every unit's drift is described by the same linear form. Its rows are condensed to a triangle
+that tells all of them, so a fleet's constants can be put together without its runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.features.parse import parse_features
+from fogml.models.box import learn_box
+from fogml.models.prior import Prior
+from fogml.models.rbf.search import independent_share
+from fogml.models.table import run_rows, table_of_rows
+from fogml.runs.run import FloatArray, Run
+
+FORM = "T^1..3, dT, T*dT"
+"""The form that units are compared in, unless another is stated."""
+ROWS = 4000
+"""Rows that a unit's runs are averaged down to."""
+_ROUNDS = 200
+_TOLERANCE = 1e-6
+_FREEDOM = 5.0
+# Degrees of freedom of the fleet's t distribution: odd units do not pull at the mean.
+_WORTH_UNITS = 2.0
+# Units' worth of belief that constants vary independently.
+LEAST_UNITS = 3
+
+
+@dataclass(frozen=True)
+class UnitConstants:
+    """A unit's training rows, condensed.
+
+    Attributes
+    ----------
+    features
+        The form.
+    triangle
+        Factor R of the rows ``[1, features, y]``, shape (k + 2, k + 2).
+    precision
+        Share of independent rows over the variance of what the form leaves [1/(deg/h)**2].
+    rows
+        Number of averaged rows.
+    shift, scale
+        Mean and standard deviation of the features, shape (k,).
+    box
+        Range of each of the features' atoms.
+    """
+
+    features: str
+    triangle: FloatArray
+    precision: float
+    rows: int
+    shift: FloatArray
+    scale: FloatArray
+    box: dict[str, list[float]]
+
+    @classmethod
+    def of(cls, runs: Sequence[Run], features: str = FORM) -> UnitConstants:
+        """The constants of a unit from its training runs.
+
+        Raises
+        ------
+        InputError
+            If the runs lack a temperature of the form, or are too short for it.
+        """
+        form = parse_features(features)
+        rows = [run_rows(run, form) for run in runs]
+        learn_box(form, [part.atoms for part in rows])
+        table = table_of_rows(rows, form.compose, ROWS)
+        if len(table) < 2 * (len(form) + 1):
+            raise InputError(f"{runs[0].name}: {len(table)} rows are too few for the constants of {features}")
+        columns = np.column_stack([np.ones(len(table)), table.X])
+        scale = np.where(table.X.std(axis=0) > 0.0, table.X.std(axis=0), 1.0)
+        solution, *_ = np.linalg.lstsq(columns / np.append(1.0, scale), table.y, rcond=None)
+        left = table.y - columns / np.append(1.0, scale) @ solution
+        variance = max(float(left @ left) / (len(table) - columns.shape[1]), 1e-24)
+        triangle = np.linalg.qr(np.column_stack([columns, table.y]), mode="r")
+        precision = independent_share(left) / variance
+        box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
+        return cls(form.text, np.asarray(triangle), precision, len(table), table.X.mean(axis=0), scale, box)
+
+    def in_columns(self, shift: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Information and image of the rows in the columns ``[1, (x - shift) / scale]``."""
+        width = len(shift)
+        change = np.zeros((width + 1, width + 1))
+        change[0, 0] = 1.0
+        change[0, 1:] = -shift / scale
+        change[1:, 1:] = np.diag(1.0 / scale)
+        columns = self.triangle[:, :-1] @ change
+        weighed = self.precision * columns.T
+        return weighed @ columns, weighed @ self.triangle[:, -1]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The constants as JSON-ready values."""
+        return {
+            key: value.tolist() if isinstance(value, np.ndarray) else value
+            for key, value in vars(self).items()
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any]) -> UnitConstants:
+        """The constants that `as_dict` wrote."""
+        arrays = {name: np.asarray(values[name], dtype=np.float64) for name in ("triangle", "shift", "scale")}
+        return cls(
+            features=str(values["features"]),
+            precision=float(values["precision"]),
+            rows=int(values["rows"]),
+            box=dict(values["box"]),
+            **arrays,
+        )
+
+
+@dataclass(frozen=True)
+class FleetConstants:
+    """A fleet's constants.
+
+    Attributes
+    ----------
+    features
+        The form.
+    prior
+        Distribution of the constants over units.
+    values, errors
+        Constant and coefficients of each unit in the prior's columns, drawn to the fleet where the
+        unit's runs tell little, and their standard errors [deg/h], shapes (u, k + 1).
+    distances
+        How far each unit lies from the fleet: Mahalanobis distance over the root of k + 1, shape (u,).
+    box
+        Range of each atom that half of the units cover.
+    """
+
+    features: str
+    prior: Prior
+    values: FloatArray
+    errors: FloatArray
+    distances: FloatArray
+    box: dict[str, list[float]]
+
+    @property
+    def names(self) -> list[str]:
+        """Names of the constants, ``1`` the first."""
+        return ["1", *parse_features(self.features).names()]
+
+
+def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
+    """Distribution of constants over units, by expectation and maximisation.
+
+    Each unit's constants are drawn from a multivariate t distribution with the fleet's mean and
+    covariance, and seen through its rows (N. Laird & J. Ware, Biometrics 38 (1982) 963; K. Lange,
+    R. Little & J. Taylor, J. Am. Stat. Assoc. 84 (1989) 881).
+
+    Raises
+    ------
+    InputError
+        If there are fewer than three units, or they are not of one form.
+    """
+    if len(units) < LEAST_UNITS:
+        raise InputError(f"{len(units)} units: at least {LEAST_UNITS} are needed to tell what they share")
+    if len({unit.features for unit in units}) > 1:
+        raise InputError("the units' constants are of different forms; run the fleet with one form for all")
+    shift = np.mean([unit.shift for unit in units], axis=0)
+    scale = np.sqrt(np.mean([unit.scale**2 for unit in units], axis=0))
+    seen = [unit.in_columns(shift, scale) for unit in units]
+    width = len(shift) + 1
+    mean, covariance = _begin(seen, width)
+    for _ in range(_ROUNDS):
+        means, spreads, distances = _each(seen, mean, covariance)
+        weights = (_FREEDOM + width) / (_FREEDOM + distances)
+        new_mean = weights @ means / weights.sum()
+        apart = means - new_mean
+        scatter = np.einsum("u,ui,uj->ij", weights, apart, apart) + spreads.sum(axis=0)
+        belief = np.diag(np.diag(scatter)) / len(units)
+        new = (scatter + _WORTH_UNITS * belief) / (len(units) + _WORTH_UNITS)
+        still = np.allclose(new, covariance, rtol=_TOLERANCE, atol=0.0) and np.allclose(
+            new_mean, mean, rtol=_TOLERANCE
+        )
+        mean, covariance = new_mean, new
+        if still:
+            break
+    means, spreads, distances = _each(seen, mean, covariance)
+    errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
+    prior = Prior(mean, covariance, shift, scale)
+    box = {
+        name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
+        for name in units[0].box
+    }
+    return FleetConstants(units[0].features, prior, means, errors, np.sqrt(distances / width), box)
+
+
+def _begin(seen: Sequence[tuple[FloatArray, FloatArray]], width: int) -> tuple[FloatArray, FloatArray]:
+    """Mean and covariance of the units' own least-squares constants, told apart by a little ridge."""
+    own = np.array(
+        [np.linalg.solve(info + 1e-9 * np.trace(info) / width * np.eye(width), image) for info, image in seen]
+    )
+    spread = np.median(np.abs(own - np.median(own, axis=0)), axis=0) * 1.4826
+    least = 1e-6 * max(float(np.abs(own).max()), 1e-12)
+    return np.median(own, axis=0), np.diag(np.maximum(spread, least) ** 2)
+
+
+def _each(
+    seen: Sequence[tuple[FloatArray, FloatArray]], mean: FloatArray, covariance: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Posterior mean and covariance of every unit, and its expected squared distance from the mean."""
+    inverse = np.linalg.inv(covariance)
+    means, spreads, distances = [], [], []
+    for information, image in seen:
+        spread = np.linalg.inv(information + inverse)
+        own = spread @ (image + inverse @ mean)
+        means.append(own)
+        spreads.append(spread)
+        distances.append(float((own - mean) @ inverse @ (own - mean) + np.trace(inverse @ spread)))
+    return np.array(means), np.array(spreads), np.array(distances)
