@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import shutil
 import tempfile
@@ -10,6 +11,9 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from fogml.errors import InputError
+
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+"""Errors of a disk that takes no more."""
 
 
 @contextmanager
@@ -22,6 +26,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     ------
     InputError
         If the folder is missing or can't be written.
+    OSError
+        If the disk is full, naming `path`.
     """
     path = Path(path)
     staging = _staging_folder(path.parent)
@@ -31,6 +37,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
         os.replace(partial, path)
     except PermissionError as error:
         raise InputError(f"{path}: cannot be written ({error.strerror}); choose another place") from error
+    except OSError as error:
+        raise _named(error, path) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
@@ -46,6 +54,8 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
     ------
     InputError
         If `path` is a file or its nearest existing parent can't be written.
+    OSError
+        If the disk is full, naming `path`.
     """
     path = Path(path)
     if path.exists() and not path.is_dir():
@@ -54,14 +64,22 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
     while not home.exists():
         home = home.parent
     staging = _staging_folder(home)
+    content = staging / "content"
     try:
-        yield staging
-        path.mkdir(parents=True, exist_ok=True)
-        for entry in sorted(staging.iterdir()):
+        content.mkdir()
+        yield content
+        if not path.exists():
+            # In one step: on a full disk even a move may fail.
+            path.parent.mkdir(parents=True, exist_ok=True)
+            os.replace(content, path)
+            return
+        for entry in sorted(content.iterdir()):
             target = path / entry.name
             if target.is_dir() and not target.is_symlink():
                 shutil.rmtree(target)
             os.replace(entry, target)
+    except OSError as error:
+        raise _named(error, path) from error
     finally:
         shutil.rmtree(staging, ignore_errors=True)
 
@@ -74,4 +92,11 @@ def _staging_folder(home: Path) -> Path:
     try:
         return Path(tempfile.mkdtemp(prefix=".partial-", dir=home))
     except OSError as error:
+        if error.errno in NO_ROOM:
+            raise _named(error, home) from error
         raise InputError(f"{home}: cannot be written ({error.strerror}); choose another place") from error
+
+
+def _named(error: OSError, path: Path) -> OSError:
+    """The error of a full disk with the output's name: that of writing to an open file has none."""
+    return OSError(error.errno, error.strerror, str(path)) if error.errno in NO_ROOM else error

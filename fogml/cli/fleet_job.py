@@ -18,7 +18,7 @@ from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
-from fogml.fleet.tasks import DONE, Task
+from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.outputs import whole_folder
 from fogml.validation.report_json import finite_json
 
@@ -75,12 +75,16 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     with terminal.work("fleet", total=len(tasks)) as work:
         outcomes = _run(settings, tasks, work, terminal)
     values = finite_json(fleet_json(outcomes, settings.for_units()))
-    with whole_folder(settings.out) as folder:
-        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
-        (folder / "fleet.json").write_text(text + "\n", encoding="utf-8")
-        (folder / "fleet.html").write_text(fleet_page(values, Path(settings.manifest).name), encoding="utf-8")
-        fleet_spreadsheet(values, folder / "fleet.xlsx")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("fleet"), encoding="utf-8")
+    page = fleet_page(values, Path(settings.manifest).name)
+    try:
+        with whole_folder(settings.out) as folder:
+            text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
+            (folder / "fleet.json").write_text(text + "\n", encoding="utf-8")
+            (folder / "fleet.html").write_text(page, encoding="utf-8")
+            fleet_spreadsheet(values, folder / "fleet.xlsx")
+            (folder / "config.yaml").write_text(settings.in_full().yaml("fleet"), encoding="utf-8")
+    except OSError as error:
+        raise full_disk(settings.out, error) from error
     _print(values, terminal)
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {home / 'fleet.html'}")

@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from fogml import __version__
 from fogml.errors import FogmlError
+from fogml.outputs import NO_ROOM
 
 COMMANDS = {
     "demo": ("fogml.cli.demo", "Train and judge on a real recording that ships, then say what to open."),
@@ -100,7 +101,8 @@ def fail(message: str) -> None:
 
 def _system_message(error: OSError) -> str:
     place = f"{error.filename}: " if error.filename else ""
-    return f"{place}{error.strerror or error}"
+    remedy = "; make room and run the command again" if error.errno in NO_ROOM else ""
+    return f"{place}{error.strerror or error}{remedy}"
 
 
 app = typer.Typer(

@@ -33,7 +33,7 @@ def write_json(
     folder: Path, plan: Plan, stored: Mapping[str, Stored], dtype: str, card: Mapping[str, Any]
 ) -> None:
     """Write `JSON_FILE`, everything in words and numbers, and `TENSORS_FILE`, the numbers packed."""
-    from safetensors.numpy import save_file
+    from safetensors.numpy import save
 
     arrays = arrays_to_write(stored, plan, dtype)
     document = {**_document(plan), "dtype": dtype, "card": dict(card)}
@@ -43,7 +43,8 @@ def write_json(
     }
     text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
     (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
-    save_file({name: np.ascontiguousarray(array) for name, array in arrays.items()}, folder / TENSORS_FILE)
+    packed = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
+    (folder / TENSORS_FILE).write_bytes(packed)
 
 
 def read_json(folder: Path, plan: Plan) -> tuple[Plan, Plan]:

@@ -89,6 +89,11 @@ def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Out
                     keep(task, outcome)
             except BrokenProcessPool:
                 return False
+            except InputError:
+                # What others are writing comes to its end: killed, they would leave it half-written.
+                for future in futures:
+                    future.cancel()
+                raise
             except BaseException:
                 pool.shutdown(wait=True, kill_workers=True)
                 raise

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import json
 from collections.abc import Callable, Mapping
@@ -12,11 +11,10 @@ from typing import Any
 
 from fogml.errors import FogmlError, InputError
 from fogml.fleet.manifest import SHIPPED, Unit
-from fogml.outputs import whole_file
+from fogml.outputs import NO_ROOM, whole_file
 
 OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
 DONE, FAILED = "done", "failed"
-_NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 
 UnitJob = Callable[[Unit, Path], Mapping[str, Any]]
 """Does a unit's job, writes the results into a folder, and gives what the fleet wants of them, JSON-ready.
@@ -87,8 +85,8 @@ def run_task(task: Task) -> dict[str, Any]:
     try:
         outcome |= {"status": DONE, "found": dict(task.job(task.unit, task.folder))}
     except OSError as error:
-        if error.errno in _NO_ROOM:
-            raise _full(task, error) from error
+        if error.errno in NO_ROOM:
+            raise full_disk(task.home, error) from error
         outcome |= {"status": FAILED, "reason": f"{error.filename or ''}: {error.strerror}".lstrip(": ")}
     except FogmlError as error:
         outcome |= {"status": FAILED, "reason": str(error)}
@@ -101,7 +99,7 @@ def run_task(task: Task) -> dict[str, Any]:
             text = json.dumps(outcome, indent=1, allow_nan=False, ensure_ascii=False)
             partial.write_text(text + "\n", encoding="utf-8")
     except OSError as error:
-        raise _full(task, error) from error
+        raise full_disk(task.home, error) from error
     return outcome
 
 
@@ -131,9 +129,10 @@ def lost(task: Task, reason: str) -> dict[str, Any]:
     }
 
 
-def _full(task: Task, error: OSError) -> InputError:
+def full_disk(home: str, error: OSError) -> InputError:
+    """What is said where a fleet's folder takes no more."""
     return InputError(
-        f"{task.home}: cannot be written ({error.strerror or error}); finished units are kept, make room and "
+        f"{home}: cannot be written ({error.strerror or error}); finished units are kept, make room and "
         "run the command again"
     )
 

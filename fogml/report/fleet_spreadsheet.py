@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from fogml.outputs import whole_file
-from fogml.report.spreadsheet import SAFE_TEXT, Writer
+from fogml.report.spreadsheet import whole_workbook
 
 _UNIT_COLUMNS = (
     ("unit", "unit"),
@@ -43,10 +42,7 @@ def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
     InputError
         If the folder is missing or can't be written.
     """
-    import xlsxwriter
-
-    with whole_file(path) as partial, xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
-        writer = Writer(workbook)
+    with whole_workbook(path) as writer:
         sheet = writer.sheet("Units")
         rows = [[unit[key] for key, _ in _UNIT_COLUMNS] for unit in fleet["units"]]
         writer.table(sheet, [head for _, head in _UNIT_COLUMNS], rows)

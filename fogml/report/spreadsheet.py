@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -54,10 +55,7 @@ def spreadsheet(judgement: Judgement, path: str | Path) -> None:
     InputError
         If the folder is missing or can't be written.
     """
-    import xlsxwriter
-
-    with whole_file(path) as partial, xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
-        writer = Writer(workbook)
+    with whole_workbook(path) as writer:
         _summary(writer, judgement)
         _figures(writer, judgement)
         if coefficients_of(judgement.model):
@@ -66,6 +64,29 @@ def spreadsheet(judgement: Judgement, path: str | Path) -> None:
         for kind, runs in (("test", judgement.test), ("train", judgement.train)):
             for index, run in enumerate(runs, start=1):
                 _averages(writer, f"{kind} {index} {run.run}", run)
+
+
+@contextmanager
+def whole_workbook(path: str | Path) -> Iterator[Writer]:
+    """Yield what writes the sheets of a workbook that appears whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or can't be written.
+    OSError
+        If the disk is full.
+    """
+    import xlsxwriter
+    from xlsxwriter.exceptions import FileCreateError
+
+    with whole_file(path) as partial:
+        try:
+            with xlsxwriter.Workbook(str(partial), SAFE_TEXT) as workbook:
+                yield Writer(workbook)
+        except FileCreateError as error:
+            cause = error.args[0] if error.args else None
+            raise (cause if isinstance(cause, OSError) else error) from None
 
 
 class Writer:
