@@ -11,6 +11,7 @@ import re
 import tempfile
 import warnings
 from collections.abc import Iterable
+from contextlib import chdir
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -161,11 +162,12 @@ def emlearn_cost(fitted: Fitted, x: FloatArray) -> dict[str, Any]:
     """Flash and instructions of emlearn's C, from scaled features to scaled drift."""
     import emlearn
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
-        converted = emlearn.convert(fitted.model, method="inline", dtype="float")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
+        with warnings.catch_warnings(), chdir(folder):
+            # It leaves what it compiles where it is called.
+            warnings.simplefilter("ignore")
+            converted = emlearn.convert(fitted.model, method="inline", dtype="float")
         converted.save(file=str(folder / "mlp.h"), name="mlp")
         text = (folder / "mlp.h").read_text()
         names = ("mlp_regress1", "mlp_predict")
