@@ -23,6 +23,7 @@ SATURATED_SAMPLES = 3
 """Samples at an extreme, one after the other, from which on the output may saturate."""
 SMALL_SPAN_DEGC = 5.0
 """A temperature span under this [degC] is small."""
+_MARK_SHARE = 0.49
 _IRREGULAR_SHARE = 0.01
 _IRREGULAR_INTERVAL = 0.1
 _LEAST_SPELLS = 100
@@ -91,8 +92,11 @@ def _irregular(run: Run) -> Iterator[Finding]:
 
 def _stuck(run: Run) -> Iterator[Finding]:
     temperatures = run.temperature_columns
+    marks = _marks(run.time)
     for name in (*temperatures, "gyro"):
         values = run.columns[name]
+        if marks is not None and not _stays(values, marks):
+            continue
         starts, stops = _spells(values)
         long = np.flatnonzero(run.time[stops - 1] - run.time[starts] > STUCK_S)
         if not len(long):
@@ -117,6 +121,23 @@ def _stuck(run: Run) -> Iterator[Finding]:
             yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
 
 
+def _marks(time: FloatArray) -> IndexArray | None:
+    """First samples at or after marks so near that a spell of a stuck value holds two; None at long gaps."""
+    apart_s = _MARK_SHARE * STUCK_S
+    if time[-1] - time[0] > apart_s * len(time):
+        return None
+    marks = np.searchsorted(time, np.arange(time[0], time[-1], apart_s))
+    return marks if np.all(marks[1:] > marks[:-1]) else None
+
+
+def _stays(values: FloatArray, marks: IndexArray) -> bool:
+    """Whether a column holds one value from any mark to the next."""
+    if len(marks) < 2:
+        return False
+    same = values[1 : marks[-1] + 1] == values[: marks[-1]]
+    return bool(np.logical_and.reduceat(same, marks[:-1]).any())
+
+
 def _spells(values: FloatArray) -> tuple[IndexArray, IndexArray]:
     """Spells [start, stop) of one value."""
     changes = np.flatnonzero(values[1:] != values[:-1]) + 1
@@ -136,9 +157,11 @@ def _saturated(run: Run) -> Iterator[Finding]:
         message = f"'gyro' is {greatest:.6g} in every sample; the output may be dead"
         yield Finding("saturation", message, column="gyro", row=1, count=len(gyro))
         return
+    extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
+    if all(_longest(at) < SATURATED_SAMPLES for _, at in extremes):
+        return
     if greatest - least < _LEAST_STEPS * _resolution(gyro):
         return  # so few steps hold no shape of noise that could be cut off
-    extremes = [(extreme, gyro == extreme) for extreme in (greatest, least)]
     usual = None
     for extreme, at in extremes:
         count, spell = int(np.count_nonzero(at)), _longest(at)
@@ -159,8 +182,11 @@ def _saturated(run: Run) -> Iterator[Finding]:
 
 def _longest(mask: BoolArray) -> int:
     """Most neighbouring samples that are True."""
-    edges = np.flatnonzero(np.diff(mask, prepend=False, append=False))
-    return int((edges[1::2] - edges[::2]).max(initial=0))
+    true = np.flatnonzero(mask)
+    if len(true) < 2:
+        return len(true)
+    edges = np.flatnonzero(np.diff(true) > 1)
+    return int(np.diff(edges, prepend=-1, append=len(true) - 1).max())
 
 
 def _outliers(run: Run) -> Iterator[Finding]:

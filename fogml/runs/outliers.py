@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,12 +12,13 @@ from fogml.runs.run import FloatArray
 OUTLIER_SIGMA = 8.0
 """Robust standard deviations off its neighbours from which on a sample is an outlier."""
 _HALF = 2
+_SHARE = 0.9
 _WITHIN = 1.6174
 """90 % of white noise of unit standard deviation lies this near to the median of five (simulated)."""
 _BEND_WITHIN = 0.6744897501960817 * 6.0**0.5
 """Half of its second differences, of variance 1 + 4 + 1, are as small."""
 _BLOCK = 1024
-_CHUNK = 1 << 15
+_CHUNK = 1 << 14
 
 
 def find_outliers(
@@ -41,12 +44,16 @@ def find_outliers(
         Samples, and sigma at each of them in the unit of `gyro`; none if there are fewer than
         five samples.
     """
+    none = np.empty(0, dtype=np.intp), np.empty(0)
     if len(gyro) <= 2 * _HALF:
-        return np.empty(0, dtype=np.intp), np.empty(0)
-    size = np.abs(_off_neighbours(gyro))
+        return none
+    size = _off_neighbours(gyro)
+    np.abs(size, out=size)
     # The first and the last sample lie on one side of all others: a line through four goes on there.
     for end, (a, b, d) in ((0, gyro[[1, 2, 4]]), (-1, gyro[[-2, -3, -5]])):
         size[end] = min(size[end], abs(gyro[end] - (a + 0.5 * (b - d))))
+    if _none_stands_out(size):
+        return none
     sigma = _sigma(size, gyro)
     found = np.flatnonzero(size > OUTLIER_SIGMA * sigma)
     if len(found) and rate_deg_s is not None:
@@ -57,6 +64,19 @@ def find_outliers(
     return found, sigma[found]
 
 
+def _none_stands_out(size: FloatArray) -> bool:
+    """Whether every block has so many samples near its greatest that sigma, which is dear, can't matter.
+
+    A tenth of them lie at or above the quantile of 0.9, and sigma is no less than that quantile tells.
+    """
+    for blocks in _blocks(size):
+        high = blocks.max(axis=1) * (_WITHIN / OUTLIER_SIGMA * (1.0 + 1e-9))
+        rank = int(_SHARE * (blocks.shape[1] - 1))
+        if np.any(np.count_nonzero(blocks >= high[:, None], axis=1) < blocks.shape[1] - rank):
+            return False
+    return True
+
+
 def _sigma(size: FloatArray, values: FloatArray) -> FloatArray:
     """Robust standard deviation of the noise about each sample, shape (n,).
 
@@ -65,7 +85,7 @@ def _sigma(size: FloatArray, values: FloatArray) -> FloatArray:
     steps, the second noise on a ramp. Where both are 0, a step of the output stands for its noise.
     """
     bends = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    sigma = np.maximum(_of_blocks(size, 0.9) / _WITHIN, _of_blocks(np.pad(bends, 1), 0.5) / _BEND_WITHIN)
+    sigma = np.maximum(_of_blocks(size, _SHARE) / _WITHIN, _of_blocks(np.pad(bends, 1), 0.5) / _BEND_WITHIN)
     usual = float(np.median(sigma))
     if usual == 0.0:
         steps = np.abs(np.diff(values))
@@ -74,25 +94,37 @@ def _sigma(size: FloatArray, values: FloatArray) -> FloatArray:
 
 
 def _of_blocks(size: FloatArray, share: float) -> FloatArray:
-    """Quantile of each block of samples; the last block ends at the end."""
+    """Quantile of each block of samples."""
+    return np.concatenate([np.quantile(blocks, share, axis=1) for blocks in _blocks(size)])
+
+
+def _blocks(size: FloatArray) -> Iterator[FloatArray]:
+    """Blocks of samples as rows, all of one length; the last one, which ends at the end, by itself."""
     whole = len(size) // _BLOCK * _BLOCK
-    quantiles: FloatArray = np.quantile(size[:whole].reshape(-1, _BLOCK), share, axis=1)
+    if whole:
+        yield size[:whole].reshape(-1, _BLOCK)
     if whole < len(size):
-        quantiles = np.append(quantiles, np.quantile(size[-_BLOCK:], share))
-    return quantiles
+        yield size[None, -_BLOCK:]
 
 
 def _off_neighbours(values: FloatArray) -> FloatArray:
     """Each value less the median of the five about it, mirrored at the ends; shape (n,)."""
-    padded = np.pad(values, _HALF, mode="reflect")
-    off = np.empty(len(values))
+    n = len(values)
+    off = np.empty(n)
     # Chunks stay in the processor's cache.
-    for start in range(0, len(values), _CHUNK):
-        part = padded[start : start + _CHUNK + 2 * _HALF]
-        n = len(part) - 2 * _HALF
-        a, b, c, d, e = (part[i : i + n] for i in (0, 1, 3, 4, 2))
-        low = np.maximum(np.minimum(a, b), np.minimum(c, d))
-        high = np.minimum(np.maximum(a, b), np.maximum(c, d))
-        median = np.maximum(np.minimum(low, high), np.minimum(e, np.maximum(low, high)))
-        np.subtract(e, median, out=off[start : start + n])
+    for start in range(_HALF, n - _HALF, _CHUNK):
+        stop = min(start + _CHUNK, n - _HALF)
+        _less_median(values[start - _HALF : stop + _HALF], off[start:stop])
+    ends = min(2 * _HALF, n)
+    _less_median(np.pad(values[:ends], (_HALF, 0), mode="reflect"), off[: ends - _HALF])
+    _less_median(np.pad(values[-ends:], (0, _HALF), mode="reflect"), off[_HALF - ends :])
     return off
+
+
+def _less_median(values: FloatArray, out: FloatArray) -> None:
+    """Each value but two at either end less the median of the five about it."""
+    a, b, e, c, d = (values[i : i + len(out)] for i in range(2 * _HALF + 1))
+    low = np.maximum(np.minimum(a, b), np.minimum(c, d))
+    high = np.minimum(np.maximum(a, b), np.maximum(c, d))
+    median = np.maximum(np.minimum(low, high), np.minimum(e, np.maximum(low, high)))
+    np.subtract(e, median, out=out)
