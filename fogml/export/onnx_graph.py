@@ -110,8 +110,9 @@ def window_weights(plan: Plan) -> FloatArray:
         }
         columns["time"] = np.asarray(time, dtype=np.float64)
         columns[sensor][length - 1] = 1.0
-        answer, _ = evaluate(rates, Run("impulse", columns), plan.sample_s)
-        weights[:, place] = answer[length - 1 :][::-1]
+        answers = np.empty((len(rates), len(time)))
+        evaluate(rates, Run("impulse", columns), plan.sample_s, list(answers))
+        weights[:, place] = answers[:, length - 1 :][:, ::-1].T
     return weights
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, get_args
 
@@ -136,13 +137,13 @@ class Atom:
 
 
 def windowed_values(
-    signal: FloatArray, clock: Clock, window: Window, unit_s: float | None
+    signal: FloatArray, clock: Clock, window: Window, unit_s: float | None, out: FloatArray | None = None
 ) -> tuple[FloatArray, BoolArray]:
     """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
     if window.method == "first":
-        return windows.first_difference(clock, signal, unit_s=unit_s)
+        return windows.first_difference(clock, signal, unit_s=unit_s, out=out)
     operator = {"block": windows.block_difference, "slope": windows.slope, "exp": windows.exponential}
-    return operator[window.method](clock, signal, window.length_s, unit_s=unit_s)
+    return operator[window.method](clock, signal, window.length_s, unit_s=unit_s, out=out)
 
 
 def direction(rate: FloatArray) -> FloatArray:
@@ -152,9 +153,9 @@ def direction(rate: FloatArray) -> FloatArray:
 
 
 def evaluate(
-    atoms: tuple[Atom, ...], run: Run, sample_s: float | None = None
-) -> tuple[FloatArray, BoolArray]:
-    """Values of atoms over a run, and where all their windows are full.
+    atoms: tuple[Atom, ...], run: Run, sample_s: float | None, columns: Sequence[FloatArray]
+) -> BoolArray:
+    """Put values of atoms over a run into `columns`; tell where all their windows are full.
 
     Parameters
     ----------
@@ -164,38 +165,60 @@ def evaluate(
         The run.
     sample_s
         Nominal sample interval [s]; the run's own if None.
+    columns
+        Where the values go, an array (n,) per atom. Where a window is not full all windowed atoms
+        are 0.
 
     Returns
     -------
-    values : (n, a) array
-        One column per atom, columns contiguous. Where `full` is False all windowed atoms are 0.
-    full : (n,) bool array
+    (n,) bool array
+
+    Raises
+    ------
+    InputError
+        If a temperature is missing, or a window is shorter than the sample interval.
     """
-    n = len(run)
-    clock = Clock(run.time, run.sample_s if sample_s is None else sample_s)
-    values = np.empty((n, len(atoms)), order="F")
-    full = np.ones(n, dtype=np.bool_)
+    try:
+        return _evaluated(atoms, run, sample_s, columns)
+    except InputError as error:
+        message = str(error)
+        raise InputError(message if message.startswith(run.name) else f"{run.name}: {message}") from error
+
+
+def _evaluated(
+    atoms: tuple[Atom, ...], run: Run, sample_s: float | None, columns: Sequence[FloatArray]
+) -> BoolArray:
+    clock = run.clock if sample_s is None else Clock(run.time, sample_s)
+    full = np.ones(len(run), dtype=np.bool_)
     signals: dict[Signal, FloatArray] = {}
-    rates: dict[tuple[Signal, Window], FloatArray] = {}
-    for column, atom in enumerate(atoms):
-        signal = signals.get(atom.signal)
-        if signal is None:
-            signal = signals[atom.signal] = atom.signal.values(run)
+    # Values first: a combination of sensors is then made once, in its own column.
+    for atom, column in zip(atoms, columns):
         if atom.window is None:
-            values[:, column] = signal
+            signals[atom.signal] = values = atom.signal.values(run, out=column)
+            if values is not column:
+                column[:] = values
+    rates: dict[tuple[Signal, Window], FloatArray] = {}
+    for atom, column in zip(atoms, columns):
+        if atom.window is None:
             continue
+        if atom.signal not in signals:
+            signals[atom.signal] = atom.signal.values(run)
+        signal, key = signals[atom.signal], (atom.signal, atom.window)
         if atom.operator == "diff":
-            values[:, column], atom_full = windowed_values(signal, clock, atom.window, None)
+            _, atom_full = windowed_values(signal, clock, atom.window, None, column)
             full &= atom_full
             continue
-        key = (atom.signal, atom.window)
         if key not in rates:
-            rates[key], atom_full = windowed_values(signal, clock, atom.window, RATE_UNIT_S)
+            place = column if atom.operator == "d" else None
+            rates[key], atom_full = windowed_values(signal, clock, atom.window, RATE_UNIT_S, place)
             full &= atom_full
-        values[:, column] = direction(rates[key]) if atom.operator == "sign" else rates[key]
-    windowed = [column for column, atom in enumerate(atoms) if atom.window is not None]
-    if windowed and not full.all():
-        partial = ~full
-        for column in windowed:
-            values[partial, column] = 0.0
-    return values, full
+        if atom.operator == "sign":
+            column[:] = direction(rates[key])
+        elif rates[key] is not column:
+            column[:] = rates[key]
+    if not full.all():
+        partial = np.flatnonzero(~full)
+        for atom, column in zip(atoms, columns):
+            if atom.window is not None:
+                column[partial] = 0.0
+    return full

@@ -14,7 +14,7 @@ from fogml.features.atoms import Atom, evaluate
 from fogml.features.box import Box
 from fogml.features.grammar import parse_terms
 from fogml.features.reach import reaching_box
-from fogml.features.terms import Term, compose, composition_plan, unique_terms
+from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -227,23 +227,15 @@ class Features:
         InputError
             If a temperature is missing, or a window is shorter than the sample interval.
         """
-        try:
-            return evaluate(self._atoms, run, sample_s)
-        except InputError as error:
-            message = str(error)
-            raise InputError(message if message.startswith(run.name) else f"{run.name}: {message}") from error
-
-    def _checked(self, atom_values: ArrayLike) -> FloatArray:
-        values = np.asarray(atom_values, dtype=np.float64)
-        if values.ndim != 2 or values.shape[1] != len(self._atoms):
-            raise InputError(
-                f"features: atom values of shape {values.shape}, (n, {len(self._atoms)}) was expected"
-            )
-        return values
+        values = np.empty((len(run), len(self._atoms)), order="F")
+        return values, evaluate(self._atoms, run, sample_s, list(values.T))
 
     def compose(self, atom_values: ArrayLike) -> FloatArray:
         """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
-        return compose(self._plan, self._checked(atom_values))
+        values = atom_matrix(atom_values, len(self._atoms))
+        columns = np.empty((len(values), len(self)), order="F")
+        compose(self._plan, list(values.T), list(columns.T))
+        return columns
 
     def limit(
         self, atom_values: ArrayLike, full: ArrayLike | None = None, *, linear: bool = False
@@ -273,7 +265,7 @@ class Features:
         """
         in_full = None if full is None else np.asarray(full, dtype=np.bool_)
         heeded = [None if atom.window is None else in_full for atom in self._atoms]
-        values, box = self._checked(atom_values), self._learned_box()
+        values, box = atom_matrix(atom_values, len(self._atoms)), self._learned_box()
         limited, outside = box.limit(values, heeded)
         if linear and limited is not values:
             limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)
@@ -291,8 +283,14 @@ class Features:
         linear
             If so, as for a model that goes on linearly.
         """
-        values, full = self.atom_values(run)
-        return self.compose(self.limit(values, full, linear=linear)[0] if limited else values)
+        if limited:
+            return self.compose(self.limit(*self.atom_values(run), linear=linear)[0])
+        columns = np.empty((len(run), len(self)), order="F")
+        terms = list(columns.T)
+        atoms = atom_columns(self._plan, terms, len(self._atoms))
+        evaluate(self._atoms, run, None, atoms)
+        compose(self._plan, atoms, terms)
+        return columns
 
     def fit_transform(self, run: Run, y: object = None) -> FloatArray:
         """`fit` to one run, then its feature columns, shape (n, k)."""

@@ -77,8 +77,15 @@ class Signal:
             pieces.append(sign + (name if size == 1.0 else f"{number_text(size)}*{name}"))
         return "".join(pieces)
 
-    def values(self, run: Run) -> FloatArray:
+    def values(self, run: Run, out: FloatArray | None = None) -> FloatArray:
         """The signal [degC] of a run, shape (n,); a view where it is one recorded column.
+
+        Parameters
+        ----------
+        run
+            The run.
+        out
+            Where it is put otherwise, shape (n,); a new array if None.
 
         Raises
         ------
@@ -88,13 +95,13 @@ class Signal:
         (name, coefficient), *others = self.parts
         total = run.temperature(name)
         if coefficient != 1.0:
-            total = coefficient * total
+            total = np.multiply(coefficient, total, out=out)
         for name, coefficient in others:
             if abs(coefficient) == 1.0:
                 part = run.temperature(name)
             else:
                 part = abs(coefficient) * run.temperature(name)
-            total = total + part if coefficient > 0 else total - part
+            total = np.add(total, part, out=out) if coefficient > 0 else np.subtract(total, part, out=out)
         return total
 
     def weights(self, recorded: Iterable[str]) -> dict[str, float]:

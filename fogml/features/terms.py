@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
 from fogml.features.atoms import Atom
@@ -96,22 +96,39 @@ def composition_plan(terms: Sequence[Term], atoms: Sequence[Atom]) -> tuple[Step
     return tuple(steps)
 
 
-def compose(plan: Sequence[Step], atom_values: FloatArray) -> FloatArray:
-    """Term columns (n, k), contiguous each, from atom values (n, a)."""
-    columns = np.empty((len(atom_values), len(plan)), order="F")
-    for index, step in enumerate(plan):
-        out = columns[:, index]
+def atom_matrix(values: ArrayLike, atoms: int) -> FloatArray:
+    """Values of so many atoms as float64.
+
+    Raises
+    ------
+    InputError
+        If the shape is not (n, atoms).
+    """
+    matrix = np.asarray(values, dtype=np.float64)
+    if matrix.ndim != 2 or matrix.shape[1] != atoms:
+        raise InputError(f"features: atom values of shape {matrix.shape}, (n, {atoms}) was expected")
+    return matrix
+
+
+def atom_columns(plan: Sequence[Step], columns: Sequence[FloatArray], atoms: int) -> list[FloatArray]:
+    """Where to put the values of atoms: in the column of a term that is the atom alone, else apart."""
+    places = {step.atoms: out for step, out in zip(plan, columns) if step.column is None}
+    return [places[(atom,)] if (atom,) in places else np.empty_like(columns[0]) for atom in range(atoms)]
+
+
+def compose(plan: Sequence[Step], atoms: Sequence[FloatArray], columns: Sequence[FloatArray]) -> None:
+    """Fill term columns, arrays (n,), from atom values; an atom may stand in its own term's column."""
+    for step, out in zip(plan, columns):
         if step.column is not None:
-            np.multiply(columns[:, step.column], atom_values[:, step.atoms[0]], out=out)
+            np.multiply(columns[step.column], atoms[step.atoms[0]], out=out)
             continue
-        first, *others = step.atoms
-        if not others:
-            out[:] = atom_values[:, first]
-            continue
-        np.multiply(atom_values[:, first], atom_values[:, others[0]], out=out)
+        first, *others = (atoms[place] for place in step.atoms)
+        if others:
+            np.multiply(first, others[0], out=out)
+        elif first is not out:
+            out[:] = first
         for other in others[1:]:
-            out *= atom_values[:, other]
-    return columns
+            out *= other
 
 
 def unique_terms(terms: Iterable[Term]) -> tuple[Term, ...]:

@@ -47,6 +47,7 @@ def block_difference(
     sample_s: float | None = None,
     *,
     unit_s: float | None = None,
+    out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Mean of the newest window less the mean of the window before it.
 
@@ -65,6 +66,8 @@ def block_difference(
         Nominal sample interval [s]; the median interval if None. A `Clock` brings its own.
     unit_s
         None for the difference itself, or the length [s] of the time unit of a rate.
+    out
+        Where the values are put, shape (n,), contiguous; a new array if None.
 
     Returns
     -------
@@ -80,18 +83,18 @@ def block_difference(
 
     Notes
     -----
-    On a regular grid cumulative sums are taken in chunks, each about its own first value, so the
-    error stays at a few units in the last place however long the recording. Elsewhere running
-    sums are taken afresh once per window.
+    On a regular grid sums are made of sums of half as many samples each, so the error stays at a
+    few units in the last place however long the recording. Elsewhere running sums are taken afresh
+    once per window.
     """
     clock, x = _prepared(time, x, sample_s)
     check_window(window_s, clock.sample_s, 1, "a block window")
     grid = clock.grid_s
     if grid is not None:
-        return _block_on_grid(x, grid, clock.sample_s, window_s, unit_s)
+        return _block_on_grid(x, grid, clock.sample_s, window_s, unit_s, out)
     from fogml.signals.window_kernels import block_kernel
 
-    return _run_kernel(block_kernel, clock, x, window_s, 2.0 * window_s, unit_s or 0.0)
+    return _run_kernel(block_kernel, clock, x, window_s, 2.0 * window_s, unit_s or 0.0, out)
 
 
 def slope(
@@ -101,6 +104,7 @@ def slope(
     sample_s: float | None = None,
     *,
     unit_s: float | None = None,
+    out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Least-squares slope over the window (t - w, t].
 
@@ -116,7 +120,7 @@ def slope(
     check_window(window_s, clock.sample_s, 2, "a slope's window")
     from fogml.signals.window_kernels import slope_kernel
 
-    return _run_kernel(slope_kernel, clock, x, window_s, window_s, unit_s or window_s)
+    return _run_kernel(slope_kernel, clock, x, window_s, window_s, unit_s or window_s, out)
 
 
 def exponential(
@@ -126,6 +130,7 @@ def exponential(
     sample_s: float | None = None,
     *,
     unit_s: float | None = None,
+    out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     r"""Rate with exponential memory: :math:`r(t) = (x - m)/\tau` with :math:`\dot m = (x - m)/\tau`.
 
@@ -149,7 +154,7 @@ def exponential(
     from fogml.signals.window_kernels import exponential_kernel
 
     return _run_kernel(
-        exponential_kernel, clock, x, window_s, EXPONENTIAL_SPAN * window_s, unit_s or window_s
+        exponential_kernel, clock, x, window_s, EXPONENTIAL_SPAN * window_s, unit_s or window_s, out
     )
 
 
@@ -159,6 +164,7 @@ def first_difference(
     sample_s: float | None = None,
     *,
     unit_s: float | None = None,
+    out: FloatArray | None = None,
 ) -> tuple[FloatArray, BoolArray]:
     """Each sample less the one before it, never across a gap.
 
@@ -166,8 +172,8 @@ def first_difference(
     """
     clock, x = _prepared(time, x, sample_s)
     n = len(x)
-    values, full = np.zeros(n), np.ones(n, dtype=np.bool_)
-    full[:1] = False
+    values, full = np.empty(n) if out is None else out, np.ones(n, dtype=np.bool_)
+    values[:1], full[:1] = 0.0, False
     if n < 2:
         return values, full
     np.subtract(x[1:], x[:-1], out=values[1:])
@@ -193,10 +199,18 @@ def _prepared(time: ArrayLike | Clock, x: ArrayLike, sample_s: float | None) -> 
 
 
 def _run_kernel(
-    kernel: Callable[..., None], clock: Clock, x: FloatArray, window_s: float, span_s: float, unit_s: float
+    kernel: Callable[..., None],
+    clock: Clock,
+    x: FloatArray,
+    window_s: float,
+    span_s: float,
+    unit_s: float,
+    out: FloatArray | None,
 ) -> tuple[FloatArray, BoolArray]:
     """Values and full mask from a compiled operator whose window is full after `span_s`."""
-    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=np.bool_)
+    values, full = np.zeros(len(x)) if out is None else out, np.zeros(len(x), dtype=np.bool_)
+    if out is not None:
+        out[:] = 0.0
     sample_s = clock.sample_s
     rules = (EDGE_TOLERANCE * sample_s, needed_s(span_s, sample_s), longest_gap_s(window_s, sample_s))
     kernel(clock.time, x, window_s, *rules, unit_s, values, full)
@@ -204,34 +218,60 @@ def _run_kernel(
 
 
 def _block_on_grid(
-    x: FloatArray, grid_s: float, sample_s: float, window_s: float, unit_s: float | None
+    x: FloatArray,
+    grid_s: float,
+    sample_s: float,
+    window_s: float,
+    unit_s: float | None,
+    out: FloatArray | None,
 ) -> tuple[FloatArray, BoolArray]:
-    """Block differences by index arithmetic and chunked cumulative sums."""
+    """Block differences by index arithmetic, chunk by chunk in the processor's cache."""
     n = len(x)
     edge = EDGE_TOLERANCE * sample_s
     newest = int(np.ceil((window_s - edge) / grid_s))
     both = int(np.ceil((2.0 * window_s - edge) / grid_s))
     before = both - newest
-    values, full = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    values, full = np.empty(n) if out is None else out, np.zeros(n, dtype=np.bool_)
+    values[: both - 1] = 0.0
     full[both - 1 :] = True
     # The two windows' mean times lie half of both counts apart.
     scale = 1.0 if unit_s is None else unit_s / (0.5 * both * grid_s)
-    at_end, at_middle, at_begin = scale / newest, -scale * (1.0 / newest + 1.0 / before), scale / before
     step = max(_CHUNK, 4 * both)
-    sums = np.zeros(min(step, n) + both)
-    part = np.empty(min(step, n))
+    part = np.empty(min(step + both, n))
+    scratch = np.empty((3, len(part)))
     for low in range(both - 1, n, step):
         high = min(low + step, n)
         origin = low - both + 1
-        size = high - low
-        # sums[k] is the sum of the k samples from origin on, about the first of them.
-        held = sums[1 : high - origin + 1]
-        np.subtract(x[origin:high], x[origin], out=held)
-        np.cumsum(held, out=held)
-        out = values[low:high]
-        np.multiply(sums[both : both + size], at_end, out=out)
-        np.multiply(sums[before : before + size], at_middle, out=part[:size])
-        out += part[:size]
-        np.multiply(sums[:size], at_begin, out=part[:size])
-        out += part[:size]
+        # About the first sample, a steady signal gives 0 whatever its value.
+        near = np.subtract(x[origin:high], x[origin], out=part[: high - origin])
+        sums = _window_sums(near, newest, scratch)
+        block = values[low:high]
+        np.multiply(sums[before:], scale / newest, out=block)
+        if before != newest:
+            sums = _window_sums(near, before, scratch)
+        earlier = sums[: len(block)]
+        earlier *= scale / before
+        block -= earlier
     return values, full
+
+
+def _window_sums(x: FloatArray, count: int, scratch: FloatArray) -> FloatArray:
+    """Sums of `count` neighbouring samples, shape (n - count + 1,), within `scratch` of shape (3, n).
+
+    Sums of 1, 2, 4 ... samples are each made of two of half as many; those in the binary digits of
+    `count` add up to the whole. That takes O(n log count) additions of which none waits for the one
+    before it, as in cumulative sums, and rounding grows with log count only.
+    """
+    doubled, total, summed = x, scratch[2], 0
+    for digit in range(count.bit_length()):
+        width = 1 << digit
+        if digit > 0:
+            half, size = width // 2, len(doubled) - width // 2
+            doubled = np.add(doubled[:size], doubled[half:], out=scratch[digit % 2, :size])
+        if count & width:
+            size = len(doubled) - summed
+            # Those that are summed already come first.
+            total = total[:size]
+            np.add(total if summed else 0.0, doubled[summed:], out=total)
+            summed += width
+    return total

@@ -45,6 +45,25 @@ def test_columns_are_the_products_of_powers(run: Run) -> None:
     np.testing.assert_allclose(columns, np.column_stack(wanted), rtol=1e-9, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sign(dT1), dT1, dT1^2, T1",
+        "T1*dT1, d(T1-T2), T1-T2",
+        "diff(T1), dT1[slope, 30 s], dT1[exp, 30 s], T1*dT1[first], 2*T1",
+        "(T1-T2)^2, T1*T2",
+    ],
+)
+@pytest.mark.parametrize("begin", [0, 1998])
+def test_columns_made_in_place_are_those_of_the_atom_values(run: Run, text: str, begin: int) -> None:
+    features, part = Features(text), run[begin:]
+    before = {name: values.copy() for name, values in part.columns.items()}
+    values, _ = features.atom_values(part)
+    np.testing.assert_array_equal(features.transform(part), features.compose(values))
+    for name, column in before.items():
+        np.testing.assert_array_equal(part.columns[name], column)
+
+
 def test_names_of_formulas_stand_for_recorded_sensors(run: Run) -> None:
     inner, outer = run.columns["T1"] + 0.5, run.columns["T2"]
     columns = parse_features("T, T_in, T_in-T_out, 2*T1-0.5*T2").transform(run)

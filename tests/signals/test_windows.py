@@ -180,6 +180,27 @@ def test_block_is_the_difference_of_means_of_so_many_samples() -> None:
         assert values[i] == pytest.approx(wanted, abs=1e-14)
 
 
+@pytest.mark.parametrize("window_s", [1.0, 2.0, 2.5, 3.0, 31.0, 63.5, 64.0, 700.0, 1023.5])
+@pytest.mark.parametrize("given", [False, True])
+def test_means_of_windows_of_any_count(window_s: float, given: bool) -> None:
+    """Beyond one chunk; 2.5 s and the like make a newest window of a sample more than the one before."""
+    x = 1e3 + np.random.default_rng(10).normal(size=70_000)
+    out = np.full(len(x), np.nan) if given else None
+    values, full = block_difference(np.arange(70_000.0), x, window_s, out=out)
+    assert values is out or not given
+    newest, both = math.ceil(window_s), round(2.0 * window_s)
+    means = [np.convolve(x, np.full(n, 1.0 / n), "valid") for n in (newest, both - newest)]
+    np.testing.assert_array_equal(full, np.arange(len(x)) >= both - 1)
+    np.testing.assert_array_equal(values[~full], 0.0)
+    wanted = means[0][both - newest :] - means[1][: len(x) - both + 1]
+    np.testing.assert_allclose(values[full], wanted, atol=1e-11)
+
+
+def test_a_steady_signal_changes_by_nothing() -> None:
+    values, _ = block_difference(np.arange(50_000.0), np.full(50_000, 25.3), 63.5)
+    assert not values.any()
+
+
 @pytest.mark.parametrize("sample_s", [0.1, 0.02, 1.0 / 3.0, 0.7])
 def test_float_noise_of_the_times_does_not_move_window_edges(sample_s: float) -> None:
     count, window_s = 2000, 40 * sample_s
