@@ -19,7 +19,7 @@ SEPARATORS = (",", ";", "\t")
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
 """What stands for a missing value, in lower case."""
 _HEAD_BYTES = 1 << 16
-_LINE_END = re.compile(r"\r\n|\r|\n")
+LINE_END = re.compile(r"\r\n|\r|\n")
 _SEARCH_BYTES = 1 << 24
 _MARK = re.compile(rb"\d[.,]\d")
 _DECIMAL_POINT = re.compile(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*\Z")
@@ -92,7 +92,7 @@ def csv_dialect(path: Path) -> CsvDialect:
         raise _no_text(path.name)
     cut = len(head) == _HEAD_BYTES
     encoding = _encoding(head, cut)
-    lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
+    lines = LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
     first = next((i for i, line in enumerate(lines) if line.strip()), None)
@@ -136,7 +136,7 @@ def number(field: str, decimal: str) -> float | None:
 def _decimal_mark(path: Path, rows: Sequence[Sequence[str]], separator: str) -> str:
     """The mark in the first rows; in the rest of the file, where those hold whole numbers only."""
     fields = [field for row in rows for field in row]
-    if any(_DECIMAL_COMMA.match(field) for field in fields):
+    if any(_DECIMAL_COMMA.match(field) for field in fields if "," in field):
         return ","
     if separator == "," or any(_DECIMAL_POINT.match(field) for field in fields):
         return "."
@@ -164,6 +164,8 @@ def _outside_quotes(line: str) -> str:
 
 
 def _fields(line: str, separator: str) -> list[str]:
+    if line and '"' not in line:
+        return line.split(separator)
     return next(csv.reader([line], delimiter=separator), [])
 
 
