@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Collection, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.runs.compiling import pays_by_now
 from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
 from fogml.runs.csv_end import cut_error, cut_line, note_of_end
 from fogml.runs.csv_lines import LineReader, line_of_row
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
 FloatArray = NDArray[np.float64]
-_WORTH_LOADING_BYTES = 1 << 29
-"""From here on the compiled parser saves more time than the third of a second that loading it takes."""
+_SAVED_S_PER_BYTE = 1e-9
+"""Time [s] that the compiled parser saves."""
 _STREAM_BYTES = 1 << 20
 """Arrow reads tens of these ahead, so that larger ones would hold whole files."""
 
@@ -143,8 +143,8 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
 
 
 def _plain_columns(path: Path, dialect: CsvDialect) -> list[FloatArray] | None:
-    """Columns by the compiled parser, where loading it takes no longer than it saves; None otherwise."""
-    if "numba" not in sys.modules and path.stat().st_size < _WORTH_LOADING_BYTES:
+    """Columns by the compiled parser, where loading it pays and the file is plain; None otherwise."""
+    if not pays_by_now(_SAVED_S_PER_BYTE * path.stat().st_size):
         return None
     import pyarrow as arrow
 

@@ -108,7 +108,7 @@ def test_reading_is_the_same_with_it_and_without(tmp_path: Path, monkeypatch: py
     table = np.round(rng.normal(size=(5000, 2)), 5)
     lines = [f"{0.1 * i:.1f},{a},text,{b}" for i, (a, b) in enumerate(table.tolist())]
     path = written(tmp_path, lines)
-    monkeypatch.setattr(csv_files, "_WORTH_LOADING_BYTES", 0)
+    monkeypatch.setattr(csv_files, "pays_by_now", lambda saving_s: True)
     compiled = read_run(path)
     monkeypatch.setattr(csv_files, "_plain_columns", lambda path, dialect: None)
     strict = read_run(path)
