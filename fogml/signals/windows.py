@@ -241,15 +241,18 @@ def _block_on_grid(
     scratch = np.empty((3, len(part)))
     for low in range(both - 1, n, step):
         high = min(low + step, n)
-        origin = low - both + 1
+        block, origin = values[low:high], low - both + 1
+        if before == newest:
+            # Differences first: sums are then small, and one of them is enough.
+            size = len(block) + newest - 1
+            apart = np.subtract(x[high - size : high], x[origin : origin + size], out=part[:size])
+            np.multiply(_window_sums(apart, newest, scratch), scale / newest, out=block)
+            continue
         # About the first sample, a steady signal gives 0 whatever its value.
         near = np.subtract(x[origin:high], x[origin], out=part[: high - origin])
         sums = _window_sums(near, newest, scratch)
-        block = values[low:high]
         np.multiply(sums[before:], scale / newest, out=block)
-        if before != newest:
-            sums = _window_sums(near, before, scratch)
-        earlier = sums[: len(block)]
+        earlier = _window_sums(near, before, scratch)[: len(block)]
         earlier *= scale / before
         block -= earlier
     return values, full
@@ -268,6 +271,8 @@ def _window_sums(x: FloatArray, count: int, scratch: FloatArray) -> FloatArray:
         if digit > 0:
             half, size = width // 2, len(doubled) - width // 2
             doubled = np.add(doubled[:size], doubled[half:], out=scratch[digit % 2, :size])
+        if width == count:
+            return doubled
         if count & width:
             size = len(doubled) - summed
             # Those that are summed already come first.

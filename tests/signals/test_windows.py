@@ -180,7 +180,7 @@ def test_block_is_the_difference_of_means_of_so_many_samples() -> None:
         assert values[i] == pytest.approx(wanted, abs=1e-14)
 
 
-@pytest.mark.parametrize("window_s", [1.0, 2.0, 2.5, 3.0, 31.0, 63.5, 64.0, 700.0, 1023.5])
+@pytest.mark.parametrize("window_s", [1.0, 1.5, 2.0, 2.5, 3.0, 31.0, 63.5, 64.0, 700.0, 1023.5])
 @pytest.mark.parametrize("given", [False, True])
 def test_means_of_windows_of_any_count(window_s: float, given: bool) -> None:
     """Beyond one chunk; 2.5 s and the like make a newest window of a sample more than the one before."""
