@@ -291,7 +291,7 @@ def page(found: Mapping[str, Any]) -> str:
         f"Features are wanted within {FEATURES_WITHIN:g} times of the limit: {ratio:.2g}, {met}. Beyond the "
         "least, each of the two rates takes eight passes within the processor's cache (a difference, six "
         "doublings to sums of 64 samples, a product), of about 0.2 ns a sample each: some 3 ns a sample, "
-        "where 40 bytes of new memory at 10 GB/s take 4. The check of the grid, and the product's two "
+        "as long as 40 bytes of new memory take at 13 GB/s. The check of the grid, and the product's two "
         "columns, which have left the cache by then, take 1 to 2 ns more.",
     ]
     return "\n".join(lines)
