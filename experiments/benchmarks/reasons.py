@@ -8,11 +8,9 @@ from typing import Any
 PAIRS = {
     "rbf": "Nystroem takes its centres at random and five widths from a grid; ours searches centres, widths "
     "and ridge by evidence, and leaves about half the error.",
-    "csv": "Where the compiler is not loaded yet, and would not have paid for it by then, ours parses by "
-    "pyarrow, whose threads OMP_NUM_THREADS bounds; where it is, by a compiled loop. Then it checks every "
-    "value (missing, infinite, time going back, stuck values, saturation, outliers), which takes about "
-    "10 ms of a million rows. pandas keeps whole numbers as integers, which cost less to parse, and "
-    "checks nothing.",
+    "csv": "Ours parses by pyarrow, whose threads OMP_NUM_THREADS bounds, and then checks every value "
+    "(missing, infinite, time going back, stuck values, saturation, outliers), which takes about 10 ms of a "
+    "million rows. pandas keeps whole numbers as integers, which cost less to parse, and checks nothing.",
     "read-csv": "As for pandas: plain readers parse, and check nothing.",
     "read-parquet": "Decoding is pyarrow's, and takes three to four times as long as the checks of every "
     "value: each reads memory once or twice, and medians are taken only where a bound does not rule "
@@ -21,10 +19,9 @@ PAIRS = {
     "core, and on all cores whatever OMP_NUM_THREADS says; ours decodes by pyarrow, which keeps to it. "
     "Another decoder would be another dependency for this alone.",
     "read-parquet-1e7-polars": "As for a million rows: its own decoder, on all cores.",
-    "write-csv": "Numbers of more than 15 digits are written by pyarrow's routine, and so are all numbers "
-    "as long as the compiler would not have paid for its loading: it takes about 70 ns a number, polars' "
-    "own 30, the compiled loop for decimals 20. Every digit is kept, in a file that appears whole with "
-    "its side file.",
+    "write-csv": "polars formats numbers by a faster routine of its own; ours writes through pyarrow, every "
+    "digit, into a file that appears whole with its side file. Another library for this alone, or digits "
+    "formatted by our own code, would cost more trust than it saves time.",
     "write-parquet": "As much is encoded; ours writes a file that appears whole, and its facts.",
     "features": "The plain way keeps no mask of full windows, knows no gaps and assumes even sampling.",
     "allan": "The plain way gives no intervals.",

@@ -19,7 +19,7 @@ SEPARATORS = (",", ";", "\t")
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
 """What stands for a missing value, in lower case."""
 _HEAD_BYTES = 1 << 16
-LINE_END = re.compile(r"\r\n|\r|\n")
+_LINE_END = re.compile(r"\r\n|\r|\n")
 _SEARCH_BYTES = 1 << 24
 _MARK = re.compile(rb"\d[.,]\d")
 _DECIMAL_POINT = re.compile(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*\Z")
@@ -92,7 +92,7 @@ def csv_dialect(path: Path) -> CsvDialect:
         raise _no_text(path.name)
     cut = len(head) == _HEAD_BYTES
     encoding = _encoding(head, cut)
-    lines = LINE_END.split(head.decode(encoding, errors="ignore"))
+    lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
     first = next((i for i, line in enumerate(lines) if line.strip()), None)

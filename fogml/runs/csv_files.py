@@ -7,10 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.runs.compiling import pays_by_now
 from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
 from fogml.runs.csv_end import cut_error, cut_line, note_of_end
 from fogml.runs.csv_lines import LineReader, line_of_row
@@ -20,9 +18,6 @@ from fogml.runs.raw_table import RawTable, no_samples, text_column
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
-FloatArray = NDArray[np.float64]
-_SAVED_S_PER_BYTE = 1e-9
-"""Time [s] that the compiled parser saves."""
 _STREAM_BYTES = 1 << 20
 """Arrow reads tens of these ahead, so that larger ones would hold whole files."""
 
@@ -42,17 +37,16 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
 
     dialect = csv_dialect(path)
     try:
-        columns = _plain_columns(path, dialect)
-        table = None if columns else arrow_csv.read_csv(path, **_options(dialect))
+        table = arrow_csv.read_csv(path, **_options(dialect))
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
         # Arrow is fast and strict; line by line tells where the fault is, or forgives it.
         whole = LineReader(path, dialect, repair).whole()
     else:
-        if table is not None and table.num_rows == 0:
+        if table.num_rows == 0:
             raise no_samples(path.name)
-        whole = _raw(path, dialect, columns or _columns(dialect, table), 0)
+        whole = _raw(path, dialect, table, 0)
     cut = cut_line(path, dialect)
     if cut is None:
         return whole.noting(note_of_end(path))
@@ -83,7 +77,7 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     try:
         with arrow_csv.open_csv(path, **_options(dialect, _STREAM_BYTES)) as reader:
             for table in _regrouped(reader, rows):
-                raw = _raw(path, dialect, _columns(dialect, table), start)
+                raw = _raw(path, dialect, table, start)
                 start += table.num_rows
                 yield raw if start > table.num_rows else raw.noting(note_of_end(path))
     except OSError as error:
@@ -142,26 +136,12 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
     }
 
 
-def _plain_columns(path: Path, dialect: CsvDialect) -> list[FloatArray] | None:
-    """Columns by the compiled parser, where loading it pays and the file is plain; None otherwise."""
-    if not pays_by_now(_SAVED_S_PER_BYTE * path.stat().st_size):
-        return None
-    import pyarrow as arrow
-
-    from fogml.runs.csv_kernel import plain_columns
-
-    return plain_columns(path, dialect, arrow.cpu_count())
-
-
-def _columns(dialect: CsvDialect, table: Table) -> list[FloatArray]:
-    return [np.asarray(table.column(str(i)).to_numpy()) for i in dialect.read]
-
-
-def _raw(path: Path, dialect: CsvDialect, columns: list[FloatArray], start: int) -> RawTable:
+def _raw(path: Path, dialect: CsvDialect, table: Table, start: int) -> RawTable:
+    columns = {dialect.cells[i]: np.asarray(table.column(str(i)).to_numpy()) for i in dialect.read}
     return RawTable(
         path.name,
         dialect.cells,
-        {dialect.cells[i]: values for i, values in zip(dialect.read, columns, strict=True)},
+        columns,
         row_name=lambda i: f"line {line_of_row(path, dialect, start + i)}",
         findings=tuple(text_column(dialect.name(i)) for i in sorted(dialect.text)),
     )

@@ -146,9 +146,12 @@ class BlockWriter:
                 use_byte_stream_split=True,
                 write_page_checksum=True,
             )
-        from fogml.runs.csv_sink import CsvSink
+        from pyarrow import csv
 
-        return CsvSink(self._partial, schema)
+        plain = not any(mark in name for name in schema.names for mark in ',"\r\n')
+        quoting = "none" if plain else "needed"
+        options = csv.WriteOptions(quoting_style=quoting, quoting_header=quoting, batch_size=1 << 16)
+        return csv.CSVWriter(self._partial, schema, write_options=options)
 
     def _append(self, table: Table) -> None:
         if self.path.suffix.lower() == ".parquet":
