@@ -31,7 +31,10 @@ def main() -> None:
     unknown: list[Row] = []
     for directory in parser.parse_args().directory:
         folder = BlindFolder(Path(directory))
-        for path in sorted(folder.answers().glob("*/gap.json")):
+        answers = sorted(folder.answers().glob("*/gap.json"))
+        if not answers:
+            raise SystemExit(f"{directory}: no answers; run the diagnosis first: fogml blind run {directory}")
+        for path in answers:
             truth = Truth.model_validate_json((folder.truth / f"{path.parent.name}.json").read_text())
             if is_final(truth.seed):
                 raise InputError(f"{directory}: made from a seed that is kept for final figures")

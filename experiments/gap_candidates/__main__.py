@@ -137,8 +137,8 @@ beside them. Seed {CONFIG["seed"]}; fogml {__version__}; `python -m experiments.
 
 `closed` is not told where the recalibrated twin is at the floor within its noise, and not judged where the
 truth itself closes less than half of the gap: there the held-out run does not show the effect. A relative has
-a cosine above {CONFIG["alike"]:g} with what the effect truly adds; random errors such as `sinusoidal` have no
-replay, and a cosine of 0 here. The doubt shows in a class of several or in an unknown of {DOUBT:g} or more.
+a cosine above {CONFIG["alike"]:g} with what the effect truly adds, a line at its best phase on every run.
+The doubt shows in a class of several or in an unknown of {DOUBT:g} or more.
 
 ## Effects that show
 

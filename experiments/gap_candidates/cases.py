@@ -15,6 +15,7 @@ from fogml.gap.model import EffectValue
 from fogml.gap.observation import observe
 from fogml.gap.result import Found
 from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.seen_as import AS_CANDIDATE
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_model import NoiseModel
@@ -109,7 +110,12 @@ class Bench:
         return float((recalibrated**2 - np.mean(gap**2)) / (recalibrated**2 - floor**2))
 
     def likeness(self, case: Case, found: Found) -> float:
-        """Absolute cosine of a found effect with the true contribution, beside the constants."""
+        """Absolute cosine of a found effect with the true contribution, beside the constants.
+
+        A line has a phase of its own on every run: that of its best fit.
+        """
+        if getattr(AS_CANDIDATE.get(found.effect), "drawn_per_run", False):
+            return self._likeness_of_line(case, found)
         shape = effect(found.effect).default_shape() | {k: v.value for k, v in found.parameters.items()}
         named = EffectValue(found.effect, found.amplitude.value, shape)
         parts = [
@@ -118,6 +124,20 @@ class Bench:
         ]
         a, b = self._beside(self._white(parts)[:, 0]), self._beside(self._signal(list(case.fit)))
         return float(abs(a @ b) / max(np.linalg.norm(a) * np.linalg.norm(b), 1e-300))
+
+    def _likeness_of_line(self, case: Case, found: Found) -> float:
+        shape = {name: estimate.value for name, estimate in found.parameters.items()}
+        columns = []
+        for place in range(len(self.observations)):
+            for phase in (0.0, 90.0):
+                parts = [
+                    o.averaged(o.model.response(found.effect, shape | {"phase": phase}, self.values))
+                    * (number == place)
+                    for number, o in enumerate(self.observations)
+                ]
+                columns.append(self._beside(self._white([part[:, None] for part in parts])[:, 0]))
+        signal, held = self._beside(self._signal(list(case.fit))), np.linalg.qr(np.column_stack(columns))[0]
+        return float(np.linalg.norm(held.T @ signal) / max(np.linalg.norm(signal), 1e-300))
 
     def _run(self, twin: Twin, number: int) -> Run:
         name = [*CONFIG["fit"], CONFIG["held_out"]][number]
