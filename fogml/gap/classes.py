@@ -69,6 +69,8 @@ class Ranking:
         Those of the unknown, before calibration.
     noise
         What is uneven in the noise.
+    nothing
+        Probability that neither an effect nor an unknown acts, by the evidence.
     """
 
     best: Explanation
@@ -76,6 +78,7 @@ class Ranking:
     unknown: float
     log_odds: float
     noise: UnevenNoise
+    nothing: float
 
 
 def rank(search: Search, explanations: Sequence[Explanation], tension: float = -math.inf) -> Ranking:
@@ -113,7 +116,8 @@ def rank(search: Search, explanations: Sequence[Explanation], tension: float = -
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
     log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))
-    return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise)
+    nothing = float(sum(w for e, w in zip(explanations, weights) if not e.ids and e.unknown is None))
+    return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise, nothing)
 
 
 def _weights(explanations: Sequence[Explanation]) -> np.ndarray:

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
 LEAST_MARGIN = -3.0
 LARGEST_LOG_ODDS = 12.0
-NAMED = (0.5, 0.5, 0.03, -3.0, -1.2)
+NAMED = (0.34, 0.45, 0.075, -2.83, -1.19)
 """Logistic constants of a class's probability: constant, then one for each of `named_features`."""
-UNKNOWN = (-0.65, 0.28)
+UNKNOWN = (-0.48, 0.374)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 
 

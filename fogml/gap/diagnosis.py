@@ -40,6 +40,8 @@ from fogml.twin.twin import Twin
 NOISE_MATTERS = 0.1
 """Change of an Allan variance's logarithm from which a search is done again."""
 MOST_DRAWS = 4
+SURELY_NOT_NOTHING = 0.02
+"""Probability that nothing acts under which there is a gap, whatever makes it."""
 
 
 def diagnose(
@@ -185,7 +187,7 @@ def _result(
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
     looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
     unknown = Unknown(ranking.unknown, looks_like, ranking.log_odds)
-    verdict = _verdict(found, unknown)
+    verdict = _verdict(found, unknown, ranking.nothing)
     if verdict == "unknown":
         found = ()
     after = fits if any(f.named for f in found) else p.recalibrated
@@ -217,13 +219,14 @@ def _result(
     )
 
 
-def _verdict(found: Sequence[Found], unknown: Unknown) -> Verdict:
+def _verdict(found: Sequence[Found], unknown: Unknown, nothing: float) -> Verdict:
     named = [f for f in found if f.named]
     if named and unknown.probability >= 0.5:
         return "partly_explained"
     if named:
         return "explained" if all(len(f.members) == 1 for f in named) else "ambiguous"
-    return "unknown" if unknown.probability >= 0.5 else "no_gap"
+    # Something acts for certain where nothing can't be: then it is not known what.
+    return "unknown" if unknown.probability >= 0.5 or nothing < SURELY_NOT_NOTHING else "no_gap"
 
 
 def as_model(twin: Twin | GyroModel) -> GyroModel:
