@@ -108,7 +108,8 @@ def headline(found: Diagnosis) -> str:
         case "partly_explained":
             return f"Partly explained. Missing from the twin: {causes}, and something unknown"
         case _:
-            return "Unknown: the gap is there, and no candidate explains it"
+            told = "explains it" if found.unknown.probability >= 0.5 else "is sure to explain it"
+            return f"Unknown: the gap is there, and no candidate {told}"
 
 
 def verdict_sentences(found: Diagnosis) -> list[str]:
@@ -145,6 +146,15 @@ def _first(found: Diagnosis, names: dict[str, str]) -> str:
         return (
             f"With its own constants fitted the twin leaves nothing that stands out of the noise: none of "
             f"{among} is named.{most}"
+        )
+    if found.verdict == "unknown" and found.unknown.probability < 0.5:
+        likeliest = max(found.evidence, key=lambda e: e.probability)
+        its = probability_words(likeliest.probability)
+        return (
+            f"There is a gap beyond doubt, and none of {among} is sure to be its cause. The likeliest, "
+            f"{title_of(likeliest.effect, names)}, has probability {its}; "
+            f"with probability {probability_words(found.unknown.probability)} something unknown acts"
+            f"{_looks(found)}."
         )
     if found.verdict == "unknown":
         return (

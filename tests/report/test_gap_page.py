@@ -53,6 +53,16 @@ def test_one_look_tells_verdict_cause_confidence_and_closing(verdict: str) -> No
         assert "follows the direction of temperature change" in first
 
 
+def test_a_gap_without_a_sure_cause_names_the_likeliest() -> None:
+    found = every_diagnosis()["unknown"]
+    doubtful = replace(found, unknown=replace(found.unknown, probability=0.37))
+    first = tiles(Page(gap_page(doubtful)))
+    assert "no candidate is sure to explain it" in first
+    assert "none of" in first and "is sure to be its cause" in first and "with probability 37 %" in first
+    likeliest = max(found.evidence, key=lambda e: e.probability)
+    assert effect(likeliest.effect).title in first
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_axis_has_a_unit_and_every_figure_words(verdict: str) -> None:
     read = page(verdict)
