@@ -98,13 +98,23 @@ def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], 
     return train_runs, test_runs
 
 
+def _seen_before(train_runs: list[Run], test_runs: list[Run]) -> list[str]:
+    """A note for each test run that is a training run too."""
+    return [
+        f"{test.name} is the training run {trained.name}: its figures say nothing of a run not trained on"
+        for test in test_runs
+        for trained in train_runs
+        if len(test) == len(trained) and test.hash == trained.hash
+    ]
+
+
 def fit_and_judge(
     settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
 ) -> tuple[DriftModel, Judgement]:
     """The fitted model and its judgement."""
     from fogml.models.names import make_model
 
-    notes: list[str] = []
+    notes = _seen_before(train_runs, test_runs)
     with terminal.work(f"fitting {settings.model}") as work:
         if settings.train_again:
             from fogml.validation.index_search import train_until_index

@@ -180,6 +180,16 @@ def test_turns_are_told(invoke, tmp_path):
     assert "b.csv: Scale-factor error: 500 before, 500 after [ppm]" in result.stdout
 
 
+def test_a_test_run_that_was_trained_on_is_told(invoke, run_files, tmp_path):
+    same, other = (
+        invoke("train", run_files[0], "--test", test, *QUICK, "-o", tmp_path / name)
+        for test, name in ((run_files[0], "same"), (run_files[1], "other"))
+    )
+    told = "its figures say nothing of a run not trained on"
+    assert told in " ".join(same.stdout.split()) and told in (tmp_path / "same" / "report.html").read_text()
+    assert told not in " ".join(other.stdout.split())
+
+
 def test_a_closed_folder_is_found_before_training(invoke, run_files, tmp_path, monkeypatch):
     monkeypatch.setattr("os.access", lambda *_: False)
     result = invoke("train", run_files[0], "--test", run_files[1], *QUICK, "-o", tmp_path / "out", status=2)
