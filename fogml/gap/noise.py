@@ -130,12 +130,16 @@ def tension(noise: Noise, prior: NoisePrior) -> float:
 
     That of a coefficient that is free to be larger, against the prior; at the price of being asked.
     """
-    above = [
-        math.log(getattr(noise.fit.model, name) / getattr(prior.centre, name)) / deviation
+    return 0.5 * max(0.0, *deviations_above(noise, prior).values()) ** 2 - math.log(10.0)
+
+
+def deviations_above(noise: Noise, prior: NoisePrior) -> dict[str, float]:
+    """Prior standard deviations that each coefficient which is free came out above its median."""
+    return {
+        name: math.log(getattr(noise.fit.model, name) / getattr(prior.centre, name)) / deviation
         for name, deviation in zip(NAMES, prior.deviations)
         if getattr(prior.centre, name) > 0.0
-    ]
-    return 0.5 * max(0.0, *above) ** 2 - math.log(10.0)
+    }
 
 
 def _plain_axes(free: Sequence[FloatArray], white_deg_h: float) -> FloatArray:

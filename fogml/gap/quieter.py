@@ -12,9 +12,9 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.gap.classes import UNEVEN, Ranking
+from fogml.gap.noise import deviations_above
 from fogml.gap.preparing import Prepared, recalibrated_constants
 from fogml.gap.search import Search
-from fogml.signals.noise_fit import NAMES
 from fogml.signals.noise_model import NoiseModel
 
 ABOVE = 1.0
@@ -27,12 +27,10 @@ def quieter(p: Prepared) -> Prepared | None:
     White noise stays as fitted: whatever acts besides, the runs show it.
     """
     fitted, known = p.noise.fit.model, p.noise_prior.centre
-    b, k = min(fitted.B, known.B), min(fitted.K, known.K)
-    _, b_deviation, k_deviation = p.noise_prior.deviations
-    above = max(_log_ratio(fitted.B, b) / b_deviation, _log_ratio(fitted.K, k) / k_deviation)
-    if above < ABOVE:
+    above = deviations_above(p.noise, p.noise_prior)
+    if max(above.get("B", 0.0), above.get("K", 0.0)) < ABOVE:
         return None
-    model = NoiseModel(fitted.N, b, k)
+    model = NoiseModel(fitted.N, min(fitted.B, known.B), min(fitted.K, known.K))
     noise = replace(p.noise, model=model, fit=replace(p.noise.fit, model=model))
     whiteners, constants = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=constants)
@@ -42,15 +40,6 @@ def log_joint(p: Prepared, search: Search, ranking: Ranking) -> float:
     """Logarithm of the probability of the runs, the best explanation and the noise together."""
     field = search.field_
     evidence = field.log_evidence - sum(whitener.log_det for whitener in p.whiteners)
-    fitted, prior = p.noise.fit.model, p.noise_prior
-    off = [
-        _log_ratio(getattr(fitted, name), getattr(prior.centre, name)) / deviation
-        for name, deviation in zip(NAMES, prior.deviations)
-        if getattr(prior.centre, name) > 0.0
-    ]
+    off = list(deviations_above(p.noise, p.noise_prior).values())
     uneven = np.logaddexp(math.log1p(-UNEVEN), ranking.noise.gain + math.log(UNEVEN))
     return float(evidence + ranking.best.log_posterior + uneven - 0.5 * np.sum(np.square(off)))
-
-
-def _log_ratio(value: float, other: float) -> float:
-    return math.log(max(value, 1e-300) / max(other, 1e-300))

@@ -8,8 +8,6 @@ from fogml.runs.run import FloatArray, Run
 
 SMOOTHED_S = 150.0
 """Readings are smoothed over this time for the responses of candidates [s]."""
-LEAST_STEP_DEGC = 5e-4
-"""Steps of a record that are finer are its digits and no sensor's."""
 USUAL_STEP_DEGC = 0.0101
 """Steps of a good sensor are no coarser: part of any recording."""
 

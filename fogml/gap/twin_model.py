@@ -11,11 +11,11 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
-from fogml.gap.readings import LEAST_STEP_DEGC, USUAL_STEP_DEGC, reading_noise, smoothed
+from fogml.gap.readings import USUAL_STEP_DEGC, reading_noise, smoothed
 from fogml.gap.seen_as import AS_CANDIDATE, line_response
 from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.run import FloatArray, Run
-from fogml.runs.steps import recorded_step
+from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step
 from fogml.twin.effect import Effect, NoiseEffect, SensorEffect
 from fogml.twin.inputs import STAND_INS, Inputs
 from fogml.twin.nominal import (
@@ -252,7 +252,7 @@ class TwinOnRun:
             if name == "T" and DELTA in slopes:
                 change = inputs.memory.difference("nuisance", inputs.time, missed, DELTA_WINDOW_S)
                 late[f"lag of {name}"] = late[f"lag of {name}"] + slopes[DELTA] * change
-        if LEAST_STEP_DEGC <= self._step_degC <= USUAL_STEP_DEGC:
+        if FINEST_STEP_DEGC <= self._step_degC <= USUAL_STEP_DEGC:
             hidden = effect(STEPS).response(replace(self._raw.afresh(), slopes=slopes))
             late["steps of the sensors"] = self._step_degC * hidden
         return late

@@ -17,7 +17,8 @@ from fogml.runs.run import FloatArray
 RELATIVE = 0.95
 """Cosine beside the constants from which two signals are relatives, as in the check on withheld effects."""
 DRAWS = 100
-MOST_COLUMNS = 400
+USUAL_COLUMNS = 400
+"""Draws stay the same up to so many columns of a group."""
 LEAST_AXIS = 0.1
 """Axes of a candidate's node with less of the first one's energy are left out."""
 NEAR = 0.6
@@ -36,7 +37,8 @@ class Unlike:
 
     def __init__(self, field: Field) -> None:
         self._field = field
-        self._normal = np.random.default_rng(0).standard_normal((DRAWS, MOST_COLUMNS))
+        widest = max(map(len, field.basis.groups.values()), default=0)
+        self._normal = np.random.default_rng(0).standard_normal((DRAWS, max(widest, USUAL_COLUMNS)))
         gram = field.gram
         main = [
             [c for c in node.columns if gram[c, c] >= LEAST_AXIS * gram[node.columns[0], node.columns[0]]]

@@ -6,6 +6,8 @@ import numpy as np
 
 from fogml.runs.run import FloatArray
 
+FINEST_STEP_DEGC = 5e-4
+"""Steps of a record that are finer are its digits and no sensor's."""
 _WHOLE = 1e-2
 
 

@@ -145,7 +145,7 @@ class ScaleFactorEffect(Effect):
 
     def response(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Change of the gyro's output [deg/h] per unit of amplitude, shape (n,)."""
-        return 1e-6 * inputs.input_rate_deg_h * self.signature(inputs, **shape)
+        return 1e-6 * inputs.input_rate_deg_h * self.in_hindsight(inputs, **shape)
 
 
 class LoopEffect(Effect):

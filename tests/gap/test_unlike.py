@@ -11,7 +11,7 @@ from fogml.gap.basis import build_basis
 from fogml.gap.dictionary import Group
 from fogml.gap.evidence import Field, Term
 from fogml.gap.search import Search
-from fogml.gap.unlike import DRAWS, RELATIVE, Unlike
+from fogml.gap.unlike import DRAWS, RELATIVE, USUAL_COLUMNS, Unlike
 from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded
 
 
@@ -74,3 +74,14 @@ def test_the_share_is_that_of_dense_draws(of_cube, of_wave):
 
     wanted = math.log((1.0 - like(after)) / (1.0 - like(before)))
     assert share(field, length) == pytest.approx(wanted, abs=0.35)
+
+
+def test_a_group_may_be_wider_than_usual():
+    rng = np.random.default_rng(2)
+    model = SmallModel(ids=("cube",))
+    run = ramps("a", count=700, turns=3)
+    frame = framed([recorded(run, model, {}, (), noise_of(run, rng))], model)
+    group = Group("both", "is anything", (rng.standard_normal((len(frame.observations[0]), 450)),))
+    field = Field(build_basis(frame, model.candidates(), [group], "tactical"))
+    assert len(field.basis.groups["both"]) > USUAL_COLUMNS
+    assert share(field) == pytest.approx(0.0, abs=0.1)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fogml.runs.run import FloatArray
-from fogml.runs.steps import recorded_step
+from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
@@ -15,7 +15,6 @@ from fogml.twin.quantities import Quantity
 from fogml.twin.responses import unseen
 
 _USUAL_STEP_DEGC = 0.0625
-_FINEST_STEP_DEGC = 5e-4
 _SMOOTHED_S, _OF_A_STEP, _LONGEST_S = 24.0, 0.5, 600.0
 """Time constant of the smoothing: at samples of 1 s, over the time between two steps, and the longest."""
 _RATE_S = 300.0
@@ -89,14 +88,14 @@ class SensorQuantisation(SensorEffect):
         smooth = 2.0 * once - twice
         within = np.clip(np.where(known, smooth - temperature, 0.0) / np.where(known, step, 1.0), -0.5, 0.5)
         usual = temperature / _USUAL_STEP_DEGC
-        return np.where(step < _FINEST_STEP_DEGC, usual - np.rint(usual), within)
+        return np.where(step < FINEST_STEP_DEGC, usual - np.rint(usual), within)
 
     def _hidden_in_hindsight(self, name: str, inputs: Inputs) -> FloatArray:
         """The same where the whole record is known."""
         time, temperature = inputs.time, inputs.temperature(name)
         step = recorded_step(temperature)
         changed = np.flatnonzero(np.diff(temperature))
-        if step < _FINEST_STEP_DEGC or len(changed) < 2:
+        if step < FINEST_STEP_DEGC or len(changed) < 2:
             return self._hidden(name, inputs)
         edges = 0.5 * (temperature[changed] + temperature[changed + 1])
         between = np.interp(time, 0.5 * (time[changed] + time[changed + 1]), edges)
