@@ -14,7 +14,6 @@ from itertools import pairwise
 import numpy as np
 
 from fogml.gap.observation import Observation
-from fogml.gap.readings import smoothed
 from fogml.runs.run import FloatArray
 from fogml.twin.memory import Memory
 
@@ -180,7 +179,7 @@ def _gradients(observations: Sequence[Observation]) -> list[FloatArray]:
     for o in observations:
         columns = [np.zeros(len(o))]
         for name in names:
-            difference = _free(o, name) - _free(o)
+            difference = o.smooth(name) - o.smooth()
             quick = difference - _lag(o, difference, 100.0)
             columns += [difference / 10.0, quick, difference * o.temperature / 500.0]
         blocks.append(np.column_stack(columns))
@@ -198,7 +197,7 @@ def _heat_flow(observations: Sequence[Observation]) -> list[FloatArray]:
     blocks = []
     for o in observations:
         columns = []
-        for t in (_free(o), *(_free(o, name) for name in names)):
+        for t in (o.smooth(), *(o.smooth(name) for name in names)):
             lagged = [t, *(_lag(o, t, tau) for tau in BANDS_S)]
             columns += [(a - b) / 10.0 for a, b in pairwise(lagged)]
         blocks.append(np.column_stack(columns))
@@ -289,10 +288,5 @@ def _lag(o: Observation, values: FloatArray, time_constant_s: float) -> FloatArr
 
 def _rate(o: Observation) -> FloatArray:
     """Rate of the temperature over a minute or so [degC/min], shape (m,)."""
-    t = _free(o)
-    return 60.0 * (t - _lag(o, t, 100.0)) / 100.0
-
-
-def _free(o: Observation, name: str = "T") -> FloatArray:
-    """A temperature free of its readings' noise, which a nominal replay holds too; shape (m,)."""
-    return o.averaged(smoothed(o.run, o.run.temperature(name)))
+    # Of readings as they are the nominal replay holds the noise as well.
+    return 60.0 * (o.smooth() - _lag(o, o.smooth(), 100.0)) / 100.0

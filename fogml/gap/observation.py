@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.gap.model import GyroModel, ModelOnRun
+from fogml.gap.readings import smoothed
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 
@@ -83,6 +84,16 @@ class Observation:
     def temperature(self) -> FloatArray:
         """Temperature T of each row [degC], shape (m,)."""
         return self.averaged(self.run.temperature())
+
+    def smooth(self, name: str = "T") -> FloatArray:
+        """A temperature of each row free of its readings' noise [degC], shape (m,)."""
+        if name not in self._smooth:
+            self._smooth[name] = self.averaged(smoothed(self.run, self.run.temperature(name)))
+        return self._smooth[name]
+
+    @cached_property
+    def _smooth(self) -> dict[str, FloatArray]:
+        return {}
 
     @property
     def row_s(self) -> float:

@@ -15,10 +15,8 @@ from fogml.twin.quantities import Quantity
 from fogml.twin.responses import unseen
 
 _USUAL_STEP_DEGC = 0.0625
-_SMOOTHED_S, _OF_A_STEP, _LONGEST_S = 24.0, 0.5, 600.0
-"""Time constant of the smoothing: at samples of 1 s, over the time between two steps, and the longest."""
-_RATE_S = 300.0
-_SMOOTHED_BOTH_WAYS_S = 14.0
+_SMOOTHED_S, _SMOOTHED_BOTH_WAYS_S = 24.0, 14.0
+"""Time constants of the smoothing at samples of 1 s; they go with the root of the interval."""
 
 
 class SensorQuantisation(SensorEffect):
@@ -76,13 +74,7 @@ class SensorQuantisation(SensorEffect):
         step = memory.least(f"{self.id} step {name}", change)
         known = np.isfinite(step)
         interval = time - memory.previous(f"{self.id} time {name}", time)
-        jumped = np.divide(
-            np.where(known, change, 0.0), interval, out=np.zeros(len(time)), where=interval > 0.0
-        )
-        jumped[~np.isfinite(jumped)] = 0.0
-        rate = memory.lag(f"{self.id} rate {name}", time, jumped, _RATE_S)
-        between = np.where(known, step, 0.0) / np.maximum(rate, 1e-12)
-        smoothed_s = np.clip(_OF_A_STEP * between, _SMOOTHED_S * np.sqrt(interval), _LONGEST_S)
+        smoothed_s = _SMOOTHED_S * np.sqrt(interval)
         once = memory.lag(f"{self.id} once {name}", time, temperature, smoothed_s)
         twice = memory.lag(f"{self.id} twice {name}", time, once, smoothed_s)
         smooth = 2.0 * once - twice
