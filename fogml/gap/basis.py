@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.candidate_columns import NodeColumns, candidate_columns
-from fogml.gap.dictionary import Group
 from fogml.gap.frame import Frame, main_axes
+from fogml.gap.group import Group
 from fogml.gap.model import Candidate
 from fogml.gap.screening import Screening
 from fogml.runs.run import FloatArray

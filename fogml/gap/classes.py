@@ -81,7 +81,12 @@ class Ranking:
     nothing: float
 
 
-def rank(search: Search, explanations: Sequence[Explanation], tension: float = -math.inf) -> Ranking:
+def rank(
+    search: Search,
+    explanations: Sequence[Explanation],
+    tension: float = -math.inf,
+    rivals: Sequence[Explanation] = (),
+) -> Ranking:
     """Classes and probabilities.
 
     Parameters
@@ -92,11 +97,14 @@ def rank(search: Search, explanations: Sequence[Explanation], tension: float = -
         What was tried, the most probable first.
     tension
         Evidence for an unknown that was taken for noise [nats]; see `fogml.gap.noise.tension`.
+    rivals
+        Explanations under other noise, on the same scale.
     """
     best = explanations[0]
     classes = {c.candidate: _members(search, best, c.candidate) for c in best.effects}
-    weights = _weights(explanations)
-    unknown = float(sum(w for e, w in zip(explanations, weights) if e.unknown is not None))
+    whole = _merged(explanations, rivals)
+    weights = _weights(whole)
+    unknown = float(sum(w for e, w in zip(whole, weights) if e.unknown is not None))
     noise = uneven_noise(search, best)
     uneven = expit(float(np.logaddexp(noise.gain, tension)) + math.log(UNEVEN / (1.0 - UNEVEN)))
     unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
@@ -104,20 +112,30 @@ def rank(search: Search, explanations: Sequence[Explanation], tension: float = -
     taken: set[str] = set()
     for chosen in best.effects:
         members = classes[chosen.candidate]
-        ranked.append(_ranked(search, best, chosen, members, explanations, weights))
+        ranked.append(_ranked(search, best, chosen, members, whole, weights))
         taken |= set(members)
     for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
-        other = _ranked(search, with_it, chosen, (id,), explanations, weights)
+        other = _ranked(search, with_it, chosen, (id,), whole, weights)
         # Named is what the best explanation holds, and what is fitted.
         other = replace(other, probability=min(other.probability, NOT_IN_BEST))
         if other.margin >= LEAST_MARGIN:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
     log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))
-    nothing = float(sum(w for e, w in zip(explanations, weights) if not e.ids and e.unknown is None))
+    nothing = float(sum(w for e, w in zip(whole, weights) if not e.ids and e.unknown is None))
     return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise, nothing)
+
+
+def _merged(explanations: Sequence[Explanation], rivals: Sequence[Explanation]) -> list[Explanation]:
+    """Each set of effects and rest once, under the noise that it is the most probable with."""
+    held: dict[tuple[frozenset[str], str], Explanation] = {}
+    for e in (*explanations, *rivals):
+        key = (e.ids, e.rest)
+        if key not in held or e.log_posterior > held[key].log_posterior:
+            held[key] = e
+    return list(held.values())
 
 
 def _weights(explanations: Sequence[Explanation]) -> np.ndarray:

@@ -8,20 +8,12 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.assumptions import assumptions
-from fogml.gap.basis import Basis, build_basis
-from fogml.gap.classes import Ranking, rank
 from fogml.gap.describe import describe_unknown
-from fogml.gap.events import event_groups
-from fogml.gap.evidence import Field
 from fogml.gap.found import found_effects
-from fogml.gap.frame import Frame
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.model import Candidate, GyroModel
-from fogml.gap.near_library import near_library
 from fogml.gap.next_run import next_run
-from fogml.gap.noise import Noise, tension
-from fogml.gap.preparing import Prepared, Progress, prepare, with_noise_beside
-from fogml.gap.quieter import log_joint, quieter
+from fogml.gap.preparing import Prepared, Progress, prepare
 from fogml.gap.reports import (
     candidate_evidence,
     constant_fits,
@@ -31,15 +23,12 @@ from fogml.gap.reports import (
     with_run_amplitudes,
 )
 from fogml.gap.result import Diagnosis, Found, HowFar, Unknown, Verdict
-from fogml.gap.search import Search
 from fogml.gap.structure import gaps_on_runs, stage_energies
+from fogml.gap.trials import Trial, best_trial
 from fogml.gap.where import where
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.twin import Twin
 
-NOISE_MATTERS = 0.1
-"""Change of an Allan variance's logarithm from which a search is done again."""
-MOST_DRAWS = 4
 SURELY_NOT_NOTHING = 0.02
 """Probability that nothing acts under which there is a gap, whatever makes it."""
 
@@ -101,87 +90,14 @@ def _diagnosed(
 ) -> Diagnosis:
     model = as_model(twin)
     candidates = _candidates(model, without)
-    prepared = prepare(model, fit, held_out, noise, tell)
-    basis = _basis(prepared, candidates, prepared.recalibrated.constants, tell)
-    search, ranking = _searched(prepared, basis, tell)
-    known = quieter(prepared)
-    if known is not None:
-        tell("searching with the noise as it is known")
-        other = _basis(known, candidates, known.recalibrated.constants, tell)
-        tried = _searched(known, other, tell)
-        if log_joint(known, *tried) > log_joint(prepared, search, ranking):
-            prepared, basis, (search, ranking) = known, other, tried
-    if ranking.best.effects:
-        # What was taken for noise may have been the effect, and the constants may have made up for it.
-        tell("fitting the noise beside what was found")
-        values = found_effects(prepared, candidates, search, ranking)[1].constants
-        again = with_noise_beside(prepared, _explained(prepared, basis, ranking))
-        if _differ(prepared.noise, again.noise) or _act_on_inputs(candidates, ranking):
-            prepared = again
-            basis = _basis(prepared, candidates, values, tell)
-            search, ranking = _searched(prepared, basis, tell)
-    return _result(prepared, candidates, basis, search, ranking, seed, plan, tell)
-
-
-def _searched(p: Prepared, basis: Basis, tell: Progress) -> tuple[Search, Ranking]:
-    tell("searching sets of effects")
-    search = Search(Field(basis))
-    return search, rank(search, search.run(), tension(p.noise, p.noise_prior))
-
-
-def _explained(p: Prepared, basis: Basis, ranking: Ranking) -> list[FloatArray]:
-    """Rows of what the effects of the best explanation can do, and its unknown, on each run."""
-    rows = []
-    for r, o in enumerate(p.fit):
-        columns = [
-            o.averaged(o.model.response(c.candidate, shape, basis.frame.values))
-            for c in ranking.best.effects
-            for shape in basis.nodes[c.node].node.draws[:MOST_DRAWS]
-        ]
-        rows.append(np.column_stack(columns))
-        if ranking.best.unknown is not None:
-            group = basis.kinds[ranking.best.unknown[0]]
-            rows[-1] = np.concatenate([rows[-1], group.columns[r]], axis=1)
-    return rows
-
-
-def _differ(first: Noise, second: Noise) -> bool:
-    """Whether the noise differs by more than matters, at the averaging time of the figures."""
-    taus = np.array([10.0, AVERAGING_S, 3000.0])
-    ratio = second.model.allan_variance(taus) / first.model.allan_variance(taus)
-    return bool(np.any(np.abs(np.log(ratio)) > NOISE_MATTERS))
-
-
-def _act_on_inputs(candidates: Mapping[str, Candidate], ranking: Ranking) -> bool:
-    """Whether a member of a class that was found depends on where the constants are."""
-    stages = {candidates[m].stage for r in ranking.effects for m in r.members}
-    return bool(stages & {"sensor", "logger", "loop", "readout"})
-
-
-def _basis(
-    p: Prepared, candidates: Mapping[str, Candidate], values: Mapping[str, float], tell: Progress
-) -> Basis:
-    frame = Frame(p.fit, p.whiteners, p.model.constants, values)
-    near = near_library(p.fit, candidates, values, p.model.grade)
-    return build_basis(
-        frame,
-        candidates,
-        (*p.groups, *near, *event_groups(frame)),
-        p.model.grade,
-        lambda id: tell(f"whitening candidates: {id}"),
-    )
+    trial = best_trial(prepare(model, fit, held_out, noise, tell), candidates, tell)
+    return _result(trial, candidates, seed, plan, tell)
 
 
 def _result(
-    p: Prepared,
-    candidates: Mapping[str, Candidate],
-    basis: Basis,
-    search: Search,
-    ranking: Ranking,
-    seed: int,
-    plan: bool,
-    tell: Progress,
+    trial: Trial, candidates: Mapping[str, Candidate], seed: int, plan: bool, tell: Progress
 ) -> Diagnosis:
+    p, basis, search, ranking = trial.prepared, trial.basis, trial.search, trial.ranking
     tell("fitting what was found")
     found, fits = found_effects(p, candidates, search, ranking)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))

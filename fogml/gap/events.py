@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogml.gap.dictionary import Group, side_by_side
 from fogml.gap.frame import Frame
+from fogml.gap.group import Group, side_by_side
 from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from fogml.gap.dictionary import Group
+from fogml.gap.group import Group
 from fogml.gap.model import Candidate
 from fogml.gap.observation import Observation
 from fogml.gap.shapes import is_angle, is_line

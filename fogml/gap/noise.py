@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.gap.dictionary import Group
 from fogml.gap.frame import constant_rows
+from fogml.gap.group import Group
 from fogml.gap.model import Constant, GyroModel
 from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray, Run

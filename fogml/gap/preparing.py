@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.dictionary import Group, unknown_groups
+from fogml.gap.dictionary import unknown_groups
 from fogml.gap.fitting import Fit, fit_model
+from fogml.gap.group import Group
 from fogml.gap.model import GyroModel
 from fogml.gap.noise import Noise, noise_of, prior_of
 from fogml.gap.observation import Observation, Unusable, observe

@@ -1,7 +1,8 @@
 """Noise that is not the same everywhere: what an unknown in the noise looks like.
 
-Whitened residuals have unit variance. Where their squares follow temperature, its rate, time or the
-table's rate, something that no mean response shows makes noise there.
+Whitened residuals have unit variance. Where their squares grow with temperature, its rate, time or the
+table's rate, something that no mean response shows makes noise there. Where they fall, nothing does:
+what is fitted may follow noise of the readings, which turns with a rate show most.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import logsumexp
+from scipy.special import log_ndtr, logsumexp
 
 from fogml.gap.frame import Frame
 from fogml.gap.observation import Observation
@@ -61,26 +62,28 @@ def uneven_noise(search: Search, best: Explanation) -> UnevenNoise:
             along = float(column @ y) / math.sqrt(size)
             wider = 1.0 + LENGTHS**2
             terms = 0.5 * (LENGTHS**2 * along**2 / wider - np.log(wider)) + np.log(LENGTH_WEIGHTS)
+            # The half of the prior of less noise is cut away.
+            terms += log_ndtr(LENGTHS * along / np.sqrt(wider)) + math.log(2.0)
             gains[name] = float(logsumexp(terms))
     if not gains:
         return UnevenNoise(-math.inf, "")
     name = max(gains, key=gains.__getitem__)
-    return UnevenNoise(
-        float(logsumexp(list(gains.values()))) - math.log(len(gains)), f"noise grows with {name}"
-    )
+    return UnevenNoise(float(logsumexp(list(gains.values()))) - math.log(len(gains)), f"noise {name}")
 
 
 def _causes(o: Observation) -> dict[str, FloatArray]:
+    """What noise may do, and columns that grow where it then is larger."""
     t = o.temperature
     rate = 60.0 * (t - Memory().lag("rate", o.time, t, 100.0)) / 100.0
     middle = 0.5 * (float(t.max()) + float(t.min()))
     causes: dict[str, FloatArray] = {
-        "high temperature": np.maximum(t - middle, 0.0),
-        "low temperature": np.maximum(middle - t, 0.0),
-        "the rate of temperature": np.abs(rate),
-        "time": o.time - o.time[0],
+        "grows with high temperature": np.maximum(t - middle, 0.0),
+        "grows with low temperature": np.maximum(middle - t, 0.0),
+        "grows with the rate of temperature": np.abs(rate),
+        "grows with time": o.time - o.time[0],
+        "falls with time": o.time[-1] - o.time,
     }
-    return causes | {"the table's rate": np.abs(o.averaged(o.run.rate))}
+    return causes | {"grows with the table's rate": np.abs(o.averaged(o.run.rate))}
 
 
 def _residual(search: Search, best: Explanation) -> FloatArray:

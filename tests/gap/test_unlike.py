@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fogml.gap.basis import build_basis
-from fogml.gap.dictionary import Group
 from fogml.gap.evidence import Field, Term
+from fogml.gap.group import Group
 from fogml.gap.search import Search
 from fogml.gap.unlike import DRAWS, RELATIVE, USUAL_COLUMNS, Unlike
 from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded

@@ -1,0 +1,163 @@
+"""Noise and explanation together: the search under several fits of the noise, and which of them stands.
+
+What moves slowly may be noise or something that acts. The noise is fitted to the runs, tried as it was
+known before, and fitted again beside what a search found. The trial stands in which noise and explanation
+are the most probable together; what the others hold for likely counts in its probabilities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fogml.gap.basis import Basis, build_basis
+from fogml.gap.classes import Ranking, rank
+from fogml.gap.events import event_groups
+from fogml.gap.evidence import Field
+from fogml.gap.found import found_effects
+from fogml.gap.frame import Frame
+from fogml.gap.model import Candidate
+from fogml.gap.near_library import near_library
+from fogml.gap.noise import Noise, tension
+from fogml.gap.preparing import Prepared, Progress, with_noise_beside
+from fogml.gap.quieter import log_joint, quieter
+from fogml.gap.search import Explanation, Search
+from fogml.runs.run import FloatArray
+
+AVERAGING_TIMES_S = (10.0, 100.0, 3000.0)
+NOISE_MATTERS = 0.1
+"""Change of an Allan variance's logarithm from which a search is done again."""
+MOST_DRAWS = 4
+REACH = 100.0
+"""How far behind a trial with known noise may be so that its noise is fitted again beside it [nats]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A search under one fit of the noise."""
+
+    prepared: Prepared
+    basis: Basis
+    search: Search
+    explanations: Sequence[Explanation]
+    ranking: Ranking
+
+    @cached_property
+    def log_joint(self) -> float:
+        """Of the runs, the best explanation and the noise together."""
+        return log_joint(self.prepared, self.search, self.ranking)
+
+    def beside(self, others: Sequence[Trial]) -> Trial:
+        """The same with probabilities that count what other trials hold for likely."""
+        rivals = [
+            replace(e, log_posterior=e.log_posterior + other._log_runs - self._log_runs)
+            for other in others
+            for e in other.explanations
+        ]
+        return replace(self, ranking=_ranked(self.prepared, self.search, self.explanations, rivals))
+
+    @property
+    def _log_runs(self) -> float:
+        return self.log_joint - self.ranking.best.log_posterior
+
+
+def best_trial(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress) -> Trial:
+    """The trial that stands, with the probabilities of all.
+
+    Parameters
+    ----------
+    p
+        The runs with the noise fitted to them.
+    candidates
+        What may be named.
+    tell
+        Told what is being done.
+    """
+    trials = [_trial(p, candidates, p.recalibrated.constants, tell)]
+    known = quieter(p)
+    if known is not None:
+        tell("searching with the noise as it is known")
+        trials.append(_trial(known, candidates, known.recalibrated.constants, tell))
+        if trials[1].log_joint > trials[0].log_joint - REACH:
+            trials += _again(trials[1], candidates, tell)
+    best = max(trials, key=lambda t: t.log_joint)
+    if best.ranking.best.effects and best not in trials[2:]:
+        again = _again(best, candidates, tell)
+        trials += again
+        best = again[0] if again else best
+    return best.beside([t for t in trials if t is not best])
+
+
+def _trial(
+    p: Prepared, candidates: Mapping[str, Candidate], values: Mapping[str, float], tell: Progress
+) -> Trial:
+    """Everything whitened and searched, constants linearised at their values."""
+    frame = Frame(p.fit, p.whiteners, p.model.constants, values)
+    near = near_library(p.fit, candidates, values, p.model.grade)
+    basis = build_basis(
+        frame,
+        candidates,
+        (*p.groups, *near, *event_groups(frame)),
+        p.model.grade,
+        lambda id: tell(f"whitening candidates: {id}"),
+    )
+    tell("searching sets of effects")
+    search = Search(Field(basis))
+    explanations = search.run()
+    return Trial(p, basis, search, explanations, _ranked(p, search, explanations))
+
+
+def _ranked(
+    p: Prepared, search: Search, explanations: Sequence[Explanation], rivals: Sequence[Explanation] = ()
+) -> Ranking:
+    return rank(search, explanations, tension(p.noise, p.noise_prior), rivals)
+
+
+def _again(trial: Trial, candidates: Mapping[str, Candidate], tell: Progress) -> list[Trial]:
+    """The search with the noise fitted beside what a trial found; none where that changes nothing.
+
+    What was taken for noise may have been the effect, and the constants may have made up for it.
+    """
+    p, best = trial.prepared, trial.ranking.best
+    if not best.effects and best.unknown is None:
+        return []
+    tell("fitting the noise beside what was found")
+    values = p.recalibrated.constants
+    if best.effects:
+        values = found_effects(p, candidates, trial.search, trial.ranking)[1].constants
+    again = with_noise_beside(p, _explained(trial))
+    if not (_differ(p.noise, again.noise) or _act_on_inputs(candidates, trial.ranking)):
+        return []
+    return [_trial(again, candidates, values, tell)]
+
+
+def _explained(trial: Trial) -> list[FloatArray]:
+    """Rows of what the effects of the best explanation can do, and its unknown, on each run."""
+    p, basis, best = trial.prepared, trial.basis, trial.ranking.best
+    rows = []
+    for r, o in enumerate(p.fit):
+        columns = [
+            o.averaged(o.model.response(c.candidate, shape, basis.frame.values))[:, None]
+            for c in best.effects
+            for shape in basis.nodes[c.node].node.draws[:MOST_DRAWS]
+        ]
+        if best.unknown is not None:
+            columns.append(basis.kinds[best.unknown[0]].columns[r])
+        rows.append(np.concatenate(columns, axis=1))
+    return rows
+
+
+def _differ(first: Noise, second: Noise) -> bool:
+    """Whether the noise differs by more than matters, about the averaging time of the figures."""
+    taus = np.array(AVERAGING_TIMES_S)
+    ratio = second.model.allan_variance(taus) / first.model.allan_variance(taus)
+    return bool(np.any(np.abs(np.log(ratio)) > NOISE_MATTERS))
+
+
+def _act_on_inputs(candidates: Mapping[str, Candidate], ranking: Ranking) -> bool:
+    """Whether a member of a class that was found depends on where the constants are."""
+    stages = {candidates[m].stage for r in ranking.effects for m in r.members}
+    return bool(stages & {"sensor", "logger", "loop", "readout"})
