@@ -15,6 +15,9 @@ from fogml.gap.result import Diagnosis
 from fogml.outputs import whole_folder
 from fogml.twin.twin_file import load_twin, twin_names
 
+NEXT_RUN = "next-run.yaml"
+"""The programme of a run that would tell more, for ``fogml simulate``."""
+
 
 class DiagnoseSettings(Settings):
     """Settings of ``fogml diagnose``."""
@@ -70,6 +73,8 @@ def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
     (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
     (folder / "config.yaml").write_text(settings.in_full().yaml("diagnose"), encoding="utf-8")
+    if found.separating_run is not None:
+        (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 
 
 def _print(found: Diagnosis, terminal: Terminal) -> None:
@@ -98,7 +103,10 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
     if rows:
         title = f"Rms of {found.how_far[0].averaging_s:g} s averages, held out [deg/h]"
         terminal.table(title, ["run", "before", "recalibrated", "after", "floor", "closed"], rows)
+    if (run := found.separating_run) is not None:
+        verb = "would show" if run.aim == "show" else "would tell apart"
+        terminal.say(f"Next: a programme of {run.hours:.1f} h {verb} {', '.join(run.separates)}: {NEXT_RUN}")
     if found.held_out_is_part:
         terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
-    for run, reason in found.unusable:
-        terminal.note(f"{run} not used: {reason}")
+    for name, reason in found.unusable:
+        terminal.note(f"{name} not used: {reason}")

@@ -112,6 +112,7 @@ def _result(
     tell("judging on held-out runs")
     far = tuple(how_far(o, p.model.constants, p.recalibrated, after, p.noise, rng) for o in p.held_out)
     evidence = candidate_evidence(search, ranking, basis, candidates, found)
+    undetectable = tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants"))
     return Diagnosis(
         fit=tuple(o.run.name for o in p.fit),
         held_out=tuple(o.run.name for o in p.held_out),
@@ -122,8 +123,8 @@ def _result(
         unknown=unknown,
         where=where(gaps, stage_energies(p, after, candidates, search, ranking), p.noise),
         how_far=far,
-        undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
-        separating_run=next_run(p, found, candidates, search, seed, tell) if plan else None,
+        undetectable=undetectable,
+        separating_run=next_run(p, found, undetectable, candidates, search, seed, tell) if plan else None,
         constants=constant_fits(p.model, after),
         evidence=evidence,
         noise=noise_report(p, after),

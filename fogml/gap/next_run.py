@@ -1,4 +1,4 @@
-"""What to measure next, where runs leave a class of several effects."""
+"""What to measure next, where runs leave a class of several effects, or could not show some at all."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from fogml.gap.preparing import Prepared
 from fogml.gap.result import Found, SeparatingRun
 from fogml.gap.search import Search
 from fogml.gap.separating import separating_run
+from fogml.gap.showing import showing_run
 from fogml.gap.starting import starting_values
 from fogml.gap.twin_model import TwinModel
 
@@ -18,6 +19,7 @@ MOST_MEMBERS = 4
 def next_run(
     p: Prepared,
     found: Sequence[Found],
+    undetectable: Sequence[str],
     candidates: Mapping[str, Candidate],
     search: Search,
     seed: int,
@@ -25,13 +27,20 @@ def next_run(
 ) -> SeparatingRun | None:
     """The programme that tells the members of the most probable class of several apart.
 
-    None where each named effect stands alone, no programme does, or the model can't simulate.
+    Where each named effect stands alone, the one that shows what these runs could not. None where there is
+    nothing to tell, no programme does, or the model can't simulate.
     """
     model = p.model
-    open_ = next((f for f in found if f.named and len(f.members) > 1), None)
-    if open_ is None or not isinstance(model, TwinModel):
+    if not isinstance(model, TwinModel):
         return None
-    values = p.recalibrated.constants
+    values, facts = p.recalibrated.constants, p.fit[0].run.facts
+    open_ = next((f for f in found if f.named and len(f.members) > 1), None)
+    if open_ is None:
+        if not undetectable:
+            return None
+        return showing_run(
+            model.twin, p.noise.model, values, undetectable, seed=seed, progress=tell, facts=facts
+        )
     members = []
     for id in open_.members[:MOST_MEMBERS]:
         nodes = search.places.get(id)
@@ -44,7 +53,6 @@ def next_run(
         )
     if len(members) < 2:
         return None
-    run = p.fit[0].run
     return separating_run(
         model.twin,
         p.noise.model,
@@ -52,5 +60,5 @@ def next_run(
         members,
         seed=seed,
         progress=tell,
-        facts=run.facts,
+        facts=facts,
     )

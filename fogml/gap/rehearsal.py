@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.gap.model import Candidate, Constant
+from fogml.gap.frame import constant_rows
+from fogml.gap.model import Candidate
 from fogml.gap.observation import Observation, observe
 from fogml.gap.programme_family import Design, Family
 from fogml.gap.run_whitener import RunWhitener
@@ -161,7 +162,7 @@ class Rehearsal(Rehearsed):
 
         self.observation = seen(on.model)
         self._whitener = RunWhitener(on.noise, seen(on.reading), on.values)
-        self.fixed = self._whitener.whiten(constant_columns(self.observation, on.model.constants))
+        self.fixed = self._whitener.whiten(constant_rows(self.observation, on.model.constants))
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
@@ -185,11 +186,3 @@ class Together(Rehearsed):
 def mounted(facts: Facts, design: Design) -> Facts:
     """The facts with the design's mounting, where it states one."""
     return facts.model_copy(update={"input_axis": design.mounting or facts.input_axis})
-
-
-def constant_columns(o: Observation, constants: Sequence[Constant]) -> FloatArray:
-    """Responses to one prior standard deviation of each constant [deg/h], shape (m, c)."""
-    held = o.model.columns()
-    return np.column_stack(
-        [c.sd * o.averaged(held[c.name]) if c.name in held else np.zeros(len(o)) for c in constants]
-    )

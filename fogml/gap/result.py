@@ -115,7 +115,10 @@ class HowFar:
 
 @dataclass(frozen=True)
 class SeparatingRun:
-    """The programme that tells classes' members apart or shows what can't be seen."""
+    """The programme that tells a class's members apart, or shows what runs so far could not.
+
+    `distance` is the least between two of the effects, or the least of their whitened lengths.
+    """
 
     separates: tuple[str, ...]
     programme: str
@@ -123,6 +126,7 @@ class SeparatingRun:
     hours: float
     steps: tuple[str, ...] = ()
     alternatives: tuple[Mapping[str, Any], ...] = ()
+    aim: Literal["tell_apart", "show"] = "tell_apart"
 
 
 @dataclass(frozen=True)

@@ -122,15 +122,22 @@ def separating_run(
             least_distance(Rehearsal(on, family, design, FINE_S), told, refined=True)
         ),
     )
-    best, distance = finals[0], math.exp(finals[0].merit)
+    distance = math.exp(finals[0].merit)
     if distance < LEAST_DISTANCE:
         return None
-    programme = family.programme(best.design, name="separating-run")
+    return run_of(family, finals, [m.value.id for m in told], distance, "separating-run")
+
+
+def run_of(
+    family: Family, finals: Sequence[Tried], ids: Sequence[str], distance: float, name: str
+) -> SeparatingRun:
+    """The best of the designs that a search ended with as a programme, the others as alternatives."""
+    programme = family.programme(finals[0].design, name=name)
     return SeparatingRun(
-        separates=tuple(m.value.id for m in told),
+        separates=tuple(ids),
         programme=programme.as_yaml(),
         distance=distance,
-        hours=best.hours,
+        hours=finals[0].hours,
         steps=tuple(text for step in programme.steps for text in _sentences(step)),
         alternatives=tuple(
             {**alternative_values(family, one), "distance": math.exp(one.merit)} for one in finals[1:]

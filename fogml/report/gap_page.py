@@ -170,10 +170,14 @@ def _separating(found: Diagnosis, names: dict[str, str]) -> Separating | None:
     if run is None:
         return None
     told = [title_of(id, names) for id in run.separates]
-    aim = f"To tell apart: {listed(told, 6)}." if len(told) > 1 else f"To show: {''.join(told)}."
+    if run.aim == "show" or len(told) == 1:
+        aim = f"These runs could not show them at their usual size, this programme would: {listed(told, 12)}."
+        name = "expected length of the least"
+    else:
+        aim, name = f"To tell apart: {listed(told, 6)}.", "expected distance"
     facts = [
         ("lasts", duration(3600.0 * run.hours)),
-        ("expected distance", f"{number(run.distance, 2)} standard deviations of the noise"),
+        (name, f"{number(run.distance, 2)} standard deviations of the noise"),
     ]
     others = gap_tables.alternatives_table(run.alternatives) if run.alternatives else None
     return Separating(aim, run.steps, run.programme, facts, others)

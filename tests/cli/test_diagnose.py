@@ -75,8 +75,14 @@ def gap(diagnosed) -> dict:
 
 def test_what_is_written(diagnosed):
     written = sorted(path.name for path in diagnosed.iterdir())
-    assert written == ["config.yaml", "gap.html", "gap.json", "twin.yaml"]
+    assert written == ["config.yaml", "gap.html", "gap.json", "next-run.yaml", "twin.yaml"]
     assert re.search("<h1>(Explained|Ambiguous)", (diagnosed / "gap.html").read_text(encoding="utf-8"))
+
+
+def test_the_next_run_is_a_programme_to_simulate(diagnosed, gap):
+    programme = load_programme(str(diagnosed / "next-run.yaml"))
+    assert math.isclose(programme.total_hours, gap["separating_run"]["hours"])
+    assert gap["separating_run"]["programme"] == (diagnosed / "next-run.yaml").read_text(encoding="utf-8")
 
 
 def test_gap_json_holds_every_key(gap):

@@ -1,0 +1,47 @@
+"""Programmes that show what runs so far could not."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import yaml
+
+from fogml.gap.programme_family import Design, Family
+from fogml.gap.rehearsal import Rehearsal, stage
+from fogml.gap.separating import LEAST_DISTANCE, distances, members_of
+from fogml.gap.showing import lengths, showing_run, usual_value
+from fogml.runs.facts import Facts
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.programme import load_programme
+from fogml.twin.twin_file import load_twin
+
+TWIN = load_twin("nominal")
+NOISE = NoiseModel(0.005, 0.01, 0.005)
+CONSTANTS = {"e0": 100.0, "k1": 10.0, "k2": 0.1, "b0": 1.0, "b1": 0.05, "b2": 5e-4, "g": 0.3, "m": 1.0}
+FACTS = Facts(latitude=39.9, input_axis="up")
+
+
+def test_lengths_are_those_of_a_search_for_separating_runs():
+    on, family = stage(TWIN, NOISE, CONSTANTS, facts=FACTS), Family()
+    rehearsal = Rehearsal(on, family, Design(rates=(0.5, 2.0, None), ladder="rates"))
+    values = [usual_value(on, id) for id in ("thermal_hysteresis", "sf_asymmetry")]
+    wanted = [distances(rehearsal, members_of(on, family, [value]))[0, 0] for value in values]
+    np.testing.assert_allclose(lengths(rehearsal, values), wanted, rtol=1e-6)
+
+
+def test_what_needs_turns_or_a_changed_temperature_gets_them():
+    ids = ["sf_asymmetry", "thermal_hysteresis", "coil_expansion", "sensor_quantisation"]
+    ask = {"facts": FACTS, "hours": 12.0, "most": 40}
+    found = showing_run(TWIN, NOISE, CONSTANTS, ids, **ask)
+    # An expansion of the coil is one with the nominal scale factor, and steps are read off a record.
+    assert found is not None and found.separates == ("sf_asymmetry", "thermal_hysteresis")
+    assert found.distance >= LEAST_DISTANCE and found.hours <= 12.0
+    text = "; ".join(found.steps)
+    assert "turn" in text and "ramp" in text
+    assert load_programme(yaml.safe_load(found.programme)).total_hours == pytest.approx(found.hours)
+    assert showing_run(TWIN, NOISE, CONSTANTS, ids, **ask) == found
+
+
+def test_where_no_programme_helps_none_is_told():
+    assert showing_run(TWIN, NOISE, CONSTANTS, ["coil_expansion"], facts=FACTS, most=10) is None
+    assert showing_run(TWIN, NOISE, CONSTANTS, ["sensor_quantisation"], facts=FACTS, most=10) is None
