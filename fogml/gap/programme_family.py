@@ -7,9 +7,11 @@ soaks, a minor loop, turns of the table, power steps. `Family.programme` writes 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
+
+import numpy as np
 
 from fogml.errors import InputError
 from fogml.twin.programme import Programme
@@ -174,8 +176,11 @@ class Family:
         )
         return tuple(found)
 
-    def neighbours(self, design: Design) -> list[Design]:
-        """Designs that differ in one choice; shortened elsewhere where that takes too long."""
+    def neighbours(self, design: Design, rng: np.random.Generator | None = None) -> Iterator[Design]:
+        """Designs that differ in one choice; shortened elsewhere where that takes too long.
+
+        In random order where `rng` is given. Each is worked out when its turn comes.
+        """
         changes: list[dict[str, Any]] = []
         for place in range(3):
             for rate in (None, *RAMP_RATES):
@@ -194,8 +199,12 @@ class Family:
             switches.append("cold_start")
         changes += [{name: value} for name in switches for value in (False, True)]
         changes += [{"mounting": mounting} for mounting in self.mountings]
-        near = dict.fromkeys(self.shortened(replace(design, **change)) for change in changes)
-        return [d for d in near if d is not None and d != design]
+        told: set[Design | None] = {None, design}
+        for place in range(len(changes)) if rng is None else rng.permutation(len(changes)):
+            near = self.shortened(replace(design, **changes[place]))
+            if near not in told:
+                told.add(near)
+                yield near  # type: ignore[misc]
 
     def shortened(self, design: Design) -> Design | None:
         """The design with shorter soaks, then without its later cycles, until it fits; None if it can't."""

@@ -91,12 +91,11 @@ def search(
         moved = True
         while moved and len(tried) < until:
             moved = False
-            near = family.neighbours(design)
-            for place in rng.permutation(len(near)):
+            for near in family.neighbours(design, rng):
                 if len(tried) >= until:
                     return
-                if value(near[place]) > best + _LEAST_GAIN:
-                    design, best, moved = near[place], value(near[place]), True
+                if value(near) > best + _LEAST_GAIN:
+                    design, best, moved = near, value(near), True
                     break
 
     starts = family.starts()
@@ -108,8 +107,7 @@ def search(
     for _ in range(RANDOM_STARTS):
         design = max(tried.values(), key=lambda t: t.worth).design
         for _ in range(RANDOM_CHANGES):
-            near = family.neighbours(design)
-            design = near[int(rng.integers(len(near)))]
+            design = next(family.neighbours(design, rng))
         climb(design, share)
     climb(max(tried.values(), key=lambda t: t.worth).design, most)
     return sorted(tried.values(), key=lambda t: (-t.worth, t.hours))
