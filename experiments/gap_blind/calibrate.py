@@ -45,7 +45,10 @@ def main() -> None:
 
 def _read(gap: dict, truth: Truth, named: list[Row], unknown: list[Row]) -> None:
     for item in gap["which"]:
-        features = named_features(item["margin"], item["form_share"], item["rest"])
+        if item["margin"] <= 0.0:
+            # The best explanation does without it, and it is not named whatever the constants are.
+            continue
+        features = named_features(item["margin"], item["form_share"], item["rest"], item["length"])
         named.append((features, bool(set(item["class"]) & truth.right_names)))
     if truth.kind != "wrong_thermal":
         odds = float(np.clip(gap["unknown"]["log_odds"], -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))

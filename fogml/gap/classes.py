@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from fogml.gap.confidence import named_probability, unknown_probability
+from fogml.gap.confidence import UNSURE, named_probability, unknown_probability
 from fogml.gap.evidence import log_sum_exp
 from fogml.gap.search import Chosen, Explanation, Search
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
@@ -19,8 +19,6 @@ FORM_SHARE = 0.01
 """Share of an effect's gain that may hang on details of its form."""
 UNEVEN = 0.03
 """Prior probability of an unknown in the noise."""
-NOT_IN_BEST = 0.49
-"""Largest probability of an effect that the best explanation does without."""
 LEAST_MARGIN = -1.5
 """Effects whose evidence has a smaller margin [nats] are not listed."""
 
@@ -119,7 +117,7 @@ def rank(
         chosen = next(c for c in with_it.effects if c.candidate == id)
         other = _ranked(search, with_it, chosen, (id,), whole, weights)
         # Named is what the best explanation holds, and what is fitted.
-        other = replace(other, probability=min(other.probability, NOT_IN_BEST))
+        other = replace(other, probability=min(other.probability, UNSURE))
         if other.margin >= LEAST_MARGIN:
             ranked.append(other)
     ranked.sort(key=lambda r: -r.probability)
@@ -183,4 +181,6 @@ def _ranked(
         margin = min(margin, math.log(max(probability, 1e-300)) - math.log(max(1.0 - probability, 1e-14)))
     rest = held.group[1] / chosen.length if held.unknown is not None and held.group is not None else 0.0
     share = search.form_share(held)
-    return Ranked(chosen, members, named_probability(margin, share, rest), margin, share, rest)
+    alone = len(held.effects) == 1 and held.unknown is None
+    named = named_probability(margin, share, rest, chosen.length, alone=alone)
+    return Ranked(chosen, members, named, margin, share, rest)

@@ -12,14 +12,19 @@ from collections.abc import Sequence
 
 SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
 LEAST_MARGIN = -3.0
+SMALL_LENGTH = 5.0
+FIRST_NAME = 1.0
+"""Least margin of an effect that nothing else is named beside [nats]: a false name costs more than none."""
+UNSURE = 0.49
+"""Largest probability of an effect that is not named for another reason."""
 LARGEST_LOG_ODDS = 12.0
-NAMED = (0.34, 0.45, 0.075, -2.83, -1.19)
+NAMED = (0.45, 0.65, 0.076, -1.4, -1.95, -0.62)
 """Logistic constants of a class's probability: constant, then one for each of `named_features`."""
-UNKNOWN = (-0.48, 0.374)
+UNKNOWN = (-0.62, 0.388)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 
 
-def named_features(margin: float, form_share: float, rest: float) -> tuple[float, ...]:
+def named_features(margin: float, form_share: float, rest: float, length: float) -> tuple[float, ...]:
     """What a finding's probability follows.
 
     Parameters
@@ -30,18 +35,27 @@ def named_features(margin: float, form_share: float, rest: float) -> tuple[float
         Share of the gain that needs other forms than the catalogue's.
     rest
         Length of what acts beside it over its own.
+    length
+        Its whitened length: of a large effect as many nats hang on details of its form.
     """
     return (
         min(max(margin, LEAST_MARGIN), SMALL_MARGIN),
         max(min(margin, LARGEST_MARGIN) - SMALL_MARGIN, 0.0),
         min(max(form_share, 0.0), 1.0),
         math.log1p(min(rest, 20.0)),
+        math.log(max(length, SMALL_LENGTH) / SMALL_LENGTH),
     )
 
 
-def named_probability(margin: float, form_share: float = 0.0, rest: float = 0.0) -> float:
-    """Probability that a class is right; for the parameters see `named_features`."""
-    return _logistic(NAMED, named_features(margin, form_share, rest))
+def named_probability(
+    margin: float, form_share: float = 0.0, rest: float = 0.0, length: float = 0.0, *, alone: bool = False
+) -> float:
+    """Probability that a class is right; for the parameters see `named_features`.
+
+    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none.
+    """
+    probability = _logistic(NAMED, named_features(margin, form_share, rest, length))
+    return min(probability, UNSURE) if alone and margin < FIRST_NAME else probability
 
 
 def unknown_probability(log_odds: float) -> float:

@@ -1,4 +1,4 @@
-"""Unknowns in time that are looked up in the data first: lines and steps.
+"""Unknowns in time that are looked up in the data first: lines, steady or swept, and steps.
 
 What is found is a group of the unknown like the others, at the price of having been looked for.
 """
@@ -13,6 +13,7 @@ import numpy as np
 from fogml.gap.frame import Frame
 from fogml.gap.group import Group, side_by_side
 from fogml.gap.observation import Observation
+from fogml.gap.swept import swept_group
 from fogml.runs.run import FloatArray
 
 MOST_LINES, MOST_STEPS = 3, 4
@@ -26,7 +27,7 @@ _FINER = 4
 
 
 def event_groups(frame: Frame) -> list[Group]:
-    """Lines and steps that stand out beside the constants.
+    """Lines, steady or swept, and steps that stand out beside the constants.
 
     Parameters
     ----------
@@ -35,8 +36,8 @@ def event_groups(frame: Frame) -> list[Group]:
     """
     rows = frame.without_constants(frame.residual[:, 0])
     left = [rows[run] for run in frame.runs]
-    steps = _steps(frame, left)
-    return _lines(frame, left) + ([] if steps is None else [steps])
+    others = (swept_group(frame, left), _steps(frame, left))
+    return _lines(frame, left) + [group for group in others if group is not None]
 
 
 def _lines(frame: Frame, left: Sequence[FloatArray]) -> list[Group]:

@@ -60,6 +60,9 @@ def found_effects(
                 members=r.members,
                 probability=r.probability,
                 margin=r.margin,
+                form_share=r.form_share,
+                rest=r.rest,
+                length=r.chosen.length,
                 amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
                 parameters={
                     q.name: Estimate(value.shape[q.name], float(errors.get(f"{id}.{q.name}", 0.0)), q.unit)

@@ -22,7 +22,8 @@ from fogml.gap.fisher import (
     usual_value,
 )
 from fogml.gap.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
-from fogml.gap.programme_family import Design, Family, Mounting
+from fogml.gap.programme_design import Design, Mounting
+from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, Rehearsed, Stage, Together, mounted, stage
 from fogml.gap.separating import Member, distances, least_distance, log_distance, members_of

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 
 HOUR_PRICE = 0.01
 """What an hour must pay: standard errors 1 % smaller, or distances 1 % longer."""

@@ -11,7 +11,8 @@ import numpy as np
 from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate
 from fogml.gap.observation import Observation, observe
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.facts import Facts

@@ -61,6 +61,8 @@ class Found:
         Share of the gain that needs another form than the catalogue's.
     rest
         Length of what acts beside it over its own.
+    length
+        Its whitened length on the fit runs, as the evidence takes it.
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -78,6 +80,7 @@ class Found:
     margin: float = 0.0
     form_share: float = 0.0
     rest: float = 0.0
+    length: float = 0.0
 
     @property
     def named(self) -> bool:

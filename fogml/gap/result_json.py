@@ -58,6 +58,7 @@ def _found(found: Found) -> dict[str, Any]:
         "margin": found.margin,
         "form_share": found.form_share,
         "rest": found.rest,
+        "length": found.length,
     }
 
 

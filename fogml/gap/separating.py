@@ -20,7 +20,8 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, EffectValue
-from fogml.gap.programme_family import Family, Mounting
+from fogml.gap.programme_design import Mounting
+from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.rehearsal import FINE_S, Rehearsal, Rehearsed, Stage, stage
 from fogml.gap.result import SeparatingRun

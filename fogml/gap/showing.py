@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.gap.model import EffectValue
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import finely, search
 from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, Stage, stage
 from fogml.gap.result import SeparatingRun

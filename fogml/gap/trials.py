@@ -84,7 +84,7 @@ def best_trial(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress)
         if trials[1].log_joint > trials[0].log_joint - REACH:
             trials += _again(trials[1], candidates, tell)
     best = max(trials, key=lambda t: t.log_joint)
-    if best.ranking.best.effects and best not in trials[2:]:
+    if best not in trials[2:]:
         again = _again(best, candidates, tell)
         trials += again
         best = again[0] if again else best

@@ -45,6 +45,24 @@ def test_a_line_is_found_at_its_period(period_s):
     assert search.explanation((), "unknown").group[0] == "line"
 
 
+@pytest.mark.parametrize(("first_s", "last_s"), [(2400.0, 600.0), (500.0, 1500.0)])
+def test_a_swept_oscillation_is_found_with_its_periods(first_s, last_s):
+    span = 20.0 * 899
+
+    def swept(t, name):
+        x = t - t[0]
+        cycles = x / first_s + 0.5 * (1.0 / last_s - 1.0 / first_s) * x**2 / span
+        return 0.15 * np.sin(2.0 * np.pi * cycles + (name == "b"))
+
+    frame = frame_with(swept)
+    group = next(g for g in event_groups(frame) if g.name == "swept")
+    told = [float(x) for x in re.search(r"from ([\d.e+]+) to ([\d.e+]+) s$", group.looks_like).groups()]
+    assert told == pytest.approx([first_s, last_s], rel=0.1)
+    search = search_of(frame)
+    assert best_gain(search, "swept") > group.price + 50.0
+    assert search.explanation((), "unknown").group[0] == "swept"
+
+
 @pytest.mark.parametrize(("run", "hours"), [("a", 1.2), ("b", 2.5)])
 def test_a_step_is_found_on_its_run_at_its_time(run, hours):
     frame = frame_with(lambda t, name: np.where((name == run) & (t - t[0] >= 3600.0 * hours), 0.6, 0.0))

@@ -14,7 +14,8 @@ from fogml.gap.model import EffectValue
 from fogml.gap.observation import observe
 from fogml.gap.plan import plan_runs
 from fogml.gap.plan_json import plan_values
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 from fogml.gap.rehearsal import Rehearsal, Together, stage
 from fogml.gap.run_whitener import LONGEST_RUNS, RunWhitener
 from fogml.gap.twin_model import TwinModel

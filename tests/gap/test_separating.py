@@ -10,7 +10,8 @@ import yaml
 
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 from fogml.gap.rehearsal import Rehearsal, stage
 from fogml.gap.separating import LEAST_DISTANCE, distances, members_of, separating_run
 from fogml.runs.facts import Facts

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import yaml
 
-from fogml.gap.programme_family import Design, Family
+from fogml.gap.programme_design import Design
+from fogml.gap.programme_family import Family
 from fogml.gap.rehearsal import Rehearsal, stage
 from fogml.gap.separating import LEAST_DISTANCE, distances, members_of
 from fogml.gap.showing import lengths, showing_run, usual_value
