@@ -1,0 +1,83 @@
+"""Several fits of the noise side by side: what each holds for likely counts in the probabilities."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.gap.classes import rank
+from fogml.gap.confidence import FIRST_NAME, named_probability
+from fogml.gap.model import EffectValue
+from fogml.gap.preparing import prepare
+from fogml.gap.trials import best_trial
+from fogml.signals.noise_model import NoiseModel
+from tests.gap.small_model import NOISE, SmallModel, noise_of, ramps, recorded
+
+
+def made(effects=(), noise=NOISE, seed=3, turns=(3, 4, 2)):
+    rng, model = np.random.default_rng(seed), SmallModel(ids=("bend", "cube"))
+    runs = [ramps(name, count=350, turns=t) for name, t in zip("abc", turns)]
+    done = [recorded(run, model, {"offset": 0.5}, effects, noise_of(run, rng, noise)) for run in runs]
+    return prepare(model, done[:2], done[2:], None)
+
+
+def trial(p):
+    return best_trial(p, p.model.candidates(), lambda what: None)
+
+
+CUBE = (EffectValue("cube", 0.6),)
+
+
+def test_a_rival_that_is_the_same_changes_nothing():
+    one = trial(made(CUBE))
+    again = rank(one.search, one.explanations, -math.inf, one.explanations)
+    alone = rank(one.search, one.explanations, -math.inf)
+    assert [(r.chosen, r.margin, r.probability) for r in again.effects] == [
+        (r.chosen, r.margin, r.probability) for r in alone.effects
+    ]
+    assert (again.unknown, again.nothing) == (alone.unknown, alone.nothing)
+
+
+@pytest.mark.parametrize("ahead", [-6.0, 2.0])
+def test_what_is_nothing_under_other_noise_takes_the_margin_off(ahead):
+    one = trial(made(CUBE))
+    best = one.explanations[0]
+    assert best.ids == {"cube"}
+    nothing = next(e for e in one.explanations if not e.ids and e.rest == "nothing")
+    rival = replace(nothing, log_posterior=best.log_posterior + ahead)
+    told = rank(one.search, one.explanations, -math.inf, [rival])
+    (cube,) = (r for r in told.effects if r.chosen.candidate == "cube")
+    # The search's own sets without it count beside the rival, so that the margin can only be less.
+    assert cube.margin <= -ahead + 1e-9
+    assert cube.margin == pytest.approx(-ahead, abs=0.2) or ahead < 0.0
+    with_it = sum(math.exp(e.log_posterior - best.log_posterior) for e in one.explanations if "cube" in e.ids)
+    without = sum(
+        math.exp(e.log_posterior - best.log_posterior)
+        for e in one.explanations
+        if "cube" not in e.ids and (e.ids or e.rest != "nothing")
+    )
+    share = math.exp(ahead) / (with_it + without + math.exp(ahead))
+    assert told.nothing == pytest.approx(share, rel=1e-6)
+
+
+def test_noise_that_was_taken_for_too_large_gives_the_effect_back():
+    plain = trial(made(CUBE, NoiseModel(0.02, 0.01, 0.01)))
+    assert plain.ranking.best.ids == {"cube"}
+    assert plain.prepared.noise.fit.model.B < 0.05
+
+
+def test_nothing_is_named_where_slow_noise_is_all_there_is():
+    loud = trial(made(noise=NoiseModel(NOISE.N, 20.0 * NOISE.B, 20.0 * NOISE.K)))
+    assert not any(r.probability >= 0.5 for r in loud.ranking.effects)
+    assert loud.ranking.nothing > 0.02
+
+
+def test_a_first_name_has_to_be_more_probable_than_none():
+    assert named_probability(FIRST_NAME - 0.01, alone=True) < 0.5 < named_probability(FIRST_NAME, alone=True)
+    assert named_probability(FIRST_NAME - 0.01) > 0.5
+    # As many nats of a longer effect, or beside more that is unexplained, say less.
+    assert named_probability(5.0, length=40.0) < named_probability(5.0, length=5.0)
+    assert named_probability(5.0, rest=1.0) < named_probability(5.0)
