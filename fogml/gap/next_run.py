@@ -14,6 +14,8 @@ from fogml.gap.starting import starting_values
 from fogml.gap.twin_model import TwinModel
 
 MOST_MEMBERS = 4
+MOST_PROGRAMMES = 300
+"""Programmes that a diagnosis tries for a class; `fogml plan` tries twice as many."""
 
 
 def next_run(
@@ -61,4 +63,5 @@ def next_run(
         seed=seed,
         progress=tell,
         facts=facts,
+        most=MOST_PROGRAMMES,
     )

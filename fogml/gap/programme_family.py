@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -152,27 +153,8 @@ class Family:
 
     def programme(self, design: Design, name: str = "planned") -> Programme:
         """The design as a programme."""
-        cold, hot = self.temperatures(design)
-        ends = (cold, hot) if design.first == "cold" else (hot, cold)
-        steps: list[Step] = [soak(ROOM_DEGC, design, opening=True)]
-        at, rate = ROOM_DEGC, RAMP_RATES[-2]
-        for rate in design.cycles:
-            for end in ends:
-                steps += leg(at, end, rate, design)
-                at = end
-        if design.minor_loop:
-            middle, reach = round(0.5 * (cold + hot)), round(MINOR_SHARE * (hot - cold))
-            for turning in (middle, middle - reach, middle + reach):
-                steps += leg(at, float(turning), RAMP_RATES[-2], replace(design, stops=0))
-                at = float(turning)
-        if at != ROOM_DEGC:
-            steps += [Ramp(ROOM_DEGC, rate), soak(ROOM_DEGC, design)]
-        return Programme(
-            steps,
-            name=name,
-            description=self.in_words(design),
-            powered=not design.cold_start,
-        )
+        written = _written(self, design)
+        return written if name == written.name else replace(written, name=name)
 
     def in_words(self, design: Design) -> str:
         """What the design does, in a line."""
@@ -208,3 +190,26 @@ class Family:
         if design.mounting is not None:
             words.append(f"input axis {design.mounting}")
         return "; ".join(words)
+
+
+@lru_cache(maxsize=256)
+def _written(family: Family, design: Design) -> Programme:
+    """The steps of a design; a search asks for the same ones several times."""
+    cold, hot = family.temperatures(design)
+    ends = (cold, hot) if design.first == "cold" else (hot, cold)
+    steps: list[Step] = [soak(ROOM_DEGC, design, opening=True)]
+    at, rate = ROOM_DEGC, RAMP_RATES[-2]
+    for rate in design.cycles:
+        for end in ends:
+            steps += leg(at, end, rate, design)
+            at = end
+    if design.minor_loop:
+        middle, reach = round(0.5 * (cold + hot)), round(MINOR_SHARE * (hot - cold))
+        for turning in (middle, middle - reach, middle + reach):
+            steps += leg(at, float(turning), RAMP_RATES[-2], replace(design, stops=0))
+            at = float(turning)
+    if at != ROOM_DEGC:
+        steps += [Ramp(ROOM_DEGC, rate), soak(ROOM_DEGC, design)]
+    return Programme(
+        steps, name="planned", description=family.in_words(design), powered=not design.cold_start
+    )
