@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import errno
 import os
+import secrets
 import shutil
-import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -32,6 +32,8 @@ def whole_file(path: str | Path) -> Iterator[Path]:
     path = Path(path)
     staging = _staging_folder(path.parent)
     try:
+        # Made within: an interrupt right after must find what cleans up.
+        _make(staging)
         partial = staging / path.name
         yield partial
         os.replace(partial, path)
@@ -66,6 +68,7 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
     staging = _staging_folder(home)
     content = staging / "content"
     try:
+        _make(staging)
         content.mkdir()
         yield content
         if not path.exists():
@@ -85,16 +88,23 @@ def whole_folder(path: str | Path) -> Iterator[Path]:
 
 
 def _staging_folder(home: Path) -> Path:
+    """A folder to be made beside an output."""
     if not home.is_dir():
         raise InputError(f"{home}: no such folder; create it first")
     if not os.access(home, os.W_OK | os.X_OK):
         raise InputError(f"{home}: no permission to write here; choose another place")
+    return home / f".partial-{secrets.token_hex(8)}"
+
+
+def _make(staging: Path) -> None:
     try:
-        return Path(tempfile.mkdtemp(prefix=".partial-", dir=home))
+        staging.mkdir(mode=0o700)
     except OSError as error:
         if error.errno in NO_ROOM:
-            raise _named(error, home) from error
-        raise InputError(f"{home}: cannot be written ({error.strerror}); choose another place") from error
+            raise
+        raise InputError(
+            f"{staging.parent}: cannot be written ({error.strerror}); choose another place"
+        ) from error
 
 
 def _named(error: OSError, path: Path) -> OSError:

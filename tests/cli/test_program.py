@@ -8,6 +8,11 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
+
+import pytest
+
+from fogml.outputs import whole_file, whole_folder
 
 PROGRAM = [sys.executable, "-c", "from fogml.cli.main import main; main()"]
 
@@ -69,3 +74,17 @@ def test_a_closed_pipe_is_no_traceback(run_files, tmp_path):
     shell = " ".join(f"'{part}'" for part in [*PROGRAM, "inspect", str(run_files[0])]) + " | true"
     found = subprocess.run(["bash", "-c", shell], capture_output=True, text=True, timeout=120)
     assert "Traceback" not in found.stderr
+
+
+@pytest.mark.parametrize("whole", [whole_file, whole_folder])
+def test_an_interrupt_while_the_staging_folder_is_made_leaves_nothing(whole, tmp_path, monkeypatch):
+    make = Path.mkdir
+
+    def interrupted(path, *args, **more):
+        make(path, *args, **more)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "mkdir", interrupted)
+    with pytest.raises(KeyboardInterrupt), whole(tmp_path / "out"):
+        pass
+    assert not list(tmp_path.iterdir())
