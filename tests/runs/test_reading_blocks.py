@@ -82,4 +82,5 @@ def test_memory_does_not_grow_with_the_file(tmp_path, suffix, least):
             for i in range(parts):
                 writer.write({"time [s]": np.arange(part) + i * part, "gyro [deg/h]": gyro, "T [degC]": gyro})
         peaks.append(peak_bytes(path, 50_000))
-    assert peaks[1] < 1.2 * peaks[0]
+    # How far Arrow reads ahead depends on what else the machine does; three times the file would be three.
+    assert peaks[1] < 1.8 * peaks[0]
