@@ -18,7 +18,6 @@ from fogml.gap.group import (
     EDGES_S,
     Group,
     Kind,
-    bumps,
     lag,
     shared_differences,
     side_by_side,
@@ -32,7 +31,7 @@ LAGS_S = (600.0, 1800.0, 5400.0, 16200.0)
 DECAYS_S = (120.0, 400.0, 1200.0, 3600.0, 10800.0)
 SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
 """Shortest half-period of each group of cosines in time [s]."""
-WAVES = 40
+KNOTS, WAVES = 9, 40
 PEAKS = 25
 """Places over the temperatures at which a peak of the response to its rate may lie."""
 MIXED = ("start", "time", "temperature", "temperature_rate", "direction", "past", "gradient", "table_rate")
@@ -55,13 +54,13 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
         half = 0.5 * (high - low)
         u = [(t - 0.5 * (low + high)) / half for t in temperatures]
         groups += [
-            ("temperature", "is a function of temperature", [bumps(x) for x in u]),
+            ("temperature", "is a function of temperature", [_bumps(x) for x in u]),
             ("temperature_fine", "is periodic in temperature, or jumps with it", [_waves(x) for x in u]),
             ("temperature_rate", "follows the rate of temperature", _rates(observations, u)),
             (
                 "temperature_rate_fine",
                 "follows the rate of temperature, more at some temperatures than at others",
-                [temperature_rate(o)[:, None] * bumps(x, PEAKS) for o, x in zip(observations, u)],
+                [temperature_rate(o)[:, None] * _bumps(x, PEAKS) for o, x in zip(observations, u)],
             ),
             ("direction", "follows the direction of temperature change", _directions(observations, u)),
             ("past", "remembers past temperatures", [_past(o, half) for o in observations]),
@@ -109,6 +108,12 @@ def _decays(observations: Sequence[Observation]) -> list[FloatArray]:
 def _drifts(o: Observation) -> FloatArray:
     hours = (o.time - o.time[0]) / 3600.0
     return np.column_stack([hours, hours**2 / 10.0, np.sqrt(hours), np.log1p(3.0 * hours)])
+
+
+def _bumps(u: FloatArray, count: int = KNOTS) -> FloatArray:
+    """Smooth bumps over places from -1 to 1, shape (m, count)."""
+    centres = np.linspace(-1.0, 1.0, count)
+    return np.exp(-0.5 * ((u[:, None] - centres) * (count - 1) / 2.0 / 0.9) ** 2)
 
 
 def _waves(u: FloatArray) -> FloatArray:

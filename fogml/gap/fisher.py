@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.model import EffectValue
+from fogml.gap.model import Candidate, EffectValue
 from fogml.gap.rehearsal import Rehearsed, Stage
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
@@ -140,11 +140,16 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
             f"effect '{id}' is a random error: no programme shows it better than a long static run; "
             "see fogml noise"
         )
-    held, grade = on.model.twin.settings.get(id), on.model.grade
-    shape = declared.default_shape(grade)
+    return stated_or_usual(on, declared)
+
+
+def stated_or_usual(on: Stage, declared: Candidate) -> EffectValue:
+    """An effect as the twin states it, else at the usual size and shape of its grade."""
+    held, grade = on.model.twin.settings.get(declared.id), on.model.grade
+    shape = {q.name: q.typical(grade) for q in declared.shape}
     if held is None:
-        return EffectValue(id, declared.amplitude.typical(grade), shape)
-    return EffectValue(id, held.amplitude, {name: held.shape[name] for name in shape})
+        return EffectValue(declared.id, declared.amplitude.typical(grade), shape)
+    return EffectValue(declared.id, held.amplitude, {name: held.shape[name] for name in shape})
 
 
 def responses(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:

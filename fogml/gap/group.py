@@ -15,7 +15,6 @@ EDGES_S = (30.0, 120.0, 600.0, 2400.0)
 """Time constants of what a change of rate or of another input leaves [s]."""
 BANDS_S = (30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0)
 """Time constants between which past temperatures are told apart [s]."""
-KNOTS = 9
 Kind = tuple[str, str, list[FloatArray]]
 """A group's name, what it looks like, and its columns on each run."""
 
@@ -76,9 +75,3 @@ def _differences(o: Observation) -> list[str]:
     if "T_out" not in held and "T2" in o.run.columns:
         held.insert(0, "T_out")
     return held
-
-
-def bumps(u: FloatArray, count: int = KNOTS) -> FloatArray:
-    """Smooth bumps over places from -1 to 1, shape (m, count)."""
-    centres = np.linspace(-1.0, 1.0, count)
-    return np.exp(-0.5 * ((u[:, None] - centres) * (count - 1) / 2.0 / 0.9) ** 2)

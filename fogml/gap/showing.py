@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from fogml.gap.fisher import stated_or_usual
 from fogml.gap.model import EffectValue
 from fogml.gap.programme_design import Design
 from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import finely, search
-from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, Stage, stage
+from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, stage
 from fogml.gap.result import SeparatingRun
 from fogml.gap.separating import LEAST_DISTANCE, run_of
 from fogml.runs.facts import Facts
@@ -70,7 +71,8 @@ def showing_run(
     """
     on = stage(twin, noise, constants, facts=facts)
     family = Family(hours, (-40.0, 60.0), ("up", "north") if facts is None else (None,), True)
-    usual = [usual_value(on, id) for id in ids if not getattr(on.candidate(id), "digitises", False)]
+    declared = [on.candidate(id) for id in ids]
+    usual = [stated_or_usual(on, one) for one in declared if not getattr(one, "digitises", False)]
     if not usual:
         return None
 
@@ -87,14 +89,6 @@ def showing_run(
     least = float(min(length for _, length in shown))
     run = run_of(family, finals[:1], [id for id, _ in shown], least, "showing-run")
     return replace(run, aim="show")
-
-
-def usual_value(on: Stage, id: str) -> EffectValue:
-    """An effect at its usual size and shape."""
-    candidate, grade = on.candidate(id), on.model.grade
-    return EffectValue(
-        id, candidate.amplitude.typical(grade), {q.name: q.typical(grade) for q in candidate.shape}
-    )
 
 
 def lengths(rehearsal: Rehearsal, values: Sequence[EffectValue]) -> FloatArray:

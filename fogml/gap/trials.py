@@ -52,6 +52,8 @@ class Trial:
 
     def beside(self, others: Sequence[Trial]) -> Trial:
         """The same with probabilities that count what other trials hold for likely."""
+        if not others:
+            return self
         rivals = [
             replace(e, log_posterior=e.log_posterior + other._log_runs - self._log_runs)
             for other in others
