@@ -7,33 +7,42 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.benchmarks.machine import describe_machine
-
 KINDS = ("studies", "jobs")
 SAME = ("processor", "cores", "memory_gb", "system", "python")
-"""What must be the same of the machine: figures of two machines in one table would mislead."""
+"""What is the same of one machine."""
 
 
 def kept_results(path: Path, *, quick: bool) -> dict[str, Any]:
-    """The results in a file, which were measured on this machine.
+    """The results in a file.
 
     Raises
     ------
     ValueError
-        If there are none, or they are of another machine or size.
+        If there are none, or they are of another size.
     """
     try:
         kept: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise ValueError(f"--merge: {path} holds no results ({error})") from None
-    here = describe_machine()
-    other = [name for name in SAME if kept["machine"][name] != here[name]]
-    if other:
-        told = ", ".join(f"{name} {kept['machine'][name]}, here {here[name]}" for name in other)
-        raise ValueError(f"--merge: {path} was measured on another machine: {told}; measure all jobs here")
     if kept["quick"] != quick:
         raise ValueError(f"--merge: {path} is of {'small' if kept['quick'] else 'full'} size")
     return kept
+
+
+def machines(results: Mapping[str, Any]) -> tuple[list[Mapping[str, Any]], dict[str, int]]:
+    """The machines that results come from, and each job's or study's place among them.
+
+    Both sides of a pair ran on the same one; times of two machines stand beside each other in no figure.
+    """
+    found: list[Mapping[str, Any]] = [results["machine"]]
+    places = {each["name"]: 0 for kind in KINDS for each in results.get(kind, [])}
+    for entry in results.get("merged", []):
+        held = [all(m[name] == entry["machine"][name] for name in SAME) for m in found]
+        if not any(held):
+            found.append(entry["machine"])
+            held.append(True)
+        places |= {name: held.index(True) for name in entry["jobs"] if name in places}
+    return found, places
 
 
 def merged(kept: Mapping[str, Any], new: Mapping[str, Any], order: Sequence[str]) -> dict[str, Any]:

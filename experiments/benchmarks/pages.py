@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from experiments.benchmarks.merging import machines
 from experiments.benchmarks.reasons import lost_pairs
 
 QUANTITIES = {"seconds": "s", "ratio": "×", "peak_mb": "MB"}
@@ -14,19 +15,22 @@ def results_page(results: Mapping[str, Any]) -> str:
     """Markdown of a ``results.json``."""
     machine = results["machine"]
     versions = ", ".join(f"{name} {number}" for name, number in machine["versions"].items())
+    marks = _machine_marks(results)
     lines = [
         "# Accuracy, speed and memory beside what a user would pick instead",
         "",
-        f"`{results['command']}` on {machine['processor']}, {machine['cores']} cores, "
-        f"{machine['memory_gb']} GB, {machine['system']}, Python {machine['python']}, {machine['date']}, "
+        f"`{results['command']}` on {_described(machine)}, {machine['date']}, "
         f"{_threads(machine)}{_note(results)}.",
         f"{versions}.",
     ]
     lines += [line for told in _measured_later(results) for line in ("", told)]
+    if marks:
+        lines += ["", *_machines(results)]
     for left in results["skipped"]:
         lines += ["", f"Skipped: {left['title']}, {left['reason']}."]
     for study in results.get("studies", []):
-        lines += ["", f"## {study['title'][0].upper()}{study['title'][1:]}", "", _section(study)]
+        title = f"{study['title'][0].upper()}{study['title'][1:]}{marks.get(study['name'], '')}"
+        lines += ["", f"## {title}", "", _section(study)]
     if results.get("studies"):
         lines += ["", "## Peers", "", *_peers()]
     if not results["jobs"]:
@@ -46,7 +50,7 @@ def results_page(results: Mapping[str, Any]) -> str:
     for job in results["jobs"]:
         memory = f"{job['peak_mb']:.0f} MB" if job["peak_mb"] is not None else ""
         lines.append(
-            f"| {job['title']} | {job['plain'].split(',')[0]} "
+            f"| {job['title']}{marks.get(job['name'], '')} | {job['plain'].split(',')[0]} "
             f"| {_seconds(job['ours_s'])} | {_seconds(job['plain_s'])} "
             f"| {job['ratio']['median']:.3g} | {memory} | {_limits(job)} |"
         )
@@ -93,9 +97,34 @@ def _note(results: Mapping[str, Any]) -> str:
     return f"; {results['note']}" if results.get("note") else ""
 
 
+def _described(machine: Mapping[str, Any]) -> str:
+    return (
+        f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB, "
+        f"{machine['system']}, Python {machine['python']}"
+    )
+
+
+def _machine_marks(results: Mapping[str, Any]) -> dict[str, str]:
+    """What stands behind a title to say which machine it was measured on; nothing for a single machine."""
+    found, places = machines(results)
+    return {name: f" ({_letter(i)})" for name, i in places.items()} if len(found) > 1 else {}
+
+
+def _machines(results: Mapping[str, Any]) -> list[str]:
+    found = machines(results)[0]
+    words = [f"{_letter(i)}: {_described(machine)}" for i, machine in enumerate(found)]
+    told = "; ".join(words)
+    return [f"Letters behind titles say the machine, the same for both sides of a pair. {told}."]
+
+
+def _letter(place: int) -> str:
+    return chr(ord("A") + place)
+
+
 def _measured_later(results: Mapping[str, Any]) -> list[str]:
     """How measurements that were merged in were made, where it differs from the rest."""
     versions = results["machine"]["versions"]
+    found, places = machines(results)
     names: dict[str, list[str]] = {}
     for entry in results.get("merged", []):
         machine = entry["machine"]
@@ -109,9 +138,10 @@ def _measured_later(results: Mapping[str, Any]) -> list[str]:
         told = f"; {', '.join(differs)}" if differs else ""
         quick = " --quick" if results["quick"] else ""
         command = f"`python -m experiments.benchmarks{quick} --merge --only NAME`"
-        how = f"{command}, {machine['date']}{told}{_note(entry)}"
+        letter = f", machine {_letter(places[entry['jobs'][0]])}" if len(found) > 1 else ""
+        how = f"{command}{letter}, {machine['date']}{told}{_note(entry)}"
         names.setdefault(how, []).extend(entry["jobs"])
-    return [f"Measured on the same machine by {how}: {', '.join(jobs)}." for how, jobs in names.items()]
+    return [f"Measured by {how}: {', '.join(jobs)}." for how, jobs in names.items()]
 
 
 def _seconds(spread: Mapping[str, Any]) -> str:

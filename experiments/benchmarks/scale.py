@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from experiments.benchmarks.merging import machines
 from fogml.outputs import whole_file
 
 HERE = Path(__file__).parent
@@ -118,6 +119,7 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
     load, server = load or Load(), server or Server()
     found, missing = costs(results, load)
     machine = results["machine"]
+    elsewhere = ", of other machines too," if len(machines(results)[0]) > 1 else ""
     lines = [
         "# Scale on paper",
         "",
@@ -128,8 +130,8 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
         f"experiments.benchmarks.scale` "
         f"from the measured costs in `results.json` ({machine['processor']}, {machine['date']}, "
         f"OMP_NUM_THREADS "
-        f"{machine.get('threads', 'all cores')}; what was merged later is told in `results.md`), taken as "
-        "core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was run "
+        f"{machine.get('threads', 'all cores')}; what was merged later{elsewhere} is told in `results.md`), "
+        "taken as core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was run "
         "at this size.",
     ]
     if missing:
