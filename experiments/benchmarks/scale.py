@@ -131,8 +131,8 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
         f"from the measured costs in `results.json` ({machine['processor']}, {machine['date']}, "
         f"OMP_NUM_THREADS "
         f"{machine.get('threads', 'all cores')}; what was merged later{elsewhere} is told in `results.md`), "
-        "taken as core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was run "
-        "at this size.",
+        "taken as core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was "
+        "run at this size.",
     ]
     if missing:
         lines += ["", f"Not measured, so not in the sums: {'; '.join(missing)}."]
