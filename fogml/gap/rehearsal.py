@@ -10,11 +10,11 @@ import numpy as np
 
 from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate
-from fogml.gap.observation import Observation, observe
+from fogml.gap.observation import observe
 from fogml.gap.programme_design import Design
 from fogml.gap.programme_family import Family
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.twin_model import TwinModel, TwinOnRun
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
@@ -40,8 +40,8 @@ class Stage:
     ----------
     model
         The twin with exact sensors, as a model that can be diagnosed.
-    reading
-        The same with the sensors that it has, whose noise tells how much rows weigh.
+    sensors
+        Those that it has, whose noise tells how much rows weigh.
     noise
         Of the gyro.
     values
@@ -55,7 +55,7 @@ class Stage:
     """
 
     model: TwinModel
-    reading: TwinModel
+    sensors: Sensors
     noise: NoiseModel
     values: Mapping[str, float]
     facts: Facts
@@ -99,7 +99,7 @@ def stage(
     ready = replace(twin, plant=plant)
     return Stage(
         TwinModel(replace(ready, sensors=Sensors())),
-        TwinModel(ready),
+        ready.sensors,
         noise,
         dict(values),
         DEFAULT_FACTS if facts is None else facts,
@@ -157,12 +157,12 @@ class Rehearsal(Rehearsed):
         sample_s = min(sample_s, max(math.floor(programme.total_s / LEAST_ROWS), 1.0))
         facts = mounted(on.facts, design)
 
-        def seen(model: TwinModel) -> Observation:
-            simulated = model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns)
-            return observe(simulated.run, model)
-
-        self.observation = seen(on.model)
-        self._whitener = RunWhitener(on.noise, seen(on.reading), on.values)
+        run = on.model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns).run
+        self.observation = observe(run, on.model)
+        replay = self.observation.model
+        assert isinstance(replay, TwinOnRun)
+        reading = replay.noise_of_sensors(on.sensors, on.values)
+        self._whitener = RunWhitener(on.noise, self.observation, on.values, reading)
         self.fixed = self._whitener.whiten(constant_rows(self.observation, on.model.constants))
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:

@@ -29,13 +29,24 @@ class RunWhitener:
         The run.
     constants
         At which the readings' noise is taken.
+    reading_noise
+        What the noise of the readings makes of the replay [deg/h], shape (n,); told from the readings if
+        None.
     """
 
-    def __init__(self, noise: NoiseModel, o: Observation, constants: Mapping[str, float]) -> None:
+    def __init__(
+        self,
+        noise: NoiseModel,
+        o: Observation,
+        constants: Mapping[str, float],
+        reading_noise: FloatArray | None = None,
+    ) -> None:
         # Flicker slower than a run sets runs of a unit apart by a constant.
         ladder = noise.ladder(o.row_s, LONGEST_RUNS * (float(o.time[-1] - o.time[0]) + o.row_s))
         self._whitener = Whitener(noise, o.time, o.row_s, ladder)
-        reading = np.sqrt(o.averaged(o.model.reading_noise(constants) ** 2) / o.width)
+        if reading_noise is None:
+            reading_noise = o.model.reading_noise(constants)
+        reading = np.sqrt(o.averaged(reading_noise**2) / o.width)
         self.weights: FloatArray = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
 
     @property

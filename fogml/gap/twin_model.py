@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
@@ -32,6 +33,7 @@ from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import Replayer, inputs_of_run
+from fogml.twin.set_up import Sensors
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
 
@@ -228,13 +230,32 @@ class TwinOnRun:
         Shape (n,) [deg/h]; the readings' noise is told from their second differences, and from
         their least step.
         """
-        slopes = temperature_slopes(self._recorded.afresh(), NominalConstants(**dict(constants)))
-        variance = np.zeros(len(self._recorded))
-        for name, slope in slopes.items():
+        noise = {}
+        for name in self._slopes(constants):
             place = self._recorded.place(name)
             if place is not None:
-                variance += (slope * reading_noise(self._recorded.temperatures[place])) ** 2
+                noise[name] = reading_noise(self._recorded.temperatures[place])
+        return self._noise_through(noise, constants)
+
+    def noise_of_sensors(self, sensors: Sensors, constants: Mapping[str, float]) -> FloatArray:
+        """The same of sensors with stated errors: their noise and their last digit."""
+        noise = {}
+        for name in self._slopes(constants):
+            place = self._recorded.place(name)
+            if place is not None:
+                errors = sensors.of(place)
+                noise[name] = math.hypot(errors.noise, errors.resolution / math.sqrt(12.0))
+        return self._noise_through(noise, constants)
+
+    def _noise_through(self, noise: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
+        slopes = self._slopes(constants)
+        variance = np.zeros(len(self._recorded))
+        for name, degC in noise.items():
+            variance += (slopes[name] * degC) ** 2
         return np.sqrt(variance)
+
+    def _slopes(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
+        return temperature_slopes(self._recorded.afresh(), NominalConstants(**dict(constants)))
 
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """What sensors of ordinary quality make of the replay [deg/h], shape (n,).
