@@ -11,6 +11,7 @@ from fogml.gap.assumptions import assumptions
 from fogml.gap.describe import describe_unknown
 from fogml.gap.found import found_effects
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
+from fogml.gap.left_out import doubted, with_look_alikes
 from fogml.gap.model import Candidate, GyroModel
 from fogml.gap.next_run import next_run
 from fogml.gap.preparing import Prepared, Progress, prepare
@@ -89,20 +90,26 @@ def _diagnosed(
     tell: Progress,
 ) -> Diagnosis:
     model = as_model(twin)
-    candidates = _candidates(model, without)
+    candidates, left_out = _candidates(model, without)
     trial = best_trial(prepare(model, fit, held_out, noise, tell), candidates, tell)
-    return _result(trial, candidates, seed, plan, tell)
+    return _result(trial, candidates, left_out, seed, plan, tell)
 
 
 def _result(
-    trial: Trial, candidates: Mapping[str, Candidate], seed: int, plan: bool, tell: Progress
+    trial: Trial,
+    candidates: Mapping[str, Candidate],
+    left_out: Mapping[str, Candidate],
+    seed: int,
+    plan: bool,
+    tell: Progress,
 ) -> Diagnosis:
     p, basis, search, ranking = trial.prepared, trial.basis, trial.search, trial.ranking
     tell("fitting what was found")
     found, fits = found_effects(p, candidates, search, ranking)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
+    found = with_look_alikes(search, ranking.best, found, left_out, p.model.grade)
     looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
-    unknown = Unknown(ranking.unknown, looks_like, ranking.log_odds)
+    unknown = doubted(Unknown(ranking.unknown, looks_like, ranking.log_odds), found)
     verdict = _verdict(found, unknown, ranking.nothing)
     if verdict == "unknown":
         found = ()
@@ -154,8 +161,11 @@ def as_model(twin: Twin | GyroModel) -> GyroModel:
     return twin
 
 
-def _candidates(model: GyroModel, without: Iterable[str]) -> dict[str, Candidate]:
-    candidates = dict(model.candidates())
+def _candidates(
+    model: GyroModel, without: Iterable[str]
+) -> tuple[dict[str, Candidate], dict[str, Candidate]]:
+    """What may be named, and what the model offers besides."""
+    candidates, left_out = dict(model.candidates()), {}
     for id in without:
         if id not in candidates:
             from fogml.twin.registry import effects
@@ -163,8 +173,8 @@ def _candidates(model: GyroModel, without: Iterable[str]) -> dict[str, Candidate
             if id not in effects():
                 raise InputError(f"--without {id}: there is no such effect; `fogml effects` lists them")
             continue
-        del candidates[id]
-    return candidates
+        left_out[id] = candidates.pop(id)
+    return candidates, left_out
 
 
 __all__ = ["AVERAGING_S", "HowFar", "Prepared", "averages", "diagnose", "prepare"]

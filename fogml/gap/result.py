@@ -63,6 +63,8 @@ class Found:
         Length of what acts beside it over its own.
     length
         Its whitened length on the fit runs, as the evidence takes it.
+    left_out
+        Ids of effects that are no candidates, and that look like it.
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -81,6 +83,7 @@ class Found:
     form_share: float = 0.0
     rest: float = 0.0
     length: float = 0.0
+    left_out: tuple[str, ...] = ()
 
     @property
     def named(self) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
@@ -51,12 +51,14 @@ class TwinModel:
     ----------
     twin
         The twin to start from; effects that are on in it are part of it and no candidates.
+    lacks
+        Ids of effects that the catalogue is taken not to hold: as if nobody knew of them.
     """
 
     memory_s = 2.0 * DELTA_WINDOW_S
 
-    def __init__(self, twin: Twin) -> None:
-        self.twin = twin
+    def __init__(self, twin: Twin, lacks: Iterable[str] = ()) -> None:
+        self.twin, self._lacks = twin, frozenset(lacks)
         self.name = twin.name
         self.grade = twin.grade
 
@@ -78,7 +80,7 @@ class TwinModel:
         return {
             id: AS_CANDIDATE[id](declared) if id in AS_CANDIDATE else declared
             for id, declared in effects().items()
-            if declared.candidate and id not in on and not on & set(declared.conflicts)
+            if declared.candidate and id not in on | self._lacks and not on & set(declared.conflicts)
         }
 
     def on(self, run: Run) -> TwinOnRun:

@@ -51,18 +51,21 @@ def load_method(text: str) -> Method:
 
 
 def diagnosis(case: CaseFiles, out: Path) -> Any:
-    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page."""
-    from fogml.gap.diagnosis import as_model, diagnose
+    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page.
+
+    What is withheld is nothing that its catalogue holds: not even as a doubt about what looks like it.
+    """
+    from fogml.gap.diagnosis import diagnose
+    from fogml.gap.twin_model import TwinModel
     from fogml.runs.reading import read_run
     from fogml.twin.twin_file import load_twin
 
-    model = as_model(load_twin("nominal"))
+    model = TwinModel(load_twin("nominal"), case.without)
     found = diagnose(
         model,
         [read_run(path) for path in case.fit],
         [read_run(path) for path in case.held_out],
         noise=read_run(case.noise) if case.noise else None,
-        without=case.without,
         seed=case.seed,
         plan=False,
     )
