@@ -135,7 +135,8 @@ class Conditioned:
             rows = self._scale[:, None] * gram[self._columns]
             inner = np.eye(k) + rows[:, self._columns] * self._scale
             self._factor = np.linalg.cholesky(0.5 * (inner + inner.T))
-            self.half = solve_triangular(self._factor, rows, lower=True)
+            # Its few rows are inverted once: the product with thousands of columns is the faster then.
+            self.half = solve_triangular(self._factor, np.eye(k), lower=True, check_finite=False) @ rows
             log_det = float(np.log(np.diag(self._factor)).sum())
         else:
             self.half = np.zeros((0, len(gram)))

@@ -18,6 +18,7 @@ from typing import Literal
 import numpy as np
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
+from fogml.gap.group_gains import group_gains
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 from fogml.gap.unlike import Unlike
 
@@ -206,7 +207,7 @@ class Search:
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
         held = self.field_.condition(self._terms(effects, None))
-        gains = np.array([group_gains(held, name)[fit] for name in names])
+        gains = group_gains(held, names, LENGTHS[fit])
         prices = np.array([self.field_.basis.kinds[name].price for name in names]) + math.log(len(names))
         weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
         if rest == "unknown" and last:
@@ -261,21 +262,3 @@ class Search:
 def _form_room(effects: Sequence[Chosen]) -> float:
     """Largest whitened length of a rest that is no more than a matter of form."""
     return FORM_ROOM * max((c.length for c in effects), default=0.0)
-
-
-def group_gains(held: Conditioned, name: str) -> np.ndarray:
-    """Gain in log evidence of a group of the unknown at each length, shape (lengths,)."""
-    places = held.field.basis.groups[name]
-    # A group's columns stand on their main axes: its inner products beside the constants are diagonal.
-    sizes = np.diagonal(held.field.gram)[places]
-    across = held.half[:, places]
-    fit = held.field.gram[places, 0] - across.T @ held.half[:, 0]
-    squares = LENGTHS[:, None] ** 2
-    weights = squares / (1.0 + squares * sizes)
-    weighed = across[None] * weights[:, None, :]
-    factor = np.linalg.cholesky(np.eye(len(across)) - weighed @ across.T)
-    half = np.linalg.solve(factor, (weighed @ fit)[:, :, None])[:, :, 0]
-    squared = (weights * fit**2).sum(axis=1) + (half**2).sum(axis=1)
-    log_det = np.log1p(squares * sizes).sum(axis=1)
-    log_det += 2.0 * np.log(np.diagonal(factor, axis1=1, axis2=2)).sum(axis=1)
-    return np.asarray(0.5 * (squared - log_det))

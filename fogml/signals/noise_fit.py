@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
-from fogml.signals.noise_fit_data import FitData, Level, fit_data
+from fogml.signals.noise_fit_data import FitData, Level, Part, fit_data
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.noise_terms import FLICKER_FLOOR
 from fogml.signals.whitening import Whitener
@@ -147,6 +147,7 @@ def fit_noise(
     centre = np.array([getattr(prior.centre, name) for name in NAMES])
     free = np.flatnonzero(centre > 0.0)
     spread = prior.deviations[free]
+    data = _orthonormal(data, prior.centre)
 
     def objective(units: FloatArray) -> float:
         """Negative log posterior at so many prior standard deviations from the centre."""
@@ -176,16 +177,42 @@ def _scaled(model: NoiseModel, factors: FloatArray) -> NoiseModel:
 
 def _log_likelihood(data: FitData, model: NoiseModel) -> float:
     """Restricted log-likelihood up to a constant."""
+    from scipy.linalg import solve_triangular
+
     total = _levels_log_likelihood(data.levels, model)
-    whitened = []
+    # Rows that the priors of the constants add belong to the columns.
+    gram = data.prior_rows.T @ data.prior_rows
     for part in data.parts:
-        whitener = Whitener(model, part.time, part.averaging_s, part.ladder)
-        whitened.append(whitener.whiten(part.table))
+        whitener, white = _whitened(part, model)
+        gram += white.T @ white
         total -= whitener.log_det
-    # Rows that the priors of the constants add, and the columns' own root.
-    root = np.linalg.qr(np.vstack((*whitened, data.prior_rows)), mode="r")
-    diagonal = np.abs(np.diag(root))
-    return total - 0.5 * float(diagonal[-1] ** 2) - float(np.sum(np.log(diagonal[:-1])))
+    root = np.linalg.cholesky(gram[:-1, :-1])
+    along = solve_triangular(root, gram[:-1, -1], lower=True)
+    square = max(float(gram[-1, -1] - along @ along), 0.0)
+    return total - 0.5 * square - float(np.sum(np.log(np.diag(root)))) - data.log_det
+
+
+def _whitened(part: Part, model: NoiseModel) -> tuple[Whitener, FloatArray]:
+    whitener = Whitener(model, part.time, part.averaging_s, part.ladder)
+    return whitener, whitener.whiten(part.table)
+
+
+def _orthonormal(data: FitData, model: NoiseModel) -> FitData:
+    """The same with columns that are orthonormal, and values beside them, when whitened by a model.
+
+    By other models they are nearly so: then inner products tell as much as the columns themselves.
+    """
+    from scipy.linalg import solve_triangular
+
+    whitened = [_whitened(part, model)[1] for part in data.parts]
+    root = np.array(np.linalg.qr(np.vstack((*whitened, data.prior_rows)), mode="r"))
+    # Values keep their size, also where the columns hold all of them.
+    last = float(root[-1, -1]) or 1.0
+    root[-1, -1] = last
+    change = solve_triangular(root, np.diag([*np.ones(len(root) - 1), last]))
+    parts = tuple(replace(part, table=part.table @ change) for part in data.parts)
+    log_det = float(np.sum(np.log(np.abs(np.diag(root)[:-1]))))
+    return replace(data, parts=parts, prior_rows=data.prior_rows @ change, log_det=log_det)
 
 
 def _levels_log_likelihood(levels: Sequence[Level], model: NoiseModel) -> float:

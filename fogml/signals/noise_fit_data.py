@@ -63,12 +63,15 @@ class FitData:
         Differences at every level, for a first look.
     prior_rows
         Rows that the priors of constants add to the columns, shape (r, p + 1).
+    log_det
+        Logarithm of the volume that the given columns span in the frame of the present ones.
     """
 
     parts: tuple[Part, ...]
     levels: tuple[Level, ...]
     glance: tuple[Level, ...]
     prior_rows: FloatArray
+    log_det: float = 0.0
 
 
 def fit_data(

@@ -97,8 +97,10 @@ class Twin:
             for other in declared.conflicts:
                 if other in self.settings:
                     raise InputError(f"effects '{id}' and '{other}' can't be on at the same time; remove one")
-        order = {id: place for place, id in enumerate(effects())}
-        ordered = dict(sorted(settings.items(), key=lambda item: order[item[0]]))
+        ordered = settings
+        if len(settings) > 1:
+            order = {id: place for place, id in enumerate(effects())}
+            ordered = dict(sorted(settings.items(), key=lambda item: order[item[0]]))
         object.__setattr__(self, "settings", MappingProxyType(ordered))
         factors = dict.fromkeys(("N", "B", "K"), NOISE_FACTOR) | dict(self.noise_factor)
         object.__setattr__(self, "noise_factor", MappingProxyType(factors))

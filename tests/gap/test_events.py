@@ -10,9 +10,10 @@ import pytest
 from fogml.gap.basis import build_basis
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field
+from fogml.gap.group_gains import group_gains
 from fogml.gap.near_library import near_library
 from fogml.gap.priors import LENGTHS
-from fogml.gap.search import Search, group_gains
+from fogml.gap.search import Search
 from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded
 
 
@@ -31,7 +32,7 @@ def search_of(frame):
 
 
 def best_gain(search, name):
-    return float(group_gains(search.field_.condition([]), name).max())
+    return float(group_gains(search.field_.condition([]), [name])[0].max())
 
 
 @pytest.mark.parametrize("period_s", [300.0, 777.0, 1300.0])
@@ -97,4 +98,4 @@ def test_gains_of_a_group_are_those_of_the_dense_formula():
             inner = np.eye(len(places)) + length**2 * gram
             squared = length**2 * fit @ np.linalg.solve(inner, fit)
             dense.append(0.5 * (squared - np.linalg.slogdet(inner)[1]))
-        assert group_gains(held, name) == pytest.approx(dense, rel=1e-6, abs=1e-6)
+        assert group_gains(held, [name])[0] == pytest.approx(dense, rel=1e-6, abs=1e-6)

@@ -1,0 +1,55 @@
+"""What each group of the unknown gains beside a set of effects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from fogml.gap.evidence import Conditioned
+from fogml.gap.priors import LENGTHS
+from fogml.runs.run import FloatArray
+
+
+def group_gains(held: Conditioned, names: Sequence[str], lengths: FloatArray = LENGTHS) -> FloatArray:
+    """Gain in log evidence of groups of the unknown at each length, shape (groups, lengths).
+
+    With s the inner products of a group's columns beside the constants, which are diagonal, H those of the
+    terms, of which the field keeps the whitened half, and w = l^2 / (1 + l^2 s) for a length l ::
+
+        gain = 1/2 (sum w b^2 + v' M^-1 v - sum log(1 + l^2 s) - log det M)
+        M = 1 - H w H',   v = H w b
+
+    where b are the columns' inner products with the data beside constants and terms.
+
+    Parameters
+    ----------
+    held
+        The field with a set of effects integrated out.
+    names
+        Of the groups.
+    lengths
+        Standard deviations of each coefficient.
+    """
+    gram, k, count = held.field.gram, len(held.half), len(lengths)
+    sizes = np.diagonal(gram)
+    squares = lengths[:, None] ** 2
+    inner = np.empty((len(names), count, k, k))
+    sides = np.empty((len(names), count, k))
+    gains = np.empty((len(names), count))
+    for i, name in enumerate(names):
+        places = held.field.basis.groups[name]
+        wider = 1.0 + squares * sizes[places]
+        weights = squares / wider
+        across = held.half[:, places]
+        fit = gram[places, 0] - across.T @ held.half[:, 0]
+        weighed = (weights[:, None, :] * across).reshape(count * k, len(places))
+        inner[i] = (weighed @ across.T).reshape(count, k, k)
+        sides[i] = (weighed @ fit).reshape(count, k)
+        gains[i] = weights @ fit**2 - np.log(wider).sum(axis=1)
+    if k:
+        inner = np.eye(k) - inner
+        gains += np.einsum("glk,glk->gl", sides, np.linalg.solve(inner, sides[..., None])[..., 0])
+        factors = np.linalg.cholesky(inner)
+        gains -= 2.0 * np.log(np.diagonal(factors, axis1=2, axis2=3)).sum(axis=2)
+    return np.asarray(0.5 * gains)
