@@ -13,7 +13,7 @@ from collections.abc import Sequence
 SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
 LEAST_MARGIN = -3.0
 SMALL_LENGTH = 5.0
-FIRST_NAME = 1.0
+FIRST_NAME = 1.5
 """Least margin of an effect that nothing else is named beside [nats]: a false name costs more than none."""
 UNSURE = 0.49
 """Largest probability of an effect that is not named for another reason."""

@@ -34,6 +34,9 @@ SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
 KNOTS, WAVES = 9, 40
 PEAKS = 25
 """Places over the temperatures at which a peak of the response to its rate may lie."""
+PRICES = {"gradient": 3.0}
+"""Of kinds that the catalogue is full of [nats]: sensors and heat flow between nodes make such differences,
+and one of those effects in another form is likelier there than a cause that nobody knows."""
 MIXED = ("start", "time", "temperature", "temperature_rate", "direction", "past", "gradient", "table_rate")
 """Groups that may act together."""
 
@@ -74,7 +77,7 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
     drives = _drives(observations)
     if drives is not None:
         groups.append(drives)
-    held = [Group(name, words, tuple(columns)) for name, words, columns in groups]
+    held = [Group(name, words, tuple(columns), PRICES.get(name, 0.0)) for name, words, columns in groups]
     mixed = [g for g in held if g.name in MIXED]
     together = tuple(np.concatenate([g.columns[r] for g in mixed], axis=1) for r in range(len(observations)))
     words = "follows temperature, its rate and its past in a way of its own"
