@@ -13,7 +13,9 @@ from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.model import Candidate, EffectValue
 from fogml.gap.result import Estimate, Found
 from fogml.gap.search import Search
+from fogml.gap.shapes import is_angle
 from fogml.gap.starting import starting_values
+from fogml.twin.quantities import Quantity
 
 if TYPE_CHECKING:
     from fogml.gap.classes import Ranked, Ranking
@@ -21,6 +23,7 @@ if TYPE_CHECKING:
 
 FORM_ERROR = 0.12
 """What an amplitude may differ by because no form is known exactly, of its size."""
+FULL_TURN_DEG = 360.0
 
 
 def found_effects(
@@ -49,9 +52,11 @@ def found_effects(
         id, declared = r.chosen.candidate, candidates[r.chosen.candidate]
         value = fitted.get(id)
         se = float(errors.get(f"{id}.amplitude", 0.0))
+        shape_errors = {q.name: float(errors.get(f"{id}.{q.name}", 0.0)) for q in declared.shape}
         if value is None or se == 0.0:
             # Not fitted, or a line of any phase, which a replay can't show.
             value, se = _rough(r, search, candidates)
+            shape_errors = {q.name: _spread(r, search, q) for q in declared.shape if q.name in value.shape}
         se = math.hypot(se, FORM_ERROR * value.amplitude)
         found.append(
             Found(
@@ -65,7 +70,7 @@ def found_effects(
                 length=r.chosen.length,
                 amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
                 parameters={
-                    q.name: Estimate(value.shape[q.name], float(errors.get(f"{id}.{q.name}", 0.0)), q.unit)
+                    q.name: Estimate(value.shape[q.name], shape_errors[q.name], q.unit)
                     for q in declared.shape
                     if q.name in value.shape
                 },
@@ -86,3 +91,18 @@ def _rough(ranked: Ranked, search: Search, candidates: Mapping[str, Candidate]) 
     low, high = declared.amplitude.limits
     shape = {q.name: node.node.shape[q.name] for q in declared.shape if q.name in node.node.shape}
     return EffectValue(declared.id, float(np.clip(sign * length * node.size, low, high)), shape), node.size
+
+
+def _spread(ranked: Ranked, search: Search, quantity: Quantity) -> float:
+    """Standard error of a shape parameter by the evidence of the candidate's nodes, beside nothing else."""
+    nodes, places = search.field_.basis.nodes, search.places[ranked.chosen.candidate]
+    chosen, name = nodes[ranked.chosen.node].node, quantity.name
+    if is_angle(quantity) and len({draw.get(name) for draw in chosen.draws}) > 1:
+        return FULL_TURN_DEG / math.sqrt(12.0)
+    apart = np.abs(np.array([nodes[i].node.shape.get(name, math.nan) for i in places]) - chosen.shape[name])
+    gains = search.field_.condition([]).node_gains(places)[places].max(axis=1)
+    weights = np.exp(gains - gains.max())
+    among = float(weights @ apart**2 / weights.sum())
+    # Between two nodes the parameter may be anywhere.
+    step = float(apart[apart > 0.0].min()) if np.any(apart > 0.0) else 0.0
+    return math.sqrt(among + step**2 / 12.0)

@@ -64,11 +64,12 @@ def doubted(unknown: Unknown, found: Sequence[Found]) -> Unknown:
     shares = [f.probability * len(f.left_out) / len({*f.members, *f.left_out}) for f in found if f.left_out]
     if not shares:
         return unknown
-    known = (1.0 - unknown.probability) * math.prod(1.0 - share for share in shares)
+    doubt = 1.0 - math.prod(1.0 - share for share in shares)
     names = ", ".join(dict.fromkeys(id for f in found for id in f.left_out))
     words = f"may be {names}, left out of the candidates, in place of what is named"
-    looks_like = f"{unknown.looks_like}; {words}" if unknown.looks_like else words
-    return replace(unknown, probability=1.0 - known, looks_like=looks_like)
+    if unknown.probability > doubt and unknown.looks_like:
+        words = f"{unknown.looks_like}; {words}"
+    return replace(unknown, probability=1.0 - (1.0 - unknown.probability) * (1.0 - doubt), looks_like=words)
 
 
 def _signatures(search: Search, best: Explanation) -> dict[str, FloatArray]:

@@ -67,3 +67,12 @@ def test_an_unlike_effect_or_one_that_nobody_knows_of_gives_no_doubt(lines):
     assert [f.effect for f in unheard_of.named] == ["sinusoidal"]
     for told in (unlike, unheard_of):
         assert told.named[0].left_out == () and told.unknown.probability < 0.4
+
+
+def test_a_lines_frequency_is_known_to_a_share_of_its_resolution(lines):
+    """A replay can't show a line of any phase: the frequency is as exact as the periodogram tells it."""
+    (one,) = diagnosed(lines, TwinModel(TWIN, ["supply_ripple"])).named
+    frequency, phase = one.parameters["frequency"], one.parameters["phase"]
+    resolution = 1.0 / lines[0].span_s
+    assert abs(frequency.value - 1.0 / 600.0) < 3.0 * frequency.se < resolution
+    assert phase.se == pytest.approx(360.0 / 12.0**0.5)
