@@ -8,6 +8,7 @@ from fogml.gap.how_far import FORM_LEFT
 from fogml.gap.noise import SAFE_SIDE
 from fogml.gap.preparing import Prepared
 from fogml.gap.priors import SLACK
+from fogml.gap.row_responses import LARGEST_SHARE
 from fogml.gap.unlike import RELATIVE
 
 
@@ -32,6 +33,11 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
     if widths:
         listed = ", ".join(f"{name}: {width:g} s" for name, width in widths.items())
         said.append(f"Long runs were averaged before the search ({listed}); faster effects can't be seen.")
+    if any(o.responses.on_means for o in p.fit):
+        said.append(
+            "There the responses of slow effects were taken on averaged inputs, for the search, where that "
+            f"changed them by at most {100.0 * LARGEST_SHARE:g}% of their rms at the usual shapes."
+        )
     if len(p.fit) == 1:
         said.append(f"One run only ({fitted}): nothing that differs between runs can be told.")
     if not any(o.run.earth_known for o in p.fit):

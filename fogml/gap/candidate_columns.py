@@ -68,9 +68,7 @@ def candidate_columns(
     can do, scaled to a length of 1 beside the constants.
     """
     widest = max(frame.observations, key=lambda o: float(np.ptp(o.temperature)))
-    nodes = grid(
-        candidate, grade, lambda s: widest.model.response(candidate.id, s, frame.values), frame.spans
-    )
+    nodes = grid(candidate, grade, lambda s: widest.response(candidate.id, s, frame.values), frame.spans)
     count = len(nodes)
     nodes = tuple(nodes[i] for i in screening.lines(nodes))
     columns = frame.responses(candidate.id, [shape for node in nodes for shape in node.draws])

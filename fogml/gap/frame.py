@@ -62,15 +62,15 @@ class Frame:
 
     def responses(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of a candidate at several shapes, shape (n, shapes)."""
-        return self.white(self.rows(lambda o, s: o.model.response(id, s, self.values), shapes))
+        return self.white(self.rows(lambda o, s: o.response(id, s, self.values), shapes))
 
     def rows(
         self,
         of: Callable[[Observation, Mapping[str, float]], FloatArray],
         shapes: Sequence[Mapping[str, float]],
     ) -> list[FloatArray]:
-        """Series over the samples of each run, averaged to rows, shape (m_r, shapes)."""
-        return [np.column_stack([o.averaged(of(o, shape)) for shape in shapes]) for o in self.observations]
+        """Rows of each run at several shapes, shape (m_r, shapes)."""
+        return [np.column_stack([of(o, shape) for shape in shapes]) for o in self.observations]
 
     @cached_property
     def residual(self) -> FloatArray:

@@ -7,11 +7,14 @@ the twin in this form.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.quantities import Quantity
@@ -86,7 +89,14 @@ class Candidate(Protocol):
         """Id of a look-alike to what separates the two; may be empty."""
 
 
-class ModelOnRun(Protocol):
+class Responding(Protocol):
+    """What gives responses of candidates."""
+
+    def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
+        """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
+
+
+class ModelOnRun(Responding, Protocol):
     """A model with the inputs that one run recorded."""
 
     def columns(self) -> Mapping[str, FloatArray]:
@@ -107,9 +117,6 @@ class ModelOnRun(Protocol):
         The names must be the same on every run that has them.
         """
 
-    def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
-        """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
-
 
 @runtime_checkable
 class OtherOrders(Protocol):
@@ -119,6 +126,27 @@ class OtherOrders(Protocol):
         self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
     ) -> list[FloatArray]:
         """A candidate's response with other thermal orders, shape (n,) each; empty where all are alike."""
+
+
+@runtime_checkable
+class Decimating(Protocol):
+    """A `ModelOnRun` that also gives responses on means over blocks of samples."""
+
+    def shapes_to_compare(self, id: str) -> Sequence[Mapping[str, float]]:
+        """Shapes at which a response on means has to agree with the mean of the response over samples.
+
+        None where a candidate may change within a block, or there is nothing to gain. A candidate that
+        has some must not depend on the constants.
+        """
+
+    def on_means(self, starts: NDArray[np.intp]) -> Responding:
+        """The model on block means of its inputs: responses have shape (b,).
+
+        Parameters
+        ----------
+        starts
+            First sample of each block, shape (b,), from 0 on; a block ends where the next one starts.
+        """
 
 
 class GyroModel(Protocol):

@@ -42,7 +42,7 @@ def near_library(
     blocks = []
     for o in observations:
         columns = [
-            o.averaged(o.model.response(id, shape, values))
+            o.response(id, shape, values)
             for id, candidate in candidates.items()
             for shape in _shapes(candidate, grade)
         ]

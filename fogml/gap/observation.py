@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.gap.model import GyroModel, ModelOnRun
 from fogml.gap.readings import smoothed
+from fogml.gap.row_responses import RowResponses
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 
@@ -59,6 +61,15 @@ class Observation:
         # `reduceat` knows no end of the last block unless one follows.
         padded = np.append(values, 0.0)
         return np.asarray(np.add.reduceat(padded, edges)[::2] / self.counts)
+
+    def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
+        """Response of each row per unit of a candidate's amplitude [deg/h], shape (m,)."""
+        return self.responses.of(id, shape, constants)
+
+    @cached_property
+    def responses(self) -> RowResponses:
+        """How responses come to the rows."""
+        return RowResponses(self)
 
     @cached_property
     def counts(self) -> NDArray[np.intp]:

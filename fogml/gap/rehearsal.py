@@ -168,7 +168,7 @@ class Rehearsal(Rehearsed):
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
         o = self.observation
-        columns = [o.averaged(o.model.response(id, shape, self.stage.values)) for shape in shapes]
+        columns = [o.response(id, shape, self.stage.values) for shape in shapes]
         return self._whitener.whiten(np.column_stack(columns))
 
 

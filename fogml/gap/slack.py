@@ -36,7 +36,7 @@ def slack_columns(basis: Basis, node: int) -> FloatArray:
     draws = chosen.node.draws[:: -(-len(chosen.node.draws) // MOST_DRAWS)]
     parts = []
     for o in frame.observations:
-        responses = [o.averaged(o.model.response(chosen.candidate, shape, frame.values)) for shape in draws]
+        responses = [o.response(chosen.candidate, shape, frame.values) for shape in draws]
         varied = [column for r in responses for column in _varied(o, r)]
         parts.append([*varied, *_other_orders(o, chosen.candidate, draws[0], frame.values, responses[0])])
     most = max(map(len, parts))

@@ -52,9 +52,7 @@ def starting_values(
     for id, shape in chosen:
         best: tuple[float, dict[str, float], float, FloatArray] | None = None
         for tried in _shapes(candidates[id], shape):
-            response = _stacked(
-                whiteners, [o.averaged(o.model.response(id, tried, values))[:, None] for o in observations]
-            )
+            response = _stacked(whiteners, [o.response(id, tried, values)[:, None] for o in observations])
             column = _beside(basis, response)[:, 0]
             for other in taken:
                 column = column - other * (other @ column)

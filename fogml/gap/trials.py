@@ -142,7 +142,7 @@ def _explained(trial: Trial) -> list[FloatArray]:
     rows = []
     for r, o in enumerate(p.fit):
         columns = [
-            o.averaged(o.model.response(c.candidate, shape, basis.frame.values))[:, None]
+            o.response(c.candidate, shape, basis.frame.values)[:, None]
             for c in best.effects
             for shape in basis.nodes[c.node].node.draws[:MOST_DRAWS]
         ]

@@ -9,12 +9,14 @@ from functools import cached_property
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
 from fogml.gap.readings import USUAL_STEP_DEGC, reading_noise, smoothed
 from fogml.gap.seen_as import AS_CANDIDATE, line_response
 from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.twin_on_means import TwinOnMeans, shapes_to_compare
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step
 from fogml.twin.effect import Effect, NoiseEffect, SensorEffect
@@ -218,6 +220,14 @@ class TwinOnRun:
         if not self._missing & set(declared.needs):
             return []
         return [self._responded(declared, shape, constants, inputs) for inputs in self._others]
+
+    def shapes_to_compare(self, id: str) -> tuple[Mapping[str, float], ...]:
+        """Shapes at which a response on means has to agree with the full one; none where it can't."""
+        return shapes_to_compare(effect(id), self._full, self._twin.grade)
+
+    def on_means(self, starts: NDArray[np.intp]) -> TwinOnMeans:
+        """Responses on block means of the inputs; blocks begin at `starts`."""
+        return TwinOnMeans(self._full, starts)
 
     def _responded(
         self, declared: Effect, shape: Mapping[str, float], constants: Mapping[str, float], inputs: Inputs

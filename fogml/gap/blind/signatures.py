@@ -94,9 +94,7 @@ class Stack:
 
     def column(self, atom: Atom) -> FloatArray:
         """Response to a unit of a candidate's amplitude [deg/h], shape (n,)."""
-        return np.concatenate(
-            [part.averaged(part.model.response(atom.id, atom.shape, self.about)) for part in self.parts]
-        )
+        return np.concatenate([part.response(atom.id, atom.shape, self.about) for part in self.parts])
 
     def averaged(self, series: Sequence[FloatArray]) -> FloatArray:
         """Block means of one series per run over its samples [deg/h], shape (n,)."""
