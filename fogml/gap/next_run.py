@@ -14,8 +14,8 @@ from fogml.gap.starting import starting_values
 from fogml.gap.twin_model import TwinModel
 
 MOST_MEMBERS = 4
-MOST_PROGRAMMES = 300
-"""Programmes that a diagnosis tries for a class; `fogml plan` tries twice as many."""
+MOST_PROGRAMMES = 200
+"""Programmes that a diagnosis tries for a class; `fogml plan` tries three times as many."""
 
 
 def next_run(

@@ -130,7 +130,8 @@ class Family:
 
     def shortened(self, design: Design) -> Design | None:
         """The design with shorter soaks, then without its later cycles, until it fits; None if it can't."""
-        while self.programme(design).total_hours > self.hours:
+        # Designs that come to the same are written out once.
+        while self.programme(design := design.plain()).total_hours > self.hours:
             shorter = [soak for soak in SOAKS_S if soak < design.soak_s]
             if shorter:
                 design = replace(design, soak_s=shorter[-1])
@@ -141,7 +142,7 @@ class Family:
                 design = replace(design, rates=(*kept, *([None] * (3 - len(kept)))))  # type: ignore[arg-type]
             else:
                 return None
-        return design.plain()
+        return design
 
     def temperatures(self, design: Design) -> tuple[float, float]:
         """Lowest and highest temperature of the cycles [degC], in whole degrees."""
@@ -192,7 +193,7 @@ class Family:
         return "; ".join(words)
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=1024)
 def _written(family: Family, design: Design) -> Programme:
     """The steps of a design; a search asks for the same ones several times."""
     cold, hot = family.temperatures(design)
