@@ -139,7 +139,7 @@ beside them. Seed {CONFIG["seed"]}; fogml {__version__}; `python -m experiments.
 truth itself closes less than half of the gap: there the held-out run does not show the effect. A relative has
 a cosine above {CONFIG["alike"]:g} with what the effect truly adds, a line at its best phase on every run.
 The doubt shows in a class of several or in an unknown of {DOUBT:g} or more. Where what is named looks like
-an effect that was left out (cosine above 0.95 of the signatures, whatever the data), the diagnosis says so and
+an effect that was left out (cosine over 0.95 of the signatures, whatever the data), the diagnosis says so and
 counts the other as unknown: that takes the left-out effect's signature. In `experiments/gap_blind` the
 catalogue does not hold what is left out, and no such doubt is raised.
 
