@@ -10,8 +10,8 @@ PAIRS = {
     "and ridge by evidence, and leaves about half the error.",
     "csv": "Ours parses by pyarrow, whose threads OMP_NUM_THREADS bounds, and then checks every value "
     "(missing, infinite, time going back, stuck values, saturation, outliers), which takes about 10 ms of a "
-    "million rows. pyarrow alone takes longer than pandas, which keeps whole numbers as integers that cost less "
-    "to parse, and checks nothing; pyarrow is strict about what is no number, and says where.",
+    "million rows. pyarrow alone takes longer than pandas, which keeps whole numbers as integers that cost "
+    "less to parse, and checks nothing; pyarrow is strict about what is no number, and says where.",
     "read-csv": "As for pandas: plain readers parse, and check nothing.",
     "read-parquet": "Decoding is pyarrow's, and takes three to four times as long as the checks of every "
     "value: each reads memory once or twice, and medians are taken only where a bound does not rule "
