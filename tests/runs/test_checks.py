@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time as clock
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -312,9 +310,7 @@ class TestTemperatureSpan:
         assert codes({name: columns[name] for name in ("time", "gyro")}) == []
 
 
-def test_a_million_rows_are_checked_in_no_time():
+def test_a_million_sound_rows_have_no_fault():
     columns = noisy(1_000_000, 0.01)
     columns["rate"] = np.zeros(1_000_000)
-    begin = clock.process_time()
-    check_run(Run("run", columns))
-    assert clock.process_time() - begin < 0.5  # measured: 0.05 s
+    assert codes(columns) == []
