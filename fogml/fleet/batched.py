@@ -17,7 +17,8 @@ def run_batched(
     """Run every task that is not done yet, `batch` of them beside each other; outcomes in order.
 
     Each job runs in a thread; wherever networks are tuned, the threads' objectives are worked out
-    together. Results are those of running the tasks one by one.
+    together. Results are those of running the tasks one by one, but for what rounding in a batch does to
+    where a search ends: far below the noise.
 
     Parameters
     ----------
