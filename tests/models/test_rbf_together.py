@@ -12,7 +12,6 @@ from fogml.models.rbf.objective import Objective, Shape
 from fogml.models.rbf.stacked import Stack, values_together
 from fogml.models.rbf.together import fit_together
 
-
 NOISE = 0.02
 
 
