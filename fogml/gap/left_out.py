@@ -74,9 +74,9 @@ def doubted(unknown: Unknown, found: Sequence[Found]) -> Unknown:
 
 def _signatures(search: Search, best: Explanation) -> dict[str, FloatArray]:
     """What each effect of an explanation does on the runs, whitened, shape (n, 1)."""
-    field = search.field_
-    mean, _ = field.condition(search.terms(best)).coefficients()
-    coefficients = dict(zip([c for t in search.terms(best) for c in t.columns], mean))
+    field, terms = search.field_, search.terms(best)
+    mean, _ = field.condition(terms).coefficients()
+    coefficients = dict(zip([c for t in terms for c in t.columns], mean))
     places = {c.candidate: field.basis.nodes[c.node].columns for c in best.effects}
     return {
         id: field.columns(held) @ np.array([[coefficients[c]] for c in held]) for id, held in places.items()

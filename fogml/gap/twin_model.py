@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import asdict, replace
 from functools import cached_property
 from pathlib import Path
@@ -242,32 +242,27 @@ class TwinOnRun:
         Shape (n,) [deg/h]; the readings' noise is told from their second differences, and from
         their least step.
         """
-        noise = {}
-        for name in self._slopes(constants):
-            place = self._recorded.place(name)
-            if place is not None:
-                noise[name] = reading_noise(self._recorded.temperatures[place])
-        return self._noise_through(noise, constants)
+        held = self._recorded.temperatures
+        return self._noise_through(lambda place: reading_noise(held[place]), constants)
 
     def noise_of_sensors(self, sensors: Sensors, constants: Mapping[str, float]) -> FloatArray:
         """The same of sensors with stated errors: their noise and their last digit."""
-        noise = {}
-        for name in self._slopes(constants):
+
+        def stated(place: str) -> float:
+            errors = sensors.of(place)
+            return math.hypot(errors.noise, errors.resolution / math.sqrt(12.0))
+
+        return self._noise_through(stated, constants)
+
+    def _noise_through(self, degC: Callable[[str], float], constants: Mapping[str, float]) -> FloatArray:
+        """What noise of the readings at each place [degC] makes of the replay [deg/h], shape (n,)."""
+        slopes = temperature_slopes(self._recorded.afresh(), NominalConstants(**dict(constants)))
+        variance = np.zeros(len(self._recorded))
+        for name, slope in slopes.items():
             place = self._recorded.place(name)
             if place is not None:
-                errors = sensors.of(place)
-                noise[name] = math.hypot(errors.noise, errors.resolution / math.sqrt(12.0))
-        return self._noise_through(noise, constants)
-
-    def _noise_through(self, noise: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
-        slopes = self._slopes(constants)
-        variance = np.zeros(len(self._recorded))
-        for name, degC in noise.items():
-            variance += (slopes[name] * degC) ** 2
+                variance += (slope * degC(place)) ** 2
         return np.sqrt(variance)
-
-    def _slopes(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
-        return temperature_slopes(self._recorded.afresh(), NominalConstants(**dict(constants)))
 
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """What sensors of ordinary quality make of the replay [deg/h], shape (n,).

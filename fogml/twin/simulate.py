@@ -219,9 +219,9 @@ def _world(
 
 def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
     """Recorded columns, and the truth, block by block."""
-    samples_ahead = world.samples(BLOCK_ROWS)
-    # A thread takes longer to start than a short run to work out.
-    for samples in _ahead(samples_ahead) if len(world.timeline) > BLOCK_ROWS else samples_ahead:
+    blocks = world.samples(BLOCK_ROWS)
+    # A thread takes longer to start than a single block to work out.
+    for samples in _ahead(blocks) if len(world.timeline) > BLOCK_ROWS else blocks:
         chain = world.output(samples)
         yield _recorded(world, samples, chain)
 
