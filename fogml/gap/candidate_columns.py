@@ -82,13 +82,15 @@ def candidate_columns(
     found = []
     for i in _kept(columns, starts.tolist(), apart, screening):
         part = columns[:, starts[i] : starts[i] + widths[i]]
+        mix = nodes[i].mix
         if apart:
             part = np.concatenate([_only(part, run) for run in apart], axis=1)
+            mix = np.asarray(np.kron(np.eye(len(apart)), mix), dtype=np.float64)
         raw = float(np.sum(part**2))
         if raw == 0.0 or np.trace(frame.beside(part, flat=True)) <= LEAST_SHARE**2 * raw:
             continue
         rank = LARGEST_RANK * max(len(apart), 1)
-        basis, length = _on_axes(part, frame.beside(part), widths[i], rank)
+        basis, length = _on_axes(part, frame.beside(part), mix, rank)
         weights = plausible_lengths(candidate, 1.0 / length) - np.log(count)
         weights += getattr(candidate, "log_prior", 0.0)
         one_way = basis.shape[1] == 1 and not signed
@@ -118,9 +120,9 @@ def _only(columns: FloatArray, run: slice) -> FloatArray:
     return part
 
 
-def _on_axes(part: FloatArray, beside: FloatArray, count: int, rank: int) -> tuple[FloatArray, float]:
-    """Columns on their main axes, scaled to a length of 1, and their length before."""
-    values, vectors = np.linalg.eigh(beside / count)
+def _on_axes(part: FloatArray, beside: FloatArray, mix: FloatArray, rank: int) -> tuple[FloatArray, float]:
+    """Main axes of columns that are mixed, scaled to a length of 1, and their length before."""
+    values, vectors = np.linalg.eigh(mix.T @ beside @ mix)
     keep = np.flatnonzero(values > _KEPT * values[-1])[::-1][:rank]
     length = float(np.sqrt(values[keep].sum()))
-    return part @ vectors[:, keep] / (np.sqrt(count) * length), length
+    return part @ (mix @ vectors[:, keep]) / length, length

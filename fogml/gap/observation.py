@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.gap.block_means import BlockMeans
 from fogml.gap.model import GyroModel, ModelOnRun
 from fogml.gap.readings import smoothed
 from fogml.gap.row_responses import RowResponses
@@ -57,10 +58,11 @@ class Observation:
         """Block means of a series over the samples, shape (n,) to (m,)."""
         if self.width == 1:
             return np.asarray(values[self.starts])
-        edges = np.column_stack([self.starts, self.stops]).ravel()
-        # `reduceat` knows no end of the last block unless one follows.
-        padded = np.append(values, 0.0)
-        return np.asarray(np.add.reduceat(padded, edges)[::2] / self.counts)
+        return self._means(values)
+
+    @cached_property
+    def _means(self) -> BlockMeans:
+        return BlockMeans(self.starts, self.stops, np.ones(len(self.run), dtype=np.intp))
 
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Response of each row per unit of a candidate's amplitude [deg/h], shape (m,)."""
@@ -70,11 +72,6 @@ class Observation:
     def responses(self) -> RowResponses:
         """How responses come to the rows."""
         return RowResponses(self)
-
-    @cached_property
-    def counts(self) -> NDArray[np.intp]:
-        """Samples in each block, shape (m,)."""
-        return self.stops - self.starts
 
     @cached_property
     def time(self) -> FloatArray:

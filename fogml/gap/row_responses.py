@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.gap.block_means import BlockMeans
 from fogml.gap.model import Decimating, Responding
 from fogml.runs.run import FloatArray, Run
 
@@ -87,39 +87,23 @@ class OnMeans:
     ----------
     model
         The model; its responses have shape (b,).
-    counts
-        Samples of each part, shape (b,).
-    edges
-        First part of each row and the one after its last in turn, shape (2 m,).
-    row_counts
-        Samples of each row, shape (m,).
+    means
+        From parts to rows; as many samples count for a part as it holds.
     """
 
     model: Responding
-    counts: NDArray[np.intp]
-    edges: NDArray[np.intp]
-    row_counts: NDArray[np.intp]
+    means: BlockMeans
 
     @classmethod
     def of(cls, o: Observation, model: Decimating, parts: int) -> OnMeans:
         """A run's model on so many parts of each row."""
         starts = parts_of_blocks(blocks_of_all(o.run, o.width, o.starts), len(o.run), parts)
-        edges = np.searchsorted(starts, np.column_stack([o.starts, o.stops]).ravel())
-        return cls(model.on_means(starts), np.diff(starts, append=len(o.run)), edges, o.counts)
+        rows = np.searchsorted(starts, o.starts), np.searchsorted(starts, o.stops)
+        return cls(model.on_means(starts), BlockMeans(*rows, np.diff(starts, append=len(o.run))))
 
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Response on the rows per unit of a candidate's amplitude [deg/h], shape (m,)."""
-        response = self.model.response(id, shape, constants)
-        if self._one_each:
-            return np.asarray(response[self.edges[::2]])
-        # As many samples count for a part as it holds; `reduceat` needs a value after the last.
-        sums = np.append(response * self.counts, 0.0)
-        return np.asarray(np.add.reduceat(sums, self.edges)[::2] / self.row_counts)
-
-    @cached_property
-    def _one_each(self) -> bool:
-        """Whether each row is one part."""
-        return bool(np.all(np.diff(self.edges)[::2] == 1))
+        return self.means(self.model.response(id, shape, constants))
 
 
 def blocks_of_all(run: Run, width: int, rows: NDArray[np.intp]) -> NDArray[np.intp]:

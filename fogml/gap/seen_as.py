@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fogml.runs.run import FloatArray
+from fogml.signals.waves import sine
 from fogml.twin.effect import Effect
 from fogml.twin.quantities import Quantity
 
@@ -62,5 +63,4 @@ def line_response(shape: Mapping[str, float], time: FloatArray) -> FloatArray:
     """Response of a line per unit of its amplitude [deg/h], from the first sample on; shape (n,)."""
     if len(time) == 0:
         return np.zeros(0)
-    angle = 2.0 * np.pi * shape["frequency"] * (time - time[0]) + np.radians(shape.get("phase", 0.0))
-    return np.asarray(np.sin(angle))
+    return sine(shape["frequency"] * (time - time[0]) + shape.get("phase", 0.0) / 360.0)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -39,14 +39,28 @@ class Node:
     shape
         Shape parameters at the node, linear ones in the middle of their range.
     draws
-        Shapes to evaluate; the node's covariance is the mean of their responses' outer products.
+        Shapes to evaluate, whose responses span what the node can do: the middle of the linear parameters
+        first, then one standard deviation along each of them.
+    turns
+        How many directions each of them is evaluated in.
     frequency_hz
         Of the line in time that the node is, if it is one.
     """
 
     shape: Mapping[str, float]
     draws: tuple[Mapping[str, float], ...]
+    turns: int = 1
     frequency_hz: float | None = None
+
+    @property
+    def mix(self) -> FloatArray:
+        """What makes the draws' responses into columns whose outer products sum to the node's covariance.
+
+        Shape (draws, draws): the response to the middle, and what each standard deviation adds to it.
+        """
+        change = np.eye(len(self.draws) // self.turns)
+        change[0, 1:] = -1.0
+        return np.asarray(np.kron(change, np.eye(self.turns)) / math.sqrt(self.turns))
 
 
 def grid(
@@ -70,7 +84,7 @@ def grid(
         about = [{AT_AMPLITUDE: float(a)} for a in amplitudes]
         nodes = _grid(candidate, grade, response, spans)
         return tuple(
-            Node({**node.shape, **at}, tuple({**draw, **at} for draw in node.draws))
+            replace(node, shape={**node.shape, **at}, draws=tuple({**draw, **at} for draw in node.draws))
             for node in nodes
             for at in about
         )
@@ -92,7 +106,7 @@ def _grid(
     for values in product(*axes):
         shape = usual | {q.name: value for q, value in zip(bent, values)}
         draws = tuple(shape | more for more in _spread(linear, turning, grade))
-        nodes.append(Node(shape, draws, _frequency(bent, values)))
+        nodes.append(Node(shape, draws, 2 ** len(turning), _frequency(bent, values)))
     return tuple(nodes)
 
 
@@ -152,21 +166,13 @@ def _lines(quantity: Quantity, low: float, high: float, spans: Mapping[str, floa
 
 
 def _spread(linear: Sequence[Quantity], turning: Sequence[Quantity], grade: str) -> list[dict[str, float]]:
-    """Points whose second moments are those of the priors of linear parameters and angles."""
+    """The middle of linear parameters and a standard deviation along each, in all directions of angles."""
     middles, spreads = {}, {}
     for quantity in linear:
         low, high = quantity.range(grade)  # type: ignore[arg-type]
         middles[quantity.name] = 0.5 * (low + high)
         spreads[quantity.name] = (high - low) / math.sqrt(12.0)
-    points = [middles]
-    if linear:
-        # Sigma points: the mean and pairs about it along each axis, equal weights.
-        reach = math.sqrt(len(linear) + 0.5)
-        points = [
-            middles | {name: middles[name] + sign * reach * spreads[name]}
-            for name in spreads
-            for sign in (-1.0, 1.0)
-        ] + [middles]
+    points = [middles, *(middles | {name: middles[name] + spreads[name]} for name in spreads)]
     for quantity in turning:
         low = quantity.tactical[0]
         points = [point | {quantity.name: low + turn} for point in points for turn in (0.0, 90.0)]

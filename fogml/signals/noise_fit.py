@@ -193,7 +193,7 @@ def _log_likelihood(data: FitData, model: NoiseModel) -> float:
 
 
 def _whitened(part: Part, model: NoiseModel) -> tuple[Whitener, FloatArray]:
-    whitener = Whitener(model, part.time, part.averaging_s, part.ladder)
+    whitener = part.whitener.with_noise(model)
     return whitener, whitener.whiten(part.table)
 
 

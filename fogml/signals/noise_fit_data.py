@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from fogml.errors import InputError
 from fogml.signals.averages import block_averages
 from fogml.signals.clock import Clock
-from fogml.signals.noise_model import ADJOINING, Ladder, flicker_ladder
+from fogml.signals.noise_model import ADJOINING, NoiseModel, flicker_ladder
+from fogml.signals.whitening import Whitener
 
 FloatArray = NDArray[np.float64]
 
+_ANY = NoiseModel(1.0)
 _FEWEST = 16
 _INDEPENDENT = 1e-9
 """Columns whose singular value is below this share of the largest hold nothing new."""
@@ -41,12 +43,10 @@ class Level:
 
 @dataclass(frozen=True)
 class Part:
-    """One series, averaged where long: columns and, last, values, shape (m, p + 1)."""
+    """One series, averaged where long: columns and, last, values, shape (m, p + 1), and what whitens them."""
 
-    time: FloatArray
-    averaging_s: FloatArray
     table: FloatArray
-    ladder: Ladder
+    whitener: Whitener
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def fit_data(
         # One for all coefficients, so that the likelihood is smooth in them.
         ladder = flicker_ladder(float(np.median(a)), length)
         table = np.column_stack((shared[low:high], y - y.mean()))
-        parts.append(Part(t, a, table, ladder))
+        parts.append(Part(table, Whitener(_ANY, t, a, ladder)))
     return FitData(tuple(parts), tuple(levels), _merged(glance), prior_rows)
 
 

@@ -9,6 +9,7 @@ serve any number of columns.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from copy import copy
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -70,16 +71,25 @@ class Whitener:
         averaging_s: ArrayLike | None = None,
         ladder: Ladder | None = None,
     ) -> None:
-        self.model = model
         times = np.ascontiguousarray(time, dtype=np.float64)
         self.averaging_s = _checked_averaging(times, averaging_s)
         typical = float(np.median(self.averaging_s))
         length = float(times[-1] - times[0]) + typical
-        self.ladder = model.ladder(typical, length) if ladder is None else ladder
-        self._kind, steps, averaging = _kinds(times, self.averaging_s, typical)
+        self._kinds = _kinds(times, self.averaging_s, typical)
+        self._tell_gains(model, model.ladder(typical, length) if ladder is None else ladder)
+
+    def with_noise(self, model: NoiseModel) -> Whitener:
+        """A whitener of the same samples and flicker states for other noise."""
+        other = copy(self)
+        other._tell_gains(model, self.ladder)
+        return other
+
+    def _tell_gains(self, model: NoiseModel, ladder: Ladder) -> None:
+        self.model, self.ladder = model, ladder
+        self._kind, steps, averaging = self._kinds
         states = len(self.ladder.time_constants_s) if model.B > 0.0 else 0
         size = states + (2 if model.Q > 0.0 else 1 if model.K > 0.0 else 0)
-        n = len(times)
+        n = len(self._kind)
         self._decay, self._reading = np.zeros((len(steps), size)), np.zeros((len(steps), size))
         self._gains, self.deviation = np.zeros((n, size)), np.zeros(n)
         gains_kernel(
@@ -188,8 +198,8 @@ class Whitener:
                 states,
                 inverse,
             )
-            # What is not finite stays in the states; without any, in its own row.
-            if not (np.all(np.isfinite(states)) and np.all(np.isfinite(columns[low:high].sum(axis=0)))):
+            # What is not finite stays in the states, if there are any.
+            if not np.all(np.isfinite(states if len(states) else columns[low:high])):
                 raise InputError(
                     f"whitening: a value among rows {here.start} to {here.stop - 1} is not finite; "
                     "leave such rows out, the times then hold a gap"

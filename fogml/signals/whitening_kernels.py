@@ -19,7 +19,7 @@ from fogml.signals.modes import phi_functions
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
-_TILE = 64
+_TILE = 128
 
 
 @njit(cache=True, nogil=True)
@@ -160,6 +160,22 @@ def gains_kernel(
 
 
 @njit(cache=True, nogil=True)
+def _predict(c: FloatArray, z: FloatArray, predicted: FloatArray) -> None:
+    """Add c @ z, in the order in which `whiten_kernel` does, so that blocks end where they may."""
+    size, width = z.shape
+    j = 0
+    while j + 4 <= size:
+        c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+        for q in range(width):
+            predicted[q] += (c0 * z[j, q] + c1 * z[j + 1, q]) + (c2 * z[j + 2, q] + c3 * z[j + 3, q])
+        j += 4
+    while j < size:
+        for q in range(width):
+            predicted[q] += c[j] * z[j, q]
+        j += 1
+
+
+@njit(cache=True, nogil=True)
 def whiten_kernel(
     values: FloatArray,
     kind: IntArray,
@@ -173,7 +189,8 @@ def whiten_kernel(
     """Turn columns (n, k) into innovations over their deviations, in place; or back with `inverse`.
 
     `states`, shape (s, k), are overwritten with those after the last sample. Columns go in tiles
-    that stay in the fastest cache with their states.
+    that stay in the fastest cache with their states. A pass over the states takes them to a sample and
+    predicts the next one, four at a time: what it costs is to fetch and to store them.
     """
     n, columns = values.shape
     size = len(states)
@@ -182,30 +199,45 @@ def whiten_kernel(
         width = right - left
         z = states[:, left:right].copy()
         error = np.empty(width)
-        predicted = np.empty(width)
+        predicted = np.zeros(width)
+        if n:
+            _predict(reading[kind[0]], z, predicted)
         for i in range(n):
             row = values[i, left:right]
-            f, c, g = decay[kind[i]], reading[kind[i]], gains[i]
-            for q in range(width):
-                predicted[q] = 0.0
-            for j in range(size):
-                weight = c[j]
-                for q in range(width):
-                    predicted[q] += weight * z[j, q]
+            f, g = decay[kind[i]], gains[i]
+            c = reading[kind[min(i + 1, n - 1)]]
             if inverse:
                 scale = deviation[i]
                 for q in range(width):
                     error[q] = row[q] * scale
                     row[q] = predicted[q] + error[q]
+                    predicted[q] = 0.0
             else:
                 scale = 1.0 / deviation[i]
                 for q in range(width):
                     error[q] = row[q] - predicted[q]
                     row[q] = error[q] * scale
-            for j in range(size):
-                kept, taken = f[j], g[j]
+                    predicted[q] = 0.0
+            j = 0
+            while j + 4 <= size:
+                f0, f1, f2, f3 = f[j], f[j + 1], f[j + 2], f[j + 3]
+                g0, g1, g2, g3 = g[j], g[j + 1], g[j + 2], g[j + 3]
+                c0, c1, c2, c3 = c[j], c[j + 1], c[j + 2], c[j + 3]
+                for q in range(width):
+                    now = error[q]
+                    z0 = f0 * z[j, q] + g0 * now
+                    z1 = f1 * z[j + 1, q] + g1 * now
+                    z2 = f2 * z[j + 2, q] + g2 * now
+                    z3 = f3 * z[j + 3, q] + g3 * now
+                    z[j, q], z[j + 1, q], z[j + 2, q], z[j + 3, q] = z0, z1, z2, z3
+                    predicted[q] += (c0 * z0 + c1 * z1) + (c2 * z2 + c3 * z3)
+                j += 4
+            while j < size:
+                kept, taken, weight = f[j], g[j], c[j]
                 for q in range(width):
                     z[j, q] = kept * z[j, q] + taken * error[q]
+                    predicted[q] += weight * z[j, q]
+                j += 1
         states[:, left:right] = z
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine
+from fogml.signals.waves import sine
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
 
@@ -39,7 +40,7 @@ def table_cosine(inputs: Inputs, key: str, phase_deg: float, harmonic: float = 1
 
 def line(inputs: Inputs, period_s: float, phase_deg: float) -> FloatArray:
     """sin(2 pi t / period + phase), shape (n,)."""
-    return np.sin(2.0 * math.pi / period_s * inputs.time + math.radians(phase_deg))
+    return sine(inputs.time / period_s + phase_deg / 360.0)
 
 
 def nominal_slope(inputs: Inputs, name: str = "T") -> FloatArray:

@@ -59,9 +59,9 @@ def test_a_line_of_any_period_and_phase_is_near_a_node():
 
 def test_what_is_linear_needs_one_node_with_the_moments_of_its_prior():
     (node,) = grid_of("mixture")
-    shares = np.array([draw["share"] for draw in node.draws])
-    assert shares.mean() == pytest.approx(0.5)
-    assert np.var(shares) == pytest.approx(1.0 / 12.0)
+    columns = np.array([[1.0, draw["share"]] for draw in node.draws]).T @ node.mix
+    # Of a share evenly spread over 0 to 1: mean, mean square.
+    np.testing.assert_allclose(columns @ columns.T, [[1.0, 0.5], [0.5, 1.0 / 3.0]])
     assert grid_of("cube")[0].draws == ({},)
 
 

@@ -86,7 +86,7 @@ def test_likelihood_is_the_restricted_one():
     design = np.column_stack((np.ones(n), x))
 
     def wanted(model: NoiseModel) -> float:
-        c = model.covariance(time, 10.0, data.parts[0].ladder)
+        c = model.covariance(time, 10.0, data.parts[0].whitener.ladder)
         inverse = np.linalg.inv(c)
         information = design.T @ inverse @ design + np.diag([0.0, 0.3**-2])
         residual = y - design @ np.linalg.solve(information, design.T @ inverse @ y)

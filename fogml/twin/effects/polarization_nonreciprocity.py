@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
+from fogml.signals.waves import sine
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
@@ -48,5 +47,4 @@ class PolarizationNonreciprocity(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h [deg/h], shape (n,)."""
-        turns = inputs.u("T_electronics") / shape["period"]
-        return np.sin(2.0 * np.pi * turns + np.radians(shape["phase"]))
+        return sine(inputs.u("T_electronics") / shape["period"] + shape["phase"] / 360.0)

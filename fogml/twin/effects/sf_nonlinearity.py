@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import FloatArray
+from fogml.signals.waves import sine
 from fogml.twin.effect import ScaleFactorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
@@ -49,5 +50,5 @@ class SfNonlinearity(ScaleFactorEffect):
         rate = np.abs(inputs.input_rate_deg_h) / 3600.0
         x = rate / FULL_SCALE_DEG_S
         q = shape["quadratic_share"]
-        ripple = np.sin(2.0 * np.pi / shape["ripple_period"] * rate)
+        ripple = sine(rate / shape["ripple_period"])
         return x * (1.0 - q + q * x) + shape["ripple_share"] * ripple

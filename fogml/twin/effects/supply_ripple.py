@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
+from fogml.signals.waves import sine
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
@@ -47,5 +46,6 @@ class SupplyRipple(BiasEffect):
         """Response per deg/h/V [deg/h], shape (n,)."""
         supply = inputs.drive("supply")
         change = supply - inputs.memory.first(f"{self.id} supply", supply)
-        angle = 2.0 * np.pi * shape["alias_frequency"] * inputs.time + np.radians(shape["phase"])
-        return change + shape["ripple"] * np.sin(angle)
+        return change + shape["ripple"] * sine(
+            shape["alias_frequency"] * inputs.time + shape["phase"] / 360.0
+        )
