@@ -18,6 +18,7 @@ from fogml.gap.twin_model import TwinModel, TwinOnRun
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.power import SelfHeating
 from fogml.twin.registry import effect
 from fogml.twin.set_up import Sensors
@@ -84,7 +85,8 @@ def stage(
 ) -> Stage:
     """The twin made ready.
 
-    Responses are those to exact sensors: their noise must not make responses look unlike each other. A twin
+    Responses are those to exact sensors: their noise must not make responses look unlike each other; and the
+    gyro's own is stated, so that none is drawn. A twin
     that states no heat of its electronics gets the usual one, or power steps would warm nothing.
     """
     assumed = []
@@ -98,7 +100,7 @@ def stage(
         )
     ready = replace(twin, plant=plant)
     return Stage(
-        TwinModel(replace(ready, sensors=Sensors())),
+        TwinModel(replace(ready, sensors=Sensors(), noise=NoiseConstants())),
         ready.sensors,
         noise,
         dict(values),

@@ -181,15 +181,18 @@ def logged(twin: Twin, output: FloatArray, inputs: Inputs) -> ChainOutput:
 
 
 def sensed(
-    twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: np.random.Generator
+    twin: Twin, name: str, temperature: FloatArray, inputs: Inputs, rng: Mapping[str, np.random.Generator]
 ) -> FloatArray:
-    """What the sensor behind column `name` records [degC] at a place with `temperature`, shape (n,)."""
+    """What the sensor behind column `name` records [degC] at a place with `temperature`, shape (n,).
+
+    `rng` holds the generator of its noise by that name.
+    """
     temperature = _falsified(twin, name, temperature, inputs, digitising=False)
     errors = twin.sensors.of(name)
     if errors.lag > 0.0:
         temperature = inputs.memory.lag(f"sensor {name}", inputs.time, temperature, errors.lag)
     if errors.noise > 0.0:
-        temperature = temperature + errors.noise * rng.standard_normal(len(temperature))
+        temperature = temperature + errors.noise * rng[name].standard_normal(len(temperature))
     if errors.resolution > 0.0:
         temperature = errors.resolution * np.rint(temperature / errors.resolution)
     return _falsified(twin, name, temperature, inputs, digitising=True)

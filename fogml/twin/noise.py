@@ -92,7 +92,13 @@ NAMES = tuple(field.name for field in fields(NoiseConstants))
 
 
 def stream(seed: int, name: str) -> np.random.Generator:
-    """A generator of its own for a named source, so that adding a source leaves the others alone."""
+    """A generator of its own for a named source, so that adding a source leaves the others alone.
+
+    Raises
+    ------
+    InputError
+        If the seed is negative.
+    """
     return generator(seed, zlib.crc32(name.encode()))
 
 
@@ -104,9 +110,37 @@ def generator(seed: int, number: int) -> np.random.Generator:
     InputError
         If the seed is negative.
     """
+    return np.random.default_rng([_checked(seed), number])
+
+
+def _checked(seed: int) -> int:
     if seed < 0:
         raise InputError(f"'seed' is {seed}; a whole number of 0 or above is needed")
-    return np.random.default_rng([seed, number])
+    return seed
+
+
+class Streams(dict[str, np.random.Generator]):
+    """The generators of a kind of source by their names, each made when it is first asked for.
+
+    Parameters
+    ----------
+    seed
+        Of all of them.
+    kind
+        What they are for, first word of their names in `stream`.
+
+    Raises
+    ------
+    InputError
+        If the seed is negative.
+    """
+
+    def __init__(self, seed: int, kind: str) -> None:
+        self._seed, self._kind = _checked(seed), kind
+
+    def __missing__(self, name: str) -> np.random.Generator:
+        self[name] = stream(self._seed, f"{self._kind} {name}")
+        return self[name]
 
 
 class NoiseSource:
@@ -127,9 +161,9 @@ class NoiseSource:
     def __init__(self, constants: NoiseConstants, seed: int, sample_s: float, source: str = "noise") -> None:
         self.constants = constants
         self._sample_s = sample_s
-        self._rng = {name: stream(seed, f"{source} {name}") for name in NAMES}
+        self._rng = Streams(seed, source)
         self._walked, self._passed = 0.0, 0
-        self._angle = float(self._rng["Q"].uniform(-0.5, 0.5))
+        self._angle = float(self._rng["Q"].uniform(-0.5, 0.5)) if constants.Q > 0.0 else 0.0
         self._flicker = None
         if constants.B > 0.0:
             from fogml.signals.flicker import Flicker

@@ -6,7 +6,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -229,10 +228,8 @@ class TimelineBlock:
     @cached_property
     def step(self) -> IndexArray:
         """Number of the step, counted from 0, repeats written out."""
-        number = np.empty(len(self), dtype=np.intp)
-        for piece, part in self._parts(np.asarray(self.timeline.schedule.step_starts)):
-            number[part] = piece
-        return number
+        starts = np.asarray(self.timeline.schedule.step_starts)
+        return self._spread(starts, np.arange(len(starts)))
 
     def _given_or(self, what: Switched, automatic: FloatArray) -> FloatArray:
         given = self._held(what)
@@ -243,32 +240,27 @@ class TimelineBlock:
 
     def _hold(self, times: FloatArray, values: FloatArray) -> FloatArray:
         """Values that hold from their times on."""
-        out = np.empty(len(self))
-        for piece, part in self._parts(times):
-            out[part] = values[piece]
-        return out
+        return np.asarray(self._spread(times, values), dtype=np.float64)
 
     def _linear(
         self, times: FloatArray, values: FloatArray, slopes: FloatArray, bends: FloatArray | None = None
     ) -> FloatArray:
         """Values that go on from their times with a slope, and with a second-order term if there is one."""
-        out = np.empty(len(self))
-        for piece, part in self._parts(times):
-            since = self.time[part] - times[piece]
-            slope = slopes[piece] if bends is None else slopes[piece] + bends[piece] * since
-            np.multiply(since, slope, out=out[part])
-            out[part] += values[piece]
-        return out
+        since = self.time - self._spread(times, times)
+        slope = self._spread(times, slopes)
+        if bends is not None:
+            slope = slope + self._spread(times, bends) * since
+        return np.asarray(since * slope + self._spread(times, values), dtype=np.float64)
 
-    def _parts(self, times: FloatArray) -> Iterator[tuple[int, slice]]:
-        """Pieces that hold samples; a piece begins at its time, the clock's rounding apart."""
+    def _spread(self, times: FloatArray, values: np.ndarray) -> np.ndarray:
+        """The value of the piece that a sample is in; a piece begins at its time, the clock's rounding apart.
+
+        What comes before the first time belongs to the first piece.
+        """
         slack = _CLOCK_SLACK * self.timeline.sample_s
-        edges = np.searchsorted(self.time, times - slack).tolist()
-        # What comes before the first time belongs to the first piece.
-        edges = [0, *edges[1:], len(self)]
-        for piece, (start, stop) in enumerate(pairwise(edges)):
-            if stop > start:
-                yield piece, slice(start, stop)
+        edges = np.searchsorted(self.time, times - slack)
+        edges[:1] = 0
+        return np.repeat(values, np.diff(edges, append=len(self)))
 
 
 def saturation_pressure(temperature: FloatArray) -> FloatArray:

@@ -14,7 +14,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.chain import ChainOutput, heading_of, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
-from fogml.twin.noise import stream
+from fogml.twin.noise import Streams
 from fogml.twin.plant.network import AIR, PlantState
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
@@ -115,7 +115,7 @@ class World:
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
         self._noise = RandomErrors(twin, seed, len(self.timeline), sample_s, apart=truth)
-        self._sensor_rng = {name: stream(seed, f"sensor {name}") for name in columns}
+        self._sensor_rng = Streams(seed, "sensor")
         self._sensor_memory, self._share_memory = Memory(), Memory()
         self._log_memory, self._free_memory = Memory(), Memory()
         self._check_sensors()
@@ -152,7 +152,7 @@ class World:
             temperature = sum(
                 (weight * inputs.temperature(node) for node, weight in place.items()), np.zeros(len(inputs))
             )
-        return sensed(self.twin, name, temperature, inputs, self._sensor_rng[name])
+        return sensed(self.twin, name, temperature, inputs, self._sensor_rng)
 
     def other_contributions(self, samples: Samples, output: FloatArray) -> dict[str, FloatArray]:
         """Contributions of the effects that are neither in the chain nor of the logger [deg/h]."""

@@ -97,7 +97,7 @@ def test_expected_standard_errors_are_the_scatter_of_fits():
     expected = np.sqrt(np.diag(covariance(information(Rehearsal(on, family, SHORT, sample_s), of))))
     (effect,) = of.effects
     programme = family.programme(SHORT)
-    ready = on.model.twin
+    ready = replace(on.model.twin, noise=twin.noise)
     for seed in range(count):
         # Constants from their priors, as the expected errors take them.
         drawn = {c.name: float(rng.normal(c.mean, c.sd)) for c in on.model.constants}

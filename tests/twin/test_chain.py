@@ -151,7 +151,7 @@ def test_sensor_effects_add_to_a_replay_that_trusts_sensors(inputs):
 
 def test_stated_errors_of_a_sensor(inputs):
     sensors = Sensors(SensorErrors(noise=0.02, lag=30.0), {"T_out": SensorErrors(resolution=0.0625)})
-    twin, rng = Twin(sensors=sensors), np.random.default_rng(0)
+    twin, rng = Twin(sensors=sensors), {"T_in": np.random.default_rng(0)}
     place = inputs.temperatures["T_in"]
     found = sensed(twin, "T_in", place, fresh(inputs), rng)
     # In a steady ramp a lag of tau is behind by tau times the rate.
