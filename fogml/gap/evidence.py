@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +19,13 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr
 
 from fogml.gap.basis import Basis, NodeColumns
+from fogml.gap.group_gains import group_gains
 from fogml.gap.priors import LENGTHS
 from fogml.gap.slack import slack_columns
 from fogml.runs.run import FloatArray
+
+MOST_KEPT = 64
+"""Conditioned fields that are kept: a search comes back to the same few."""
 
 
 @dataclass(frozen=True)
@@ -58,6 +63,7 @@ class Field:
         self.gram: FloatArray = gram - half.T @ half
         self._blocks_of_rows: list[tuple[FloatArray, FloatArray]] = [(basis.rows, half)]
         self._slacks: dict[int, tuple[int, ...]] = {}
+        self._conditioned: dict[tuple[Term, ...], Conditioned] = {}
         width = max((len(n.columns) for n in basis.nodes), default=1)
         self.rank = width
         # A column of zeros fills nodes of lower rank up.
@@ -94,9 +100,10 @@ class Field:
         total = first + width
         gram = np.empty((total, total))
         gram[:first, :first] = self.gram
-        across = [rows.T @ columns - other.T @ half for rows, other in self._blocks_of_rows]
-        gram[:, first:] = np.concatenate(across)
-        gram[first:, :first] = gram[:first, first:].T
+        # Few columns from the left: the product goes through the many rows' memory once.
+        across = [columns.T @ rows - half.T @ other for rows, other in self._blocks_of_rows]
+        gram[first:] = np.concatenate(across, axis=1)
+        gram[:first, first:] = gram[first:, :first].T
         self.gram = gram
         return tuple(range(first, total))
 
@@ -112,8 +119,15 @@ class Field:
         return out
 
     def condition(self, terms: Sequence[Term]) -> Conditioned:
-        """The field with terms integrated out as well."""
-        return Conditioned(self, terms)
+        """The field with terms integrated out as well; the latest ones are kept."""
+        key = tuple(terms)
+        held = self._conditioned.pop(key, None)
+        if held is None:
+            held = Conditioned(self, terms)
+            if len(self._conditioned) >= MOST_KEPT:
+                del self._conditioned[next(iter(self._conditioned))]
+        self._conditioned[key] = held
+        return held
 
 
 class Conditioned:
@@ -123,10 +137,14 @@ class Conditioned:
     ----------
     log_evidence
         Of the data, up to what does not depend on the terms.
+    sign_gains
+        What a sign that is known adds to the gains of the nodes that were asked for, shape (nodes, lengths).
     """
 
     def __init__(self, field: Field, terms: Sequence[Term]) -> None:
         self.field, self.terms = field, tuple(terms)
+        self._node_gains: dict[bytes, FloatArray] = {}
+        self.sign_gains = np.zeros((len(field.basis.nodes), len(LENGTHS)))
         self._columns = np.array([c for t in terms for c in t.columns], dtype=np.intp)
         self._scale = np.array([t.length for t in terms for _ in t.columns])
         gram = field.gram
@@ -134,12 +152,13 @@ class Conditioned:
         if k:
             rows = self._scale[:, None] * gram[self._columns]
             inner = np.eye(k) + rows[:, self._columns] * self._scale
+            rows = rows[:, : field.basis.rows.shape[1]]
             self._factor = np.linalg.cholesky(0.5 * (inner + inner.T))
             # Its few rows are inverted once: the product with thousands of columns is the faster then.
             self.half = solve_triangular(self._factor, np.eye(k), lower=True, check_finite=False) @ rows
             log_det = float(np.log(np.diag(self._factor)).sum())
         else:
-            self.half = np.zeros((0, len(gram)))
+            self.half = np.zeros((0, field.basis.rows.shape[1]))
             log_det = 0.0
         fit = self.half[:, 0]
         self.square = float(gram[0, 0] - fit @ fit)
@@ -159,6 +178,20 @@ class Conditioned:
         """
         field = self.field
         places = np.arange(len(field.basis.nodes)) if nodes is None else nodes
+        key = places.tobytes()
+        if key not in self._node_gains:
+            out = np.full((len(field.basis.nodes), len(LENGTHS)), -np.inf)
+            out[places] = self._gains_of(places)
+            self._node_gains[key] = out
+        return self._node_gains[key]
+
+    @cached_property
+    def group_gains(self) -> FloatArray:
+        """Gain in log evidence of each group of the unknown at each length, shape (groups, lengths)."""
+        return group_gains(self, list(self.field.basis.groups))
+
+    def _gains_of(self, places: NDArray[np.intp]) -> FloatArray:
+        field = self.field
         index = field._index[places]
         half = np.concatenate([self.half, np.zeros((len(self.half), 1))], axis=1)
         across = half[:, index]
@@ -177,11 +210,8 @@ class Conditioned:
             fit, size = fits[one, 0][:, None], np.maximum(blocks[one, 0, 0], 0.0)[:, None]
             z = LENGTHS * fit / np.sqrt(1.0 + LENGTHS**2 * size)
             sign_gains[one] = log_ndtr(z) + np.log(2.0)
-        out = np.full((len(field.basis.nodes), len(LENGTHS)), -np.inf)
-        self.sign_gains = np.zeros_like(out)
         self.sign_gains[places] = sign_gains
-        out[places] = gains + sign_gains + field.log_weights[places]
-        return out
+        return np.asarray(gains + sign_gains + field.log_weights[places])
 
 
 def log_sum_exp(values: FloatArray) -> float:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fogml.gap.evidence import Conditioned
 from fogml.gap.priors import LENGTHS
 from fogml.runs.run import FloatArray
 
+if TYPE_CHECKING:
+    from fogml.gap.evidence import Conditioned
 
-def group_gains(held: Conditioned, names: Sequence[str], lengths: FloatArray = LENGTHS) -> FloatArray:
-    """Gain in log evidence of groups of the unknown at each length, shape (groups, lengths).
+
+def group_gains(held: Conditioned, names: Sequence[str]) -> FloatArray:
+    """Gain in log evidence of groups of the unknown at each of `LENGTHS`, shape (groups, lengths).
 
     With s the inner products of a group's columns beside the constants, which are diagonal, H those of the
     terms, of which the field keeps the whitened half, and w = l^2 / (1 + l^2 s) for a length l ::
@@ -28,12 +31,10 @@ def group_gains(held: Conditioned, names: Sequence[str], lengths: FloatArray = L
         The field with a set of effects integrated out.
     names
         Of the groups.
-    lengths
-        Standard deviations of each coefficient.
     """
-    gram, k, count = held.field.gram, len(held.half), len(lengths)
+    gram, k, count = held.field.gram, len(held.half), len(LENGTHS)
     sizes = np.diagonal(gram)
-    squares = lengths[:, None] ** 2
+    squares = LENGTHS[:, None] ** 2
     inner = np.empty((len(names), count, k, k))
     sides = np.empty((len(names), count, k))
     gains = np.empty((len(names), count))

@@ -18,7 +18,6 @@ from typing import Literal
 import numpy as np
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
-from fogml.gap.group_gains import group_gains
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 from fogml.gap.unlike import Unlike
 
@@ -207,7 +206,7 @@ class Search:
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
         held = self.field_.condition(self._terms(effects, None))
-        gains = group_gains(held, names, LENGTHS[fit])
+        gains = held.group_gains[:, fit]
         prices = np.array([self.field_.basis.kinds[name].price for name in names]) + math.log(len(names))
         weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
         if rest == "unknown" and last:

@@ -102,10 +102,11 @@ def _grid(
     linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
     bent = [q for q in rest if q not in linear]
     axes = [_axis(q, grade, NODES[min(len(bent), 3)], spans) for q in bent]
+    points = _spread(linear, turning, grade)
     nodes = []
     for values in product(*axes):
         shape = usual | {q.name: value for q, value in zip(bent, values)}
-        draws = tuple(shape | more for more in _spread(linear, turning, grade))
+        draws = tuple(shape | more for more in points)
         nodes.append(Node(shape, draws, 2 ** len(turning), _frequency(bent, values)))
     return tuple(nodes)
 
