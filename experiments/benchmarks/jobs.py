@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from experiments.benchmarks.accuracy import ACCURACY_STUDIES
+from experiments.benchmarks.all_rows import ALL_ROWS_STUDY
 from experiments.benchmarks.allan_jobs import ALLAN_JOBS
 from experiments.benchmarks.command_jobs import COMMAND_JOBS
 from experiments.benchmarks.compensation_jobs import COMPENSATION_JOBS
@@ -29,6 +30,7 @@ JOBS: tuple[Job, ...] = (
 STUDIES: tuple[Study, ...] = (
     *ACCURACY_STUDIES,
     *TRAINING_STUDIES,
+    ALL_ROWS_STUDY,
     *COMPENSATION_STUDIES,
     *DIAGNOSIS_STUDIES,
     *LIMIT_STUDIES,

@@ -1,7 +1,7 @@
 """Time and memory of training, and the error it buys, at 10,000 to 1,000,000 samples.
 
-``python -m experiments.benchmarks.training MODEL SAMPLES RATES UNIT`` trains one model in a process
-of its own and prints what it took as JSON; the study calls it, models in turn.
+``python -m experiments.benchmarks.training MODEL SAMPLES RATES UNIT [--rows N]`` trains one model in a
+process of its own and prints what it took as JSON; the study calls it, models in turn.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ import statistics
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -52,13 +53,21 @@ def training_run(unit: int, rates: Sequence[float], samples: int) -> Run:
     return world(unit).run(chamber(rates, whole_s / samples), whole_s / samples, unit, "train")[0]
 
 
-def trained_alone(model: str, samples: int, rates: str, unit: int, budget: Budget) -> dict[str, Any]:
-    """Train a model in this process: seconds, memory before and at most [MB], errors on other rates "
-    "[deg/h]."""
+def trained_alone(
+    model: str, samples: int, rates: str, unit: int, budget: Budget, rows: int | None = None
+) -> dict[str, Any]:
+    """Train a model in this process: seconds, memory before and at most [MB], errors on other rates [deg/h].
+
+    `rows` are those that a peer's training rows are averaged to at most, in place of its own number.
+    """
     from fogml.models.names import make_model
 
     run = training_run(unit, RATES[rates], samples)
-    unfitted: Any = make_model("rbf") if model == OURS else PeerModel(peer_of(model), budget)
+    if model == OURS:
+        unfitted: Any = make_model("rbf")
+    else:
+        peer = peer_of(model)
+        unfitted = PeerModel(peer if rows is None else replace(peer, most_rows=rows), budget)
     _warm_up(model, unit)
     before = high_water_mb(os.getpid())
     begin = time.perf_counter()
@@ -69,8 +78,8 @@ def trained_alone(model: str, samples: int, rates: str, unit: int, budget: Budge
     for label, rate in TESTS.items():
         test, truth = world(unit).run(chamber((rate,), 2.0), 2.0, 1000 + unit, label)
         errors[label] = rms_error(fitted.predict, test, truth)
-    rows = fitted.rows_ if isinstance(fitted, PeerModel) else fitted.card_.rows
-    return {"seconds": seconds, "before_mb": before, "peak_mb": peak, "rows": rows, "errors": errors}
+    used = fitted.rows_ if isinstance(fitted, PeerModel) else fitted.card_.rows
+    return {"seconds": seconds, "before_mb": before, "peak_mb": peak, "rows": used, "errors": errors}
 
 
 def _warm_up(model: str, unit: int) -> None:
@@ -185,7 +194,8 @@ def main(words: Sequence[str]) -> None:
     """Train one model and print what it took."""
     model, samples, rates, unit = words[:4]
     budget = QUICK if "--quick" in words else FULL
-    print(json.dumps(trained_alone(model, int(samples), rates, int(unit), budget)))
+    rows = int(words[words.index("--rows") + 1]) if "--rows" in words else None
+    print(json.dumps(trained_alone(model, int(samples), rates, int(unit), budget, rows)))
 
 
 if __name__ == "__main__":

@@ -13,7 +13,7 @@ from scipy.integrate import trapezoid
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from experiments.benchmarks import accuracy, diagnosis, limits, scale, training  # noqa: E402
+from experiments.benchmarks import accuracy, all_rows, diagnosis, limits, scale, training  # noqa: E402
 from experiments.benchmarks.accuracy_cases import Case, cold_start, thermal_cycle, twin_runs  # noqa: E402
 from experiments.benchmarks.harness import Ran  # noqa: E402
 from experiments.benchmarks.jobs import JOBS, STUDIES  # noqa: E402
@@ -179,6 +179,35 @@ def test_training_in_turn(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     assert [words[3] for words in asked] == ["500", "500", "501", "501"]
     assert found["rows"][1]["rows"] == training.QUICK.most_rows
     assert "| cubic | 150 |" in training.page(found)
+
+
+def test_peers_on_more_rows(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    """The page's figures by hand, from trainings that are stood in for."""
+
+    def alone(arguments: list[str], **_: object) -> Ran:
+        model, rows = (
+            arguments[2],
+            int(arguments[arguments.index("--rows") + 1]) if "--rows" in arguments else 9,
+        )
+        # KernelRidge in the square of its rows.
+        told = {"rows": rows, "seconds": 0.5 if model == training.OURS else 1e-3 * rows**2}
+        return Ran(json.dumps({**told, "errors": {"slower": 0.1, "faster": 0.2}}), 0.0, 0.0)
+
+    monkeypatch.setattr(all_rows, "run_python", alone)
+    found = all_rows.measure(True, 1, tmp_path)
+    assert [row["rows"] for row in found["rows"]] == [9, 100, 150] * 2
+    peers = found["rows"][1:3]
+    seconds, exponent = all_rows.at_all_samples(peers, 2_000)
+    assert exponent == pytest.approx(2.0) and seconds == pytest.approx(1e-3 * 2_000**2)
+    assert all_rows.at_all_samples(peers, 155) == (pytest.approx(22.5), None)
+    page = all_rows.page(found)
+    assert "| kernel-ridge | 150 | 22.5 s | 45 | 0.1000 | 0.2000 |" in page
+    assert "| kernel-ridge | all | | 8e+03; wanted 5: met | | |" in page
+
+
+def test_a_peer_takes_the_rows_that_are_asked_for():
+    told = training.trained_alone("kernel-ridge", 2_000, "one", 1, Budget(1, 2), 120)
+    assert 100 < told["rows"] <= 120
 
 
 @pytest.mark.parametrize("name", ["accuracy-twin", "compensation", "limits"])
