@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -17,7 +17,9 @@ from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square, mean_square_draws
 
 AVERAGING_S = 100.0
-DRAWS = 40
+DRAWS, NOISES, CHOICES = 40, 200, 4000
+LEAST_GAP = 0.2
+"""A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
 FORM_LEFT = 0.07
 """What of a closing may be missing because no form is known exactly, as a share of it."""
 _Z90 = 1.6448536269514722
@@ -60,9 +62,12 @@ def how_far(
     after: Fit,
     noise: Noise,
     rng: np.random.Generator,
-    widen: Callable[[float], float] = lambda deviation: deviation,
 ) -> HowFar:
     """Before, recalibrated, after and floor of a held-out run, and what is closed.
+
+    The interval of what is closed is that of what the effects' true constants would close, the floor being
+    that of the true noise. A floor that is uncertain by a factor makes it lopsided, and so do errors of
+    parameters: what such errors add to the mean square after, the true ones close besides.
 
     Parameters
     ----------
@@ -76,8 +81,6 @@ def how_far(
         The noise model.
     rng
         Draws parameters and noises for the interval.
-    widen
-        Calibration of the interval's standard deviation.
     """
     windows = averages(o)
     means = {c.name: c.mean for c in constants}
@@ -88,21 +91,27 @@ def how_far(
 
     squares = {name: _mean_square(gap(f)) for name, f in (("rec", recalibrated), ("after", after))}
     before = _mean_square(gap(means))
-    floor, floor_deviation = _floor(windows, noise, rng)
+    floor = float(expected_mean_square(noise.fit.model, windows.time, windows.window_s))
+    floors, noises = _floors(windows, noise, rng)
     closed, interval, note = None, None, ""
     denominator = squares["rec"] - floor
-    if denominator <= _Z90 * floor_deviation:
+    if denominator <= _Z90 * np.std(noises):
         note = "the recalibrated twin is at the floor within its noise: nothing left to close"
     else:
         closed = (squares["rec"] - squares["after"]) / denominator
-        deviation = floor_deviation / denominator
+        taken = np.zeros(DRAWS)
         if after.effects:
-            base = gap(after)
-            moved = [_mean_square(gap(c, e) - base) for c, e in after.draws(rng, DRAWS)]
-            deviation = float(np.hypot(deviation, np.median(moved) / denominator))
-            deviation = float(np.hypot(deviation, FORM_LEFT * closed))
-        deviation = widen(deviation)
-        interval = (closed - _Z90 * deviation, closed + _Z90 * deviation)
+            left = gap(after)
+            moves = [gap(c, e) - left for c, e in after.draws(rng, DRAWS)]
+            taken = np.array([_mean_square(move) + 2.0 * float(np.mean(move * left)) for move in moves])
+        which = rng.integers(NOISES, size=CHOICES)
+        # The true constants leave no less than the noise.
+        room = np.maximum(squares["after"] - noises[which], 0.0)
+        closing = squares["rec"] - squares["after"] + np.minimum(rng.choice(taken, CHOICES), room)
+        drawn = closing / np.maximum(squares["rec"] - floors[which], LEAST_GAP * denominator)
+        drawn *= 1.0 + FORM_LEFT * rng.standard_normal(CHOICES)
+        low, high = np.quantile(drawn, (0.05, 0.95))
+        interval = min(float(low), closed), max(float(high), closed)
     return HowFar(
         run=o.run.name,
         averaging_s=windows.window_s,
@@ -120,9 +129,9 @@ def _mean_square(values: FloatArray) -> float:
     return float(np.mean(values**2))
 
 
-def _floor(windows: Averages, noise: Noise, rng: np.random.Generator) -> tuple[float, float]:
-    """Expected mean square of the noise's averages, and the deviation of one run's from it."""
-    floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
-    drawn = mean_square_draws(noise.fit.model, windows.time, windows.window_s, 200, rng)
-    models = [expected_mean_square(m, windows.time, windows.window_s) for m in noise.fit.draw(rng, 12)]
-    return float(floor), float(np.hypot(np.std(drawn), np.std(models)))
+def _floors(windows: Averages, noise: Noise, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
+    """Expected mean squares of the noise, as uncertain as its coefficients, and those of one run each."""
+    models = noise.fit.draw(rng, NOISES)
+    expected = np.array([expected_mean_square(m, windows.time, windows.window_s) for m in models])
+    drawn = mean_square_draws(noise.fit.model, windows.time, windows.window_s, NOISES, rng)
+    return expected, expected * drawn / drawn.mean()
