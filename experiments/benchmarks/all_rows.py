@@ -20,7 +20,7 @@ from experiments.benchmarks.study import Study
 from experiments.benchmarks.training import OURS, RATES
 
 SAMPLES, UNIT = 10_000, 500
-ROWS = {"gaussian-process": (600, 1200, 2400), "kernel-ridge": (2000, 5000, 10_000)}
+ROWS = {"gaussian-process": (300, 600, 1200), "kernel-ridge": (2000, 5000, 10_000)}
 QUICK_SAMPLES, QUICK_ROWS = 2_000, {"kernel-ridge": (100, 150)}
 WANTED = {"gaussian-process": 15.0, "kernel-ridge": 5.0}
 """How many times as long a peer is to take as ours on all samples."""
