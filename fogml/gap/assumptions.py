@@ -25,8 +25,9 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
         f"An effect's true form may differ from the catalogue's by {SLACK:.0%} of its size; where a "
         "temperature that it needs was not recorded, that holds other thermal orders as well.",
         "Amplitudes are taken to lie within the card's ranges, or a decade or so above.",
-        f"An amplitude's standard error holds {FORM_ERROR:.0%} of it for the form of the effect, the "
-        f"interval of what is closed {FORM_LEFT:.0%} of that.",
+        f"An amplitude's standard error holds {FORM_ERROR:.0%} of it for the form of the effect. The "
+        f"interval of what is closed holds {FORM_LEFT:.0%} of that for it, an uncertain floor, and what "
+        "errors of the fitted values add to the gap after.",
         f"What is like a candidate (cosine above {RELATIVE:g} beside the constants) is no unknown.",
     ]
     widths = {o.run.name: o.row_s for o in p.fit if o.width > 1}

@@ -107,20 +107,23 @@ def with_noise_beside(p: Prepared, explained: Sequence[FloatArray]) -> Prepared:
 def _check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
     if not fit:
         raise InputError("no run to diagnose is given")
-    hashes: dict[str, str] = {}
+    held: dict[str, tuple[str, str]] = {}
     for role, runs in (("fit", fit), ("held-out", held_out)):
         for run in runs:
-            if run.hash in hashes:
+            if run.hash in held:
+                other, name = held[run.hash]
+                if other == role:
+                    raise InputError(f"{run.name}: the same samples as {name}; give each run once")
                 raise InputError(
-                    f"{run.name}: given as a {role} run and as {hashes[run.hash]} too; a held-out run "
+                    f"{run.name}: given as a {role} run and as a {other} run ({name}) too; a held-out run "
                     "must be one that the fit has not seen"
                 )
-            hashes[run.hash] = f"a {role} run ({run.name})"
+            held[run.hash] = role, run.name
     units = {run.facts.unit: run.name for run in (*fit, *held_out) if run.facts.unit}
     axes = {run.facts.axis: run.name for run in (*fit, *held_out) if run.facts.axis}
-    for what, held in (("unit", units), ("axis", axes)):
-        if len(held) > 1:
-            listed = ", ".join(f"{name} is {what} {value}" for value, name in held.items())
+    for what, stated in (("unit", units), ("axis", axes)):
+        if len(stated) > 1:
+            listed = ", ".join(f"{name} is {what} {value}" for value, name in stated.items())
             raise InputError(f"the runs are of different {what}s ({listed}); diagnose one {what} at a time")
 
 

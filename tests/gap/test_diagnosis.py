@@ -171,7 +171,7 @@ def of_unit(run, name):
     ("ask", "message"),
     [
         (lambda a, b, c: ([a, b], [b], {}), "b.csv: given as a held-out run and as a fit run"),
-        (lambda a, b, c: ([a, a], [c], {}), "given as a fit run and as a fit run"),
+        (lambda a, b, c: ([a, a], [c], {}), "the same samples as a.csv; give each run once"),
         (lambda a, b, c: ([a, of_unit(b, "other")], [c], {}), "runs are of different units"),
         (lambda a, b, c: ([still()], [c], {}), "temperature moves by 0 degC in all"),
         (lambda a, b, c: ([a[:30]], [c], {}), "needs at least 600 s"),
