@@ -37,7 +37,14 @@ def effects() -> dict[str, Effect]:
         If a package's effect cannot be loaded or its id is taken.
     """
     _discover()
-    return dict(sorted(_catalogue.items(), key=lambda item: (*_order(item[1].code), item[0])))
+    return {declared.id: declared for declared in sorted(_catalogue.values(), key=catalogue_order)}
+
+
+def catalogue_order(declared: Effect) -> tuple[str, int, str]:
+    """What sorts effects by the catalogue's letter codes."""
+    match = _CODE.match(declared.code)
+    letters, digits = match.groups() if match else ("", "")
+    return letters, int(digits or 0), declared.id
 
 
 def effect(id: str) -> Effect:
@@ -147,12 +154,6 @@ def _add(declared: Any, origin: str) -> None:
     if declared.id in _catalogue:
         raise InputError(f"{origin}: there is an effect '{declared.id}' already; unregister it first")
     _catalogue[declared.id] = declared
-
-
-def _order(code: str) -> tuple[str, int]:
-    match = _CODE.match(code)
-    letters, digits = match.groups() if match else ("", "")
-    return letters, int(digits or 0)
 
 
 def _near(id: str) -> str:

@@ -14,7 +14,7 @@ from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.quantities import Grade
-from fogml.twin.registry import effect, effects
+from fogml.twin.registry import catalogue_order, effect
 from fogml.twin.set_up import Plant, Sensors, Surroundings
 
 if TYPE_CHECKING:
@@ -97,10 +97,7 @@ class Twin:
             for other in declared.conflicts:
                 if other in self.settings:
                     raise InputError(f"effects '{id}' and '{other}' can't be on at the same time; remove one")
-        ordered = settings
-        if len(settings) > 1:
-            order = {id: place for place, id in enumerate(effects())}
-            ordered = dict(sorted(settings.items(), key=lambda item: order[item[0]]))
+        ordered = dict(sorted(settings.items(), key=lambda item: catalogue_order(effect(item[0]))))
         object.__setattr__(self, "settings", MappingProxyType(ordered))
         factors = dict.fromkeys(("N", "B", "K"), NOISE_FACTOR) | dict(self.noise_factor)
         object.__setattr__(self, "noise_factor", MappingProxyType(factors))
