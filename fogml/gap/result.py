@@ -90,6 +90,11 @@ class Found:
         """Whether it is named."""
         return self.probability >= NAMED
 
+    @property
+    def others(self) -> tuple[str, ...]:
+        """Members of its class beside itself."""
+        return tuple(m for m in self.members if m != self.effect)
+
 
 @dataclass(frozen=True)
 class Unknown:

@@ -47,7 +47,7 @@ def causes_table(found: Sequence[Found], names: dict[str, str]) -> Table:
         shape = "; ".join(
             f"{name.replace('_', ' ')} {estimate_words(value)}" for name, value in f.parameters.items()
         )
-        others = [title_of(m, names) for m in f.members if m != f.effect]
+        others = [title_of(m, names) for m in f.others]
         others += [f"{title_of(m, names)}, which was left out" for m in f.left_out]
         cells = (
             f"{title_of(f.effect, names)} ({f.effect})",

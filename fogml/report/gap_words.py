@@ -84,7 +84,7 @@ def closed_words(item: HowFar) -> str:
 
 def cause_words(found: Found, names: dict[str, str]) -> str:
     """An effect, or all of its class, as one cause."""
-    members = [found.effect, *(m for m in found.members if m != found.effect)]
+    members = [found.effect, *found.others]
     told = [title_of(m, names) for m in members]
     if len(told) <= _LIKELY_MEMBERS:
         return " or ".join(told)
