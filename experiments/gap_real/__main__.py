@@ -104,7 +104,10 @@ def facts(rows: list[dict[str, Any]]) -> dict[str, Any]:
     told = "from {before:.0f} to {recalibrated:.0f} deg/h on {axis}"
     named = [r for r in rows if r["named"]]
     sure = [r for r in named if max(n["probability"] for n in r["named"]) >= 0.8]
+    widest = [r for r in rows if r["axis"] == "x"]
     return {
+        "widest": len(widest),
+        "least_unknown": min(r["unknown"] for r in widest),
         "closed": ", ".join(told.format(**row) for row in last),
         "walk": max(r["walk"] for r in wide),
         "most": max(r["after"] / r["floor"] for r in rows),
@@ -165,8 +168,8 @@ VERDICT = """## Verdict
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
 - **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something,
-  {better} close half of the gap or more on the leg held out, and {harm} make it larger. Asked for the last
-  leg of x, where the loop is widest, the diagnosis says `unknown` and names nothing.
+  {better} close half of the gap or more on the leg held out, and {harm} make it larger. On x, where the loop
+  is widest, the unknown is at {least_unknown:.2f} or more in all {widest} diagnoses, whatever else is named.
 - **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure}
   diagnoses with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit
   runs: one leg down and one up, in which temperature, its rate and time go together, and a transition whose
