@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import subprocess
 import sys
-import time
 from importlib import import_module
 from types import SimpleNamespace
 
@@ -75,16 +74,6 @@ def test_help_loads_nothing_heavy():
     )
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
     assert found.stderr.strip() == "[]"
-
-
-def test_help_answers_soon():
-    times = []
-    for _ in range(5):
-        begun = time.perf_counter()
-        assert run_program("--help").returncode == 0
-        times.append(time.perf_counter() - begun)
-    # 0.1 s on an idle machine; other processes may hold the processor.
-    assert min(times) < 0.3
 
 
 def test_an_unknown_command_names_the_nearest():

@@ -222,19 +222,3 @@ def test_notes_on_use(train, other):
     assert any("the model states no unit" in note for note in notes)
     assert any("Earth rate" in note for note in notes)
     assert make_model("polynomial").fit(train).check_applies(other) == ()
-
-
-def test_million_rows_by_33_columns_stay_quick():
-    """A guard against falling back to lstsq or to one pass per column; the benchmark has the figures."""
-    import time
-
-    rng = np.random.default_rng(0)
-    n = 200_000
-    clock = np.arange(n) * 0.1
-    base = 20.0 + 30.0 * np.sin(clock / 3000.0)
-    sensors = {f"T{k}": base + np.sin(clock / (500.0 * k)) for k in (1, 2, 3, 4)}
-    run = Run.from_columns("long", time=clock, gyro=0.01 * base + rng.normal(size=n), **sensors)
-    make_model("multipoint-5-3").fit(run)
-    begin = time.perf_counter()
-    make_model("multipoint-5-3").fit(Run("long", run.columns))
-    assert time.perf_counter() - begin < 1.5
