@@ -101,9 +101,8 @@ def how_far(
         closed = (squares["rec"] - squares["after"]) / denominator
         taken = np.zeros(DRAWS)
         if after.effects:
-            left = gap(after)
-            moves = [gap(c, e) - left for c, e in after.draws(rng, DRAWS)]
-            taken = np.array([_mean_square(move) + 2.0 * float(np.mean(move * left)) for move in moves])
+            moved = [_mean_square(gap(c, e)) for c, e in after.draws(rng, DRAWS)]
+            taken = np.array(moved) - squares["after"]
         which = rng.integers(NOISES, size=CHOICES)
         # The true constants leave no less than the noise.
         room = np.maximum(squares["after"] - noises[which], 0.0)

@@ -229,7 +229,7 @@ class TimelineBlock:
     def step(self) -> IndexArray:
         """Number of the step, counted from 0, repeats written out."""
         starts = np.asarray(self.timeline.schedule.step_starts)
-        return self._spread(starts, np.arange(len(starts)))
+        return np.repeat(np.arange(len(starts)), self._samples_of(starts))
 
     def _given_or(self, what: Switched, automatic: FloatArray) -> FloatArray:
         given = self._held(what)
@@ -240,27 +240,28 @@ class TimelineBlock:
 
     def _hold(self, times: FloatArray, values: FloatArray) -> FloatArray:
         """Values that hold from their times on."""
-        return np.asarray(self._spread(times, values), dtype=np.float64)
+        return np.repeat(values, self._samples_of(times))
 
     def _linear(
         self, times: FloatArray, values: FloatArray, slopes: FloatArray, bends: FloatArray | None = None
     ) -> FloatArray:
         """Values that go on from their times with a slope, and with a second-order term if there is one."""
-        since = self.time - self._spread(times, times)
-        slope = self._spread(times, slopes)
+        samples = self._samples_of(times)
+        since = self.time - np.repeat(times, samples)
+        slope = np.repeat(slopes, samples)
         if bends is not None:
-            slope = slope + self._spread(times, bends) * since
-        return np.asarray(since * slope + self._spread(times, values), dtype=np.float64)
+            slope = slope + np.repeat(bends, samples) * since
+        return since * slope + np.repeat(values, samples)
 
-    def _spread(self, times: FloatArray, values: np.ndarray) -> np.ndarray:
-        """The value of the piece that a sample is in; a piece begins at its time, the clock's rounding apart.
+    def _samples_of(self, times: FloatArray) -> IndexArray:
+        """Number of samples in each piece; a piece begins at its time, the clock's rounding apart.
 
         What comes before the first time belongs to the first piece.
         """
         slack = _CLOCK_SLACK * self.timeline.sample_s
         edges = np.searchsorted(self.time, times - slack)
         edges[:1] = 0
-        return np.repeat(values, np.diff(edges, append=len(self)))
+        return np.diff(edges, append=len(self))
 
 
 def saturation_pressure(temperature: FloatArray) -> FloatArray:
