@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+# A step of the search may try a width of next to nothing.
+_NARROWEST = 300.0  # logarithm of one over its square
 LINEAR_PRECISION = 1e-6
 """Ridge of the linear part, in units of the noise variance: as good as none on standardised columns."""
 
@@ -44,6 +46,11 @@ class Value:
     centres: FloatArray
     log_widths: FloatArray
     log_ridge: float
+
+
+def inverse_squares(log_widths: FloatArray) -> FloatArray:
+    """One over the squares of widths."""
+    return np.asarray(np.exp(np.minimum(-2.0 * log_widths, _NARROWEST)))
 
 
 class Objective:
@@ -123,9 +130,7 @@ class Objective:
             empty[:, count:] = self._linear
             self._buffers[count] = empty
         design = self._buffers[count]
-        # A step of the search may try a width of next to nothing; its objective is infinite then.
-        with np.errstate(over="ignore"):
-            inverse_square = np.exp(-2.0 * shape.log_widths)
+        inverse_square = inverse_squares(shape.log_widths)
         exponent = np.hstack(
             [
                 -inverse_square,
@@ -180,7 +185,7 @@ class Objective:
         slope.mul_(design[:, :count])
         sums = torch.mm(slope.T, self._moments).double().cpu().numpy()
         square, first, zeroth = np.split(sums, [self.dimensions, 2 * self.dimensions], axis=1)
-        inverse_square = np.exp(-2.0 * shape.log_widths)
+        inverse_square = inverse_squares(shape.log_widths)
         by_centres = 2.0 * inverse_square * (first - shape.centres * zeroth)
         by_widths = 2.0 * inverse_square * (square - 2.0 * shape.centres * first + shape.centres**2 * zeroth)
         return Value(float(value), by_centres, by_widths, by_ridge)

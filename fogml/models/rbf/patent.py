@@ -14,7 +14,7 @@ from fogml.models.folds import dealt_folds
 from fogml.models.rbf.centres import orthogonal_least_squares, thinned, thinned_rows
 from fogml.models.rbf.evaluate import basis_functions
 from fogml.models.rbf.fitted import NetworkRegressor
-from fogml.models.rbf.search import Frame
+from fogml.models.rbf.levels import Frame
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]

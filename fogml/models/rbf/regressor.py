@@ -13,8 +13,9 @@ from fogml.errors import InputError
 from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.blocks import average_in_blocks
 from fogml.models.rbf.fitted import NetworkRegressor
+from fogml.models.rbf.levels import Frame
 from fogml.models.rbf.rates import RATES_THAT_TELL, followed_columns, restrained_inputs, training_rates
-from fogml.models.rbf.search import Frame, Search, SearchSettings
+from fogml.models.rbf.search import COARSE_ROWS, COARSE_ROWS_PER_CENTRE, Search, SearchSettings
 from fogml.models.rbf.tuning import TuningSettings
 
 if TYPE_CHECKING:
@@ -34,7 +35,8 @@ class RBFRegressor(NetworkRegressor):
 
     Rows are taken to be in order of time. Centres and widths are tuned on averages of blocks of
     time, by L-BFGS on the log evidence with the output weights solved exactly at every step
-    (variable projection); the output weights are then solved for on all rows by QR in float64.
+    (variable projection): starts and sizes race on about a thousand coarse averages, the best network
+    is refined on finer ones. The output weights are then solved for on all rows by QR in float64.
     The same rows, parameters and machine give the same network.
 
     Parameters
@@ -60,7 +62,7 @@ class RBFRegressor(NetworkRegressor):
         also start e^3 times wider, and beyond the training rows the network goes on linearly along
         its slope there. None: starts are tried input by input.
     average_rows
-        Rows are averaged in blocks down to about this number for tuning.
+        Rows are averaged in blocks down to about this number for the network that is kept.
     width_prior
         Standard deviation of the log-normal prior of own widths about the shared ones.
     seed
@@ -165,9 +167,12 @@ class RBFRegressor(NetworkRegressor):
         inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         inputs, target = np.ascontiguousarray(inputs), np.asarray(target, dtype=np.float64)
         seen = self._seen(inputs.shape[1])
+        settings = self._settings()
         rows = average_in_blocks(inputs, target, self.average_rows, groups, time)
+        coarse = max(COARSE_ROWS, COARSE_ROWS_PER_CENTRE * max(settings.sizes))
+        tried = average_in_blocks(inputs, target, coarse, groups, time) if coarse < len(rows.target) else rows
         frame = Frame.of(inputs, target)
-        found = Search(rows, frame, seen, self._settings()).run()
+        found = Search(rows, tried, frame, seen, settings).run()
         self.sizes_tried_ = {str(size): value for size, value in found.tried.items()}
         self.independent_share_ = found.share
         self.ridge_ = float(np.exp(found.shape.log_ridge)) * rows.per_row

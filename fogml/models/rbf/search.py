@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
@@ -11,10 +11,17 @@ from numpy.typing import NDArray
 
 from fogml.models.rbf.blocks import AveragedRows
 from fogml.models.rbf.centres import kmeans_centres, ols_centres
-from fogml.models.rbf.objective import Objective, Shape
+from fogml.models.rbf.levels import Frame, Level
+from fogml.models.rbf.objective import Shape
 from fogml.models.rbf.stopping import Watch, held_out_rows
 from fogml.models.rbf.together import joined
-from fogml.models.rbf.tuning import LOG_WIDTH_RANGE, TuningSettings, tune_own, tune_shared
+from fogml.models.rbf.tuning import (
+    LOG_WIDTH_RANGE,
+    Descent,
+    OwnVariables,
+    SharedVariables,
+    TuningSettings,
+)
 from fogml.models.tall_least_squares import one_blas_thread
 
 FloatArray = NDArray[np.float64]
@@ -23,31 +30,17 @@ IndexArray = NDArray[np.intp]
 _LEAST_LOG_WIDTH = float(np.log(2.0))  # of shared widths along inputs that hold a rate
 _WIDE = 3.0  # wide widths start e^3 times wider
 _ROWS_PER_CENTRE = 3
+COARSE_ROWS, COARSE_ROWS_PER_CENTRE = 1000, 15
+"""Rows on which shapes are tried: at least so many, and so many to each centre of the largest network."""
 _MANY_INPUTS = 6  # more inputs than this are not tried one by one
 _TRIED_CENTRES = 16
 _STARTS = 2
+_RACE_STEPS = 15
+_BEHIND_NATS = 0.5
 _FIRST_LOG_RIDGE = -4.0
 _ROUNDING = 1e-9  # of the target's standard deviation
 _VALIDATION_RIDGE = 1e-6
 _NEARLY_INDEPENDENT = 0.7  # a greater share of independent rows changes nothing
-
-
-@dataclass(frozen=True)
-class Frame:
-    """Mean and standard deviation of the inputs, shape (k,), and of the target."""
-
-    shift: FloatArray
-    scale: FloatArray
-    target_shift: float
-    target_scale: float
-
-    @classmethod
-    def of(cls, inputs: FloatArray, target: FloatArray) -> Frame:
-        """The frame of training rows; what does not vary is left unscaled."""
-        shift, scale = inputs.mean(axis=0), inputs.std(axis=0)
-        scale = np.where(scale > 1e-12 * np.maximum(np.abs(shift), 1e-300), scale, 1.0)
-        deviation = float(target.std())
-        return cls(shift, scale, float(target.mean()), deviation if deviation > 0.0 else 1.0)
 
 
 @dataclass(frozen=True)
@@ -75,13 +68,49 @@ class Found:
     share: float
 
 
-class Search:
-    """The search on averaged rows.
+class Tried:
+    """A descent, and what watches it.
 
     Parameters
     ----------
-    rows
-        Averaged rows.
+    log_widths
+        Shared log widths that it starts from, shape (d,).
+    descent, watch
+        The descent, and what watches it, if anything does.
+
+    Attributes
+    ----------
+    early
+        What it had reached after its first few steps; infinite where it went to its end at once.
+    """
+
+    def __init__(self, log_widths: FloatArray, descent: Descent, watch: Watch | None) -> None:
+        self.log_widths, self._watch = log_widths, watch
+        self.descent = descent
+        self.early = float("inf")
+
+    @property
+    def reached(self) -> tuple[float, Shape]:
+        """Objective so far, or the error on held-out rows, and its network."""
+        if self._watch is not None and self._watch.best is not None:
+            return self._watch.error, self._watch.best
+        return self.descent.value, self.descent.shape
+
+    def run(self, steps: int | None = None) -> Tried:
+        """Go on by so many steps, or to the end."""
+        self.descent.run(steps)
+        if steps is not None and not np.isfinite(self.early):
+            self.early = self.reached[0]
+        return self
+
+
+class Search:
+    """The search on averaged rows: all that is tried on coarse ones, the best refined on fine ones.
+
+    Parameters
+    ----------
+    fine, coarse
+        Averaged rows; the same where there are few.
     frame
         Standardisation of inputs and target.
     seen
@@ -90,16 +119,20 @@ class Search:
         What may be done.
     """
 
-    def __init__(self, rows: AveragedRows, frame: Frame, seen: IndexArray, settings: SearchSettings) -> None:
+    def __init__(
+        self,
+        fine: AveragedRows,
+        coarse: AveragedRows,
+        frame: Frame,
+        seen: IndexArray,
+        settings: SearchSettings,
+    ) -> None:
         self.settings = settings
-        inputs = (rows.inputs - frame.shift) / frame.scale
-        self._linear = np.column_stack([inputs, np.ones(len(inputs))])
-        self._inputs = np.ascontiguousarray(inputs[:, seen])
-        self._target = (rows.target - frame.target_shift) / frame.target_scale
-        self._in_time = rows.in_time
+        place = frame, seen, settings.device, settings.dtype
+        self._fine = Level(fine, *place)
+        self._coarse = self._fine if coarse is fine else Level(coarse, *place)
         self._share = 1.0
         self._centres: dict[tuple[int, int], FloatArray] = {}
-        self._ends: dict[tuple[object, ...], tuple[float, Shape]] = {}
         wide = settings.wide_inputs
         self._wide = None if wide is None else np.isin(seen, np.asarray(wide, dtype=np.intp))
 
@@ -112,23 +145,26 @@ class Search:
 
     def run(self) -> Found:
         """Tune every size and keep the best; larger sizes are left once they gain nothing."""
-        dimensions = self._inputs.shape[1]
-        most = len(np.unique(self._inputs, axis=0)) // _ROWS_PER_CENTRE
+        dimensions = self._fine.inputs.shape[1]
+        most = len(np.unique(self._fine.inputs, axis=0)) // _ROWS_PER_CENTRE
         sizes = sorted({min(size, most) for size in self.settings.sizes} - {0})
         if dimensions == 0 or not sizes or self._linear_suffices():
             return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0}, 1.0)
+        evidence = self.settings.evidence
         with one_blas_thread(), _one_torch_thread(), self._beside_others():
-            starts = self._best_starts(min(sizes[0], _TRIED_CENTRES))
-            value, best = self._best(sizes[0], starts)
-            tried = {sizes[0]: value}
+            first = self._first(min(sizes[0], _TRIED_CENTRES))
+            starts = [tried.log_widths for tried in first]
+            # With fewer independent rows another optimum is the better one, and not near the first.
+            same = evidence and sizes[0] <= _TRIED_CENTRES and self._share == 1.0
+            best = first[0] if same else self._race(sizes[0], starts, evidence)[0]
+            values = {sizes[0]: best.reached[0]}
             for size in sizes[1:]:
-                value, shape = self._best(size, starts)
-                better = value < min(tried.values())
-                tried[size] = value
-                if not better:
+                tried = self._race(size, starts, evidence, best)[0]
+                values[size] = tried.reached[0]
+                if tried.reached[0] >= best.reached[0]:
                     break
-                best = shape
-        return Found(best, tried, self._share)
+                best = tried
+            return Found(self._refined(best), values, self._share)
 
     @staticmethod
     def _beside_others() -> AbstractContextManager[None]:
@@ -138,31 +174,47 @@ class Search:
 
     def _linear_suffices(self) -> bool:
         """Whether the linear part leaves nothing but rounding."""
-        weights, *_ = np.linalg.lstsq(self._linear, self._target, rcond=None)
-        return float(np.max(np.abs(self._target - self._linear @ weights))) < _ROUNDING
+        linear, target = self._fine.linear, self._fine.target
+        weights, *_ = np.linalg.lstsq(linear, target, rcond=None)
+        return float(np.max(np.abs(target - linear @ weights))) < _ROUNDING
 
-    def _best_starts(self, count: int) -> list[FloatArray]:
-        """The log widths from which a small network does best, of `_first_widths`.
+    def _first(self, count: int) -> list[Tried]:
+        """Descents of a small network from the log widths from which it does best, of `_first_widths`.
 
         The evidence has several optima, in some of which the network is as good as linear in an
         input, and which of them a descent ends in depends on the widths that it starts from.
         What the best leaves tells how many rows count as independent from here on.
         """
-        widths = self._first_widths()
-        ends = [self._tuned(count, start, evidence=True) for start in widths]
-        order = np.argsort([value for value, _ in ends], kind="stable")
-        if self._in_time and self.settings.evidence:
-            share = independent_share(self._objective_of_all().residuals(ends[order[0]][1]))
-            self._share = share if share < _NEARLY_INDEPENDENT else 1.0
-        return [widths[i] for i in order[:_STARTS]]
+        first = self._race(count, self._first_widths(), evidence=True)
+        if self.settings.evidence:
+            self._share = self._share_of(self._coarse, first[0].reached[1])
+        return first
 
-    def _best(self, count: int, starts: list[FloatArray]) -> tuple[float, Shape]:
-        """Objective reached with `count` centres from the best of several starts, and the shape."""
-        return min((self._tuned(count, start) for start in starts), key=lambda end: end[0])
+    def _share_of(self, level: Level, shape: Shape) -> float:
+        """Share of rows that count as independent, by what a network leaves of them."""
+        if not level.in_time:
+            return 1.0
+        share = independent_share(level.objective(True, 1.0)[0].residuals(shape))
+        return share if share < _NEARLY_INDEPENDENT else 1.0
+
+    def _race(
+        self, count: int, starts: Sequence[FloatArray], evidence: bool, smaller: Tried | None = None
+    ) -> list[Tried]:
+        """Descents with `count` centres from several log widths, the best first.
+
+        All go a few steps, those that have come the furthest go on, and the best goes to its end, but
+        for one that is behind a smaller network after as many steps.
+        """
+        tried = _ahead(self._start(count, log_widths, evidence) for log_widths in starts)
+        if len(tried) > _STARTS:
+            tried = _ahead(tried[:_STARTS])
+        if smaller is None or tried[0].early <= smaller.early + _BEHIND_NATS:
+            tried[0].run()
+        return tried
 
     def _first_widths(self) -> list[FloatArray]:
         """Log widths of the short descents: all equal, rates wider, all but one wider in turn."""
-        dimensions = self._inputs.shape[1]
+        dimensions = self._fine.inputs.shape[1]
         widths = [np.zeros(dimensions), np.ones(dimensions)]
         if 1 < dimensions <= _MANY_INPUTS:
             widths += [np.where(np.arange(dimensions) == i, 0.0, _WIDE / 2) for i in range(dimensions)]
@@ -171,57 +223,53 @@ class Search:
         bounded = [np.maximum(start, self._least_log_widths) for start in widths]
         return list({tuple(start): start for start in bounded}.values())
 
-    def _tuned(self, count: int, log_widths: FloatArray, evidence: bool | None = None) -> tuple[float, Shape]:
-        """Objective reached with `count` centres from shared log widths, and the shape."""
-        evidence = self.settings.evidence if evidence is None else evidence
-        key = (count, tuple(log_widths.tolist()), evidence, self._share)
-        if key not in self._ends:
-            self._ends[key] = self._descend(count, log_widths, evidence)
-        return self._ends[key]
-
-    def _descend(self, count: int, log_widths: FloatArray, evidence: bool) -> tuple[float, Shape]:
-        settings = self.settings
-        log_ridge = settings.tuning.log_ridge
-        learn = log_ridge is None and evidence
-        if log_ridge is None:
-            log_ridge = _FIRST_LOG_RIDGE if evidence else float(np.log(_VALIDATION_RIDGE * len(self._target)))
-        fitted, held = held_out_rows(len(self._target), everything=evidence)
-        inputs, linear, target = self._inputs[fitted], self._linear[fitted], self._target[fitted]
-        objective = self._objective(inputs, linear, target, evidence)
-        if settings.centre_choice == "ols":
-            centres = ols_centres(inputs, linear, target, np.exp(log_widths), count)
+    def _start(self, count: int, log_widths: FloatArray, evidence: bool) -> Tried:
+        """A descent on coarse rows that has not begun."""
+        settings, level = self.settings, self._coarse
+        objective, watch = level.objective(evidence, self._share)
+        stated = settings.tuning.log_ridge
+        if stated is not None:
+            log_ridge = stated - self._log_ridge_change
         else:
-            centres = self._kmeans(inputs, count)
-        watch = None
-        if not evidence:
-            watch = Watch(objective, self._inputs[held], self._linear[held], self._target[held])
-        if settings.tune:
-            value, shape = tune_own(objective, centres, log_widths, log_ridge, self._tuning, learn, watch)
-        else:
-            value, log_widths, log_ridge = tune_shared(
-                objective, centres, log_widths, log_ridge, self._tuning, learn, watch
-            )
-            shape = Shape(centres, np.tile(log_widths, (len(centres), 1)), log_ridge)
-        if watch is not None and watch.best is not None:
-            return watch.error, watch.best
-        return value, shape
+            log_ridge = _FIRST_LOG_RIDGE if evidence else float(np.log(_VALIDATION_RIDGE * len(level)))
+        centres = self._first_centres(level, count, log_widths, evidence)
+        variables = (OwnVariables if settings.tune else SharedVariables)(
+            centres, log_widths, log_ridge, self._tuning
+        )
+        learn = stated is None and evidence
+        return Tried(log_widths, Descent(objective, variables, learn, watch), watch)
 
-    def _kmeans(self, inputs: FloatArray, count: int) -> FloatArray:
+    def _first_centres(self, level: Level, count: int, log_widths: FloatArray, evidence: bool) -> FloatArray:
+        """Where centres begin, shape (count, d)."""
+        rows = held_out_rows(len(level), everything=evidence)[0]
+        inputs = level.inputs[rows]
+        if self.settings.centre_choice == "ols":
+            return ols_centres(inputs, level.linear[rows], level.target[rows], np.exp(log_widths), count)
         key = (count, len(inputs))
         if key not in self._centres:
             self._centres[key] = kmeans_centres(inputs, count, self.settings.seed)
         return self._centres[key]
 
-    def _objective_of_all(self) -> Objective:
-        return self._objective(self._inputs, self._linear, self._target, evidence=True)
+    @property
+    def _log_ridge_change(self) -> float:
+        """By how much the log ridge of a fine row is larger: its noise variance is."""
+        return float(np.log(self._coarse.per_row / self._fine.per_row))
 
-    def _objective(
-        self, inputs: FloatArray, linear: FloatArray, target: FloatArray, evidence: bool
-    ) -> Objective:
-        place = {"device": self.settings.device, "dtype": self.settings.dtype}
-        objective = Objective(inputs, linear, target, evidence=evidence, **place)
-        objective.share = self._share
-        return objective
+    def _refined(self, best: Tried) -> Shape:
+        """The best network, gone on with on fine rows."""
+        if self._fine is self._coarse:
+            return best.reached[1]
+        evidence = self.settings.evidence
+        if evidence:
+            self._share = self._share_of(self._fine, best.reached[1])
+        objective, watch = self._fine.objective(evidence, self._share)
+        descent = best.descent.on(objective, self._log_ridge_change, watch)
+        return Tried(best.log_widths, descent, watch).run().reached[1]
+
+
+def _ahead(tried: Iterable[Tried]) -> list[Tried]:
+    """Descents after some more steps, those first that have come the furthest."""
+    return sorted((one.run(_RACE_STEPS) for one in tried), key=lambda one: one.reached[0])
 
 
 def independent_share(residuals: FloatArray) -> float:

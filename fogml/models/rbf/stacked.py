@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.models.rbf.objective import LINEAR_PRECISION, Objective, Shape, Value
+from fogml.models.rbf.objective import LINEAR_PRECISION, Objective, Shape, Value, inverse_squares
 
 if TYPE_CHECKING:
     import torch
@@ -48,7 +48,7 @@ def values_together(stack: Stack, shapes: Sequence[Shape]) -> list[Value]:
     if len(shapes) == 1:
         return [first.value(shapes[0])]
     centres = np.stack([shape.centres for shape in shapes])
-    inverse_square = np.exp(-2.0 * np.stack([shape.log_widths for shape in shapes]))
+    inverse_square = inverse_squares(np.stack([shape.log_widths for shape in shapes]))
     exponent = np.concatenate(
         [
             -inverse_square,

@@ -6,10 +6,9 @@ shared widths are tuned along. A descent with shared widths alone first ends in 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import log
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,8 @@ Bounds = tuple[float | None, float | None]
 LOG_RIDGE_RANGE: Bounds = (log(1e-7), log(1e6))
 LOG_WIDTH_RANGE: Bounds = (log(0.05), log(300.0))
 _MEMORY = 20  # steps that L-BFGS remembers
-_FLAT = 1e-7  # share of the objective below which a step gains nothing
+_FLAT_NATS = 3e-3  # below which a step gains nothing
+_FLAT = 1e-7  # the same as a share, where the first value says nothing
 
 
 class Function(Protocol):
@@ -32,8 +32,10 @@ class Function(Protocol):
     def __call__(self, shape: Shape) -> Value: ...
 
 
-Watcher = Callable[[Shape], None]
-"""Called with the shape after each iteration; raises StopIteration to end the descent."""
+class Watcher(Protocol):
+    """Sees the shape after each iteration; raises StopIteration to end the descent."""
+
+    def __call__(self, shape: Shape) -> None: ...
 
 
 @dataclass(frozen=True)
@@ -62,92 +64,174 @@ class TuningSettings:
     least_log_widths: FloatArray | None = None
 
 
-def tune_shared(
-    objective: Function,
-    centres: FloatArray,
-    log_widths: FloatArray,
-    log_ridge: float,
-    settings: TuningSettings,
-    learn: bool,
-    watch: Watcher | None = None,
-) -> tuple[float, FloatArray, float]:
-    """Minimise over one log width per input, and the ridge where it is to be learned; centres stay.
+class Variables(Protocol):
+    """What a descent moves, as one vector; its last entry is the log ridge."""
 
-    Returns
-    -------
-    (value, log widths of shape (d,), log ridge)
-    """
-    dimensions = centres.shape[1]
+    begin: FloatArray
+    steps: int
 
-    def shape(values: FloatArray) -> Shape:
-        return Shape(centres, np.tile(values[:dimensions], (len(centres), 1)), float(values[-1]))
+    def shape(self, values: FloatArray) -> Shape:
+        """The network that values stand for."""
 
-    def pull(value: Value) -> tuple[float, FloatArray]:
-        slope = np.append(value.log_widths.sum(axis=0), value.log_ridge if learn else 0.0)
-        return value.value, slope
+    def pull(self, value: Value, values: FloatArray) -> tuple[float, FloatArray]:
+        """Objective with the priors of the values, and its gradient by them."""
 
-    bounds = [
-        *_width_bounds(settings, dimensions),
-        LOG_RIDGE_RANGE if learn else (log_ridge, log_ridge),
-    ]
-    begin = np.append(log_widths, log_ridge)
-    best, values = _descend(
-        lambda v: pull(objective(shape(v))), begin, bounds, settings.shared_steps, shape, watch
-    )
-    return best, values[:dimensions], float(values[-1])
+    def bounds(self) -> list[Bounds]:
+        """Of all values but the ridge."""
 
 
-def tune_own(
-    objective: Function,
-    centres: FloatArray,
-    log_widths: FloatArray,
-    log_ridge: float,
-    settings: TuningSettings,
-    learn: bool,
-    watch: Watcher | None = None,
-) -> tuple[float, Shape]:
-    """Minimise over all centres and widths, shared widths and, where it is to be learned, the ridge.
+class SharedVariables:
+    """One log width per input, shape (d,); centres, shape (j, d), stay where they are."""
 
-    Moves of centres and own widths have normal priors, see `TuningSettings`.
+    def __init__(
+        self, centres: FloatArray, log_widths: FloatArray, log_ridge: float, settings: TuningSettings
+    ) -> None:
+        self._centres, self._settings = centres, settings
+        self.begin, self.steps = np.append(log_widths, log_ridge), settings.shared_steps
+
+    def shape(self, values: FloatArray) -> Shape:
+        return Shape(self._centres, np.tile(values[:-1], (len(self._centres), 1)), float(values[-1]))
+
+    def pull(self, value: Value, values: FloatArray) -> tuple[float, FloatArray]:
+        return value.value, np.append(value.log_widths.sum(axis=0), value.log_ridge)
+
+    def bounds(self) -> list[Bounds]:
+        return _width_bounds(self._settings, self._centres.shape[1])
+
+
+class OwnVariables:
+    """All centres and widths, and shared widths; moves of centres and own widths have normal priors.
 
     Parameters
     ----------
     centres, log_widths, log_ridge
         Where to begin: shape (j, d), shared widths of shape (d,), and the ridge.
-
-    Returns
-    -------
-    (value with the priors, shape)
+    settings
+        The priors.
     """
-    count, dimensions = centres.shape
-    size = count * dimensions
-    unit = np.exp(log_widths) * settings.centre_prior
-    # A wide input needs no moves of its width: moves stay within the rows' spread.
-    unit = np.minimum(unit, settings.centre_prior)
 
-    def shape(values: FloatArray) -> Shape:
-        moves, own = (part.reshape(count, dimensions) for part in (values[:size], values[size : 2 * size]))
-        shared = values[2 * size : 2 * size + dimensions]
-        return Shape(centres + unit * moves, shared + settings.width_prior * own, float(values[-1]))
+    def __init__(
+        self, centres: FloatArray, log_widths: FloatArray, log_ridge: float, settings: TuningSettings
+    ) -> None:
+        self._centres, self._settings = centres, settings
+        self._size = centres.size
+        # A wide input needs no moves of its width: moves stay within the rows' spread.
+        self._unit = np.minimum(np.exp(log_widths) * settings.centre_prior, settings.centre_prior)
+        self.begin = np.concatenate([np.zeros(2 * self._size), log_widths, [log_ridge]])
+        self.steps = settings.own_steps
 
-    def pull(values: FloatArray) -> tuple[float, FloatArray]:
-        value = objective(shape(values))
+    def shape(self, values: FloatArray) -> Shape:
+        size, form = self._size, self._centres.shape
+        moves, own = values[:size].reshape(form), values[size : 2 * size].reshape(form)
+        log_widths = values[2 * size : -1] + self._settings.width_prior * own
+        return Shape(self._centres + self._unit * moves, log_widths, float(values[-1]))
+
+    def pull(self, value: Value, values: FloatArray) -> tuple[float, FloatArray]:
+        size = self._size
         slope = np.concatenate(
             [
-                (value.centres * unit).ravel() + values[:size],
-                (value.log_widths * settings.width_prior).ravel() + values[size : 2 * size],
+                (value.centres * self._unit).ravel() + values[:size],
+                (value.log_widths * self._settings.width_prior).ravel() + values[size : 2 * size],
                 value.log_widths.sum(axis=0),
-                [value.log_ridge if learn else 0.0],
+                [value.log_ridge],
             ]
         )
         penalty = 0.5 * float(values[: 2 * size] @ values[: 2 * size])
         return value.value + penalty, slope
 
-    begin = np.concatenate([np.zeros(2 * size), log_widths, [log_ridge]])
-    bounds: list[Bounds] = [(None, None)] * (2 * size)
-    bounds += [*_width_bounds(settings, dimensions), LOG_RIDGE_RANGE if learn else (log_ridge, log_ridge)]
-    best, values = _descend(pull, begin, bounds, settings.own_steps, shape, watch)
-    return best, shape(values)
+    def bounds(self) -> list[Bounds]:
+        free: list[Bounds] = [(None, None)] * (2 * self._size)
+        return free + _width_bounds(self._settings, self._centres.shape[1])
+
+
+class Descent:
+    """A descent that can be left and gone on with, also on other rows; L-BFGS within bounds.
+
+    Where it goes on, it does so as if it had never been left: what L-BFGS knows of the curvature is
+    won back from the values that it has asked for, which are kept until its end.
+
+    Parameters
+    ----------
+    function
+        The objective.
+    variables
+        What moves.
+    learn
+        Whether the ridge is learned, rather than kept.
+    watch
+        Sees every step.
+
+    Attributes
+    ----------
+    value
+        Objective with the priors where it stands; infinite before the first step.
+    """
+
+    def __init__(
+        self, function: Function, variables: Variables, learn: bool, watch: Watcher | None = None
+    ) -> None:
+        self._function, self._variables, self._learn, self._watch = function, variables, learn, watch
+        self._begin = self._values = variables.begin
+        self._steps = self._seen = 0
+        self._ended = False
+        self._asked: dict[bytes, tuple[float, FloatArray]] = {}
+        self.value = float("inf")
+
+    @property
+    def shape(self) -> Shape:
+        """The network where it stands."""
+        return self._variables.shape(self._values)
+
+    def run(self, steps: int | None = None) -> Descent:
+        """Go on by so many steps, or to the end."""
+        most = self._variables.steps if steps is None else min(self._steps + steps, self._variables.steps)
+        if self._ended or most <= self._steps:
+            return self
+        from scipy.optimize import minimize
+
+        ridge = float(self._begin[-1])
+        first = abs(self._pull(self._begin)[0])
+        flat = _FLAT_NATS / max(first, 1.0) if np.isfinite(first) else _FLAT
+        options = {"maxiter": most, "maxcor": _MEMORY, "ftol": flat}
+        passed = iter(range(1, most + 1))
+        found = minimize(
+            self._pull,
+            self._begin,
+            jac=True,
+            method="L-BFGS-B",
+            bounds=[*self._variables.bounds(), LOG_RIDGE_RANGE if self._learn else (ridge, ridge)],
+            options=options,
+            callback=lambda intermediate_result: self._see(next(passed), intermediate_result.x),
+        )
+        self.value, self._values = float(found.fun), np.asarray(found.x)
+        self._steps = most
+        self._ended = int(found.nit) < most or most == self._variables.steps
+        if self._ended:
+            self._asked.clear()
+        return self
+
+    def on(self, function: Function, log_ridge: float = 0.0, watch: Watcher | None = None) -> Descent:
+        """A descent from where this one stands on another objective, its log ridge changed by so much."""
+        other = Descent(function, self._variables, self._learn, watch)
+        other._begin = self._values.copy()
+        other._begin[-1] += log_ridge
+        other._values = other._begin
+        return other
+
+    def _see(self, step: int, values: FloatArray) -> None:
+        if self._watch is not None and step > self._seen:
+            self._seen = step
+            self._watch(self._variables.shape(values))
+
+    def _pull(self, values: FloatArray) -> tuple[float, FloatArray]:
+        key = values.tobytes()
+        if key not in self._asked:
+            value, slope = self._variables.pull(self._function(self._variables.shape(values)), values)
+            if not self._learn:
+                slope[-1] = 0.0
+            self._asked[key] = value, slope
+        value, slope = self._asked[key]
+        return value, slope.copy()
 
 
 def _width_bounds(settings: TuningSettings, dimensions: int) -> list[Bounds]:
@@ -155,20 +239,3 @@ def _width_bounds(settings: TuningSettings, dimensions: int) -> list[Bounds]:
     if settings.least_log_widths is None:
         return [LOG_WIDTH_RANGE] * dimensions
     return [(float(least), LOG_WIDTH_RANGE[1]) for least in settings.least_log_widths]
-
-
-def _descend(
-    function: Callable[[FloatArray], tuple[float, FloatArray]],
-    begin: FloatArray,
-    bounds: list[Bounds],
-    steps: int,
-    shape: Callable[[FloatArray], Shape],
-    watch: Watcher | None,
-) -> tuple[float, FloatArray]:
-    """Minimum of a function with its gradient, by L-BFGS within bounds."""
-    from scipy.optimize import minimize
-
-    options = {"maxiter": steps, "maxcor": _MEMORY, "ftol": _FLAT}
-    extra: dict[str, Any] = {} if watch is None else {"callback": lambda values: watch(shape(values))}
-    found = minimize(function, begin, jac=True, method="L-BFGS-B", bounds=bounds, options=options, **extra)
-    return float(found.fun), np.asarray(found.x)
