@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,7 +46,14 @@ def found_effects(
         fit = fit_model(
             p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
         )
-    fitted = {e.id: e for e in fit.effects}
+    # A replay can't show what has another phase on each run: there the evidence has the amplitude.
+    seen = {
+        r.chosen.candidate: _rough(r, search, candidates)
+        for r in ranking.effects
+        if getattr(candidates[r.chosen.candidate], "drawn_per_run", False)
+    }
+    fit = replace(fit, effects=tuple(seen[e.id][0] if e.id in seen else e for e in fit.effects))
+    fitted = {e.id: e for e in fit.effects if e.id not in seen}
     errors = fit.standard_errors
     found = []
     for r in ranking.effects:
@@ -54,8 +62,7 @@ def found_effects(
         se = float(errors.get(f"{id}.amplitude", 0.0))
         shape_errors = {q.name: float(errors.get(f"{id}.{q.name}", 0.0)) for q in declared.shape}
         if value is None or se == 0.0:
-            # Not fitted, or a line of any phase, which a replay can't show.
-            value, se = _rough(r, search, candidates)
+            value, se = seen.get(id) or _rough(r, search, candidates)
             shape_errors = {q.name: _spread(r, search, q) for q in declared.shape if q.name in value.shape}
         se = math.hypot(se, FORM_ERROR * value.amplitude)
         found.append(

@@ -117,6 +117,21 @@ def test_a_single_effect_is_named_alone_or_in_its_class(id):
     assert far.after < far.recalibrated
 
 
+def test_a_line_has_its_amplitude_though_its_phase_is_another_one_on_each_run():
+    frequency, amplitude = 0.0063, 0.03
+    runs = []
+    for run, phase in zip(plain(3), (0.3, 2.1, 4.4)):
+        line = amplitude * np.sin(2.0 * np.pi * frequency * run.time + phase)
+        runs.append(replace(run, columns={**run.columns, "gyro": run.columns["gyro"] + line}))
+    found = diagnose(TWIN, runs[:2], runs[2:], noise=static(), plan=False)
+    (one,) = found.named
+    assert one.effect == "sinusoidal"
+    assert abs(one.amplitude.value - amplitude) < 2.0 * one.amplitude.se < 0.5 * amplitude
+    assert one.parameters["frequency"].value == pytest.approx(frequency, rel=0.01)
+    # The twin that is written has the same.
+    assert [e.amplitude for e in found.effects] == [one.amplitude.value]
+
+
 @pytest.mark.parametrize("id", ["thermal_hysteresis"])
 def test_an_effect_that_is_no_candidate_gets_no_certain_wrong_name(id):
     (a, b, c), _ = with_effect(id, 7)
