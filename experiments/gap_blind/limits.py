@@ -1,10 +1,14 @@
-"""What the data of a suite allow: how far apart a wrong answer and the truth are, by a likelihood ratio.
+"""What the data of a suite allow, by likelihood ratios between true forms, and how far the answers are off.
 
-For each wrong name, and each effect that was missed or hidden behind another, the distance between what
-truly acts and what was answered is ``||r||^2 / 2`` nats: r is what the answered effects, at the shapes
-stated and the best amplitudes, leave of the true contributions, both whitened by the true noise, beside
-the nominal constants. It is the expected logarithm of the likelihood ratio between the two for one who
-knows both forms. Under 3 nats no method can tell them; the prior of an effect among 36 alone is 4.
+For each effect that acts, ``gain`` is what its true form adds to the evidence of the runs beside the true
+forms of whatever else acts, its amplitude alone unknown, beside the nominal constants and the errors of
+ordinary sensors with their priors [nats]. Nobody who has to find an effect among 36 of unknown shape can
+name it from much under 8: a choice of 36 costs 4, its size and shape about as much.
+
+For each wrong name, and each effect that was missed, the distance between what truly acts and what was
+answered is ``||r||^2 / 2`` nats: r is what the answered effects, at the shapes stated and the best
+amplitudes, leave of the true contributions, both whitened by the true noise, beside the nominal constants.
+Where the answer says that something unknown acts, what truly is unknown counts as answered.
 
 ``python -m experiments.gap_blind.limits DIR`` writes ``limits.json`` and ``limits.md`` beside itself.
 """
@@ -13,7 +17,8 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections import defaultdict
+from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -22,84 +27,146 @@ from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness
-from fogml.gap.blind.truth import Truth, read_contributions
+from fogml.gap.blind.truth import Truth, read_contributions, read_truth
+from fogml.gap.frame import Frame
+from fogml.gap.observation import observe
+from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.twin_model import TwinModel
 from fogml.outputs import whole_file
+from fogml.runs.reading import read_run
+from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin_file import load_twin
 
 HERE = Path(__file__).parent
 TELLING_NATS = 3.0
 """Under so many nats two explanations are one."""
 SURE_NATS = 10.0
+GAIN_EDGES = (-np.inf, 4.0, 8.0, 12.0, 16.0, 24.0, 40.0, 80.0, np.inf)
+KINDS = ("one", "two", "three", "unknown_and_known")
+STRONG = 10.0
 GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
+Row = dict[str, Any]
 
 
 def main() -> None:
-    """Measure every wrong answer of the diagnosis; write the table."""
+    """Measure every case that the diagnosis answered; write the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("directory", help="an answered suite")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     given = parser.parse_args()
     folder = BlindFolder(Path(given.directory))
     found = Parallel(n_jobs=given.workers)(delayed(_measured)(folder, name) for name in folder.names())
-    rows = [row for row in found if row is not None]
+    effects = [row for own, _ in found for row in own]
+    wrong = [row for _, row in found if row is not None]
     with whole_file(HERE / "limits.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+        text = json.dumps({"effects": effects, "wrong": wrong}, indent=1)
+        partial.write_text(text + "\n", encoding="utf-8")
     with whole_file(HERE / "limits.md") as partial:
-        partial.write_text(_page(rows, len(found)), encoding="utf-8")
+        partial.write_text(_page(effects, wrong, len(found)), encoding="utf-8")
 
 
-def _measured(folder: BlindFolder, name: str) -> dict[str, Any] | None:
-    """A wrong answer's distance from the truth; None where the answer is right."""
+def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
+    """What each known effect of a case adds, and a wrong answer's distance from the truth."""
     path = folder.answers() / name / "gap.json"
-    if not path.is_file():
-        return None
-    truth = Truth.model_validate_json((folder.truth / f"{name}.json").read_text())
-    known = {e.id for e in truth.known if e.id}
+    truth = read_truth(folder.truth / f"{name}.json")
+    if not path.is_file() or not truth.effects:
+        return [], None
     gap = json.loads(path.read_text())
     named = [item for item in gap["which"] if item["probability"] >= 0.5]
+    held = {member for item in named for member in item["class"]}
+    effects = [
+        {"case": name, "kind": truth.kind, "effect": e.id, "d_prime": e.d_prime, "gain": gain}
+        | {"named": e.id in held}
+        for e, gain in zip(truth.effects, _gains(folder, truth))
+        if e in truth.known
+    ]
     wrong = [item["effect"] for item in named if not truth.right_names & set(item["class"])]
-    missed = sorted(known - {m for i in named for m in i["class"]})
-    if not truth.effects or not (wrong or missed):
-        return None
-    return {
-        "case": name,
-        "kind": truth.kind,
-        "d_prime": min(e.d_prime for e in truth.effects),
-        "wrong": wrong,
-        "missed": missed,
-        "unknown": gap["unknown"]["probability"],
-        "nats": _distance(folder, truth, named),
-    }
+    missed = sorted({e.id for e in truth.known if e.id} - held)
+    if not (wrong or missed):
+        return effects, None
+    unknown = gap["unknown"]["probability"]
+    row = {"case": name, "kind": truth.kind, "wrong": wrong, "missed": missed, "unknown": unknown}
+    return effects, row | {"nats": _distance(folder, truth, named, unknown >= 0.5)}
 
 
-def _distance(folder: BlindFolder, truth: Truth, named: list[dict[str, Any]]) -> float:
+def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
+    """Evidence that each effect's true form adds beside the others [nats]."""
+    model = TwinModel(load_twin("nominal"))
+    given = read_contributions(folder.truth / f"{truth.case}.npz")
+    runs = [observe(read_run(path), model) for path in case_files(folder.cases / truth.case).fit]
+    whiteners = [RunWhitener(_noise(truth), o, truth.nominal) for o in runs]
+    frame = Frame(runs, whiteners, model.constants, truth.nominal)
+    rows = [
+        np.column_stack([o.averaged(given[o.run.name, i]) for i in range(len(truth.effects))]) for o in runs
+    ]
+    forms = frame.white(rows)
+    whole = _log_evidence(frame, forms)
+    return [whole - _log_evidence(frame, np.delete(forms, i, axis=1)) for i in range(forms.shape[1])]
+
+
+def _log_evidence(frame: Frame, forms: FloatArray) -> float:
+    """Of the runs, beside constants and sensors' errors; amplitudes about as large as they are."""
+    columns = np.concatenate([frame.residual, forms], axis=1)
+    inner = frame.beside(columns)
+    own, fit = np.eye(forms.shape[1]) + inner[1:, 1:], inner[1:, 0]
+    return float(-0.5 * inner[0, 0] + 0.5 * fit @ np.linalg.solve(own, fit) - 0.5 * np.linalg.slogdet(own)[1])
+
+
+def _noise(truth: Truth) -> NoiseModel:
+    value = {key: amount.value for key, amount in truth.noise.items()}
+    return NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
+
+
+def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool) -> float:
     given = read_contributions(folder.truth / f"{truth.case}.npz")
     runs = case_files(folder.cases / truth.case).fit
-    total = [sum(given[run.name, i] for i in range(len(truth.effects))) for run in runs]
-    value = {key: amount.value for key, amount in truth.noise.items()}
-    noise = NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
-    likeness = Likeness(runs, [total], noise, truth.nominal)
+    counted = [i for i, e in enumerate(truth.effects) if not (unknown and e in truth.unknown)]
+    if not counted:
+        counted = list(range(len(truth.effects)))
+    total = [sum(given[run.name, i] for i in counted) for run in runs]
+    likeness = Likeness(runs, [total], _noise(truth), truth.nominal)
     shapes = {i["effect"]: {k: v["value"] for k, v in i["parameters"].items()} for i in named}
     return 0.5 * likeness.left(shapes)
 
 
-def _page(rows: list[dict[str, Any]], cases: int) -> str:
-    held: dict[tuple[str, str], list[float]] = defaultdict(list)
-    for row in rows:
-        group = GROUPS[0] if row["wrong"] else GROUPS[1]
-        held[group, row["kind"]].append(row["nats"])
+def _page(effects: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
     lines = [
         "# What the data allow",
         "",
-        f"Synthetic cases of the second reality: {cases}, of which {len(rows)} were answered with a wrong "
-        "name or without an effect that acts. For each the expected logarithm of the likelihood ratio "
-        "between the truth and the named effects, for one who knows both forms, the noise and the nominal "
-        "constants' span (nats). Under 3 nats nobody can tell the two; a method that does not know which of "
-        "36 effects or what unknown acts needs some 10 more.",
+        f"Synthetic cases of the second reality: {cases}, with {len(effects)} known effects.",
+        "",
+        "## How much of what the data show is named",
+        "",
+        "Known effects by what the true form of each adds to the evidence beside whatever else truly acts, "
+        "the nominal constants and ordinary sensors' errors: the logarithm of the likelihood ratio for one "
+        "who knows all forms. Who doesn't, and chooses among 36 effects of unknown size and shape, needs "
+        "some 8 nats to name one.",
+        "",
+        f"| gain in nats | effects | named | {' | '.join(KINDS)} |",
+        "|---|---:|---:|" + "---:|" * len(KINDS),
+    ]
+    for low, high in pairwise(GAIN_EDGES):
+        inside = [row for row in effects if low <= row["gain"] < high]
+        label = f"under {high:g}" if low == -np.inf else f"{low:g} to {high:g}"
+        label = f"over {low:g}" if high == np.inf else label
+        cells = [_share([row for row in inside if row["kind"] == kind]) for kind in KINDS]
+        lines.append(f"| {label} | {len(inside)} | {_share(inside)} | {' | '.join(cells)} |")
+    lines += ["", _ceiling(effects), ""]
+    lines += [
+        "## How far wrong answers are from the truth",
+        "",
+        f"{len(wrong)} cases were answered with a wrong name or without an effect that acts. For each the "
+        "expected logarithm of the likelihood ratio between the truth and the named effects, for one who "
+        f"knows both forms. Under {TELLING_NATS:g} nats nobody can tell the two. Where the answer says that "
+        "something unknown acts, what truly is unknown counts as answered.",
         "",
         "| answer | kind | cases | median nats | under 3 | under 10 |",
-        "|---|---|---|---|---|---|",
+        "|---|---|---:|---:|---:|---:|",
     ]
+    held: dict[tuple[str, str], list[float]] = {}
+    for row in wrong:
+        held.setdefault((GROUPS[0] if row["wrong"] else GROUPS[1], row["kind"]), []).append(row["nats"])
     for (group, kind), values in sorted(held.items()):
         nats = np.array(values)
         lines.append(
@@ -107,6 +174,21 @@ def _page(rows: list[dict[str, Any]], cases: int) -> str:
             f"{np.mean(nats < TELLING_NATS):.0%} | {np.mean(nats < SURE_NATS):.0%} |"
         )
     return "\n".join(lines) + "\n"
+
+
+def _share(rows: Sequence[Row]) -> str:
+    return f"{np.mean([row['named'] for row in rows]):.2f} of {len(rows)}" if rows else "–"
+
+
+def _ceiling(effects: Sequence[Row]) -> str:
+    """Shares of the suite's effects that the data show at all."""
+    strong = [row for row in effects if row["kind"] == "one" and row["d_prime"] > STRONG]
+    beside = [row for row in effects if row["kind"] == "unknown_and_known"]
+    parts = []
+    for words, rows in (("of single effects with d′ over 10", strong), ("beside an unknown", beside)):
+        shown = float(np.mean([row["gain"] >= 8.0 for row in rows])) if rows else float("nan")
+        parts.append(f"{words} {shown:.2f}")
+    return f"Share that the data show with 8 nats or more: {', '.join(parts)}."
 
 
 if __name__ == "__main__":

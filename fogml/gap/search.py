@@ -26,6 +26,8 @@ SIZES = (0.4, 0.4, 0.15, 0.04, 0.01)
 """Prior probability of 0, 1, ... effects; all effects are equally likely."""
 UNKNOWN = 0.25
 """Prior probability that something unknown acts besides."""
+SECOND = 0.2
+"""Prior probability that a second group is needed where an unknown acts."""
 FORM, FORM_ROOM = 0.3, 0.25
 """Prior probability of a rest of form where it can be seen, and its largest length over the effects'."""
 BEAM = (8, 6, 4)
@@ -171,6 +173,8 @@ class Search:
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
         terms = self._terms(effects, group)
+        if rest == "unknown":
+            averaged_rest += self._second(terms)
         evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
         return Explanation(tuple(effects), rest, group, evidence, evidence + prior)
@@ -205,32 +209,42 @@ class Search:
         fit = small if rest == "form" else ~small
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
-        held = self.field_.condition(self._terms(effects, None))
-        gains = held.group_gains[:, fit]
-        prices = np.array([self.field_.basis.kinds[name].price for name in names]) + math.log(len(names))
-        weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
-        if rest == "unknown" and last:
-            weights += self._unlike_shares(effects, names, gains, weights, LENGTHS[fit])[:, None]
+        gains, weights = self._weighed(self._terms(effects, None), fit, rest == "unknown" and last)
         gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
         averaged = log_sum_exp(gains) - float(gains.max() - weights[row, column])
         return (names[row], float(LENGTHS[fit][column])), averaged
 
+    def _second(self, terms: Sequence[Term]) -> float:
+        """What a second group for the unknown adds to the evidence, averaged over there being none."""
+        gains, weights = self._weighed(terms, np.ones(len(LENGTHS), dtype=np.bool_), True)
+        return float(np.logaddexp(math.log1p(-SECOND), math.log(SECOND) + log_sum_exp(gains + weights)))
+
+    def _weighed(self, terms: Sequence[Term], fit: np.ndarray, unlike: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Gains of the groups beside terms at the lengths that fit, and the logarithms of their weights.
+
+        Weights are prior probabilities, less what signals that are a candidate's take away if `unlike`.
+        """
+        basis = self.field_.basis
+        gains = self.field_.condition(terms).group_gains[:, fit]
+        prices = np.array([kind.price for kind in map(basis.kinds.__getitem__, basis.groups)])
+        weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
+        weights -= math.log(max(len(basis.groups), 1))
+        if unlike:
+            weights += self._unlike_shares(terms, gains, weights, LENGTHS[fit])[:, None]
+        return gains, weights
+
     def _unlike_shares(
-        self,
-        effects: Sequence[Chosen],
-        names: Sequence[str],
-        gains: np.ndarray,
-        weights: np.ndarray,
-        lengths: np.ndarray,
+        self, terms: Sequence[Term], gains: np.ndarray, weights: np.ndarray, lengths: np.ndarray
     ) -> np.ndarray:
         """What each group's probability loses for signals that are a candidate's, shape (groups,)."""
+        names = list(self.field_.basis.groups)
         shares = np.zeros(len(names))
         weighed = gains + weights
         near = weighed.max(axis=1) > weighed.max() - MATTERS
         for i in np.flatnonzero(near & (gains.max(axis=1) > MATTERS)).tolist():
             group = (names[i], float(lengths[int(np.argmax(weighed[i]))]))
-            held = self.field_.condition(self._terms(effects, group))
+            held = self.field_.condition([*terms, self._term(*group)])
             shares[i] = self._unlike.log_share(held, *group)
         return shares
 
@@ -247,15 +261,19 @@ class Search:
         return self._terms(found.effects, found.group)
 
     def _terms(self, effects: Iterable[Chosen], group: tuple[str, float] | None) -> list[Term]:
-        nodes, groups = self.field_.basis.nodes, self.field_.basis.groups
+        nodes = self.field_.basis.nodes
         terms = []
         for c in effects:
             terms.append(Term(nodes[c.node].columns, c.length))
             if c.length >= SLACK_FROM:
                 terms.append(Term(self.field_.slack(c.node), SLACK * c.length))
         if group is not None:
-            terms.append(Term(tuple(int(c) for c in groups[group[0]]), group[1]))
+            terms.append(self._term(*group))
         return terms
+
+    def _term(self, name: str, length: float) -> Term:
+        """The columns of a group of the unknown."""
+        return Term(tuple(int(c) for c in self.field_.basis.groups[name]), length)
 
 
 def _form_room(effects: Sequence[Chosen]) -> float:

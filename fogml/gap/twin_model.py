@@ -42,7 +42,7 @@ from fogml.twin.twin_file import save_twin
 LOW_ORDER = 4
 """Nodes of a plant of a lower order: case, two faces of the coil, electronics."""
 STEPS = "sensor_quantisation"
-USUAL_LAG_S = 2.0
+USUAL_LAG_S = 0.7
 """Lag of a good sensor on the coil [s], as a standard deviation: part of any recording."""
 
 
