@@ -8,13 +8,15 @@ from itertools import combinations
 import numpy as np
 import pytest
 from scipy.special import logsumexp
+from scipy.stats import multivariate_normal
 
 from fogml.gap.basis import build_basis
 from fogml.gap.classes import rank
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.evidence import Field
 from fogml.gap.model import EffectValue
-from fogml.gap.search import Search
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
+from fogml.gap.search import MATTERS, SECOND, Search
 from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded
 
 TRUE = {"offset": 1.0, "slope": -0.5}
@@ -104,6 +106,47 @@ def test_something_that_no_candidate_can_do_is_the_unknowns():
     assert ranking.unknown > 0.9
     # What else is named is small beside it.
     assert all(c.length < ranking.best.unknown[1] for c in ranking.best.effects)
+
+
+def test_a_second_group_of_the_unknown_counts_by_its_dense_density():
+    search = searched(())
+    basis = search.field_.basis
+    terms = search.terms(search.explanation([], "unknown"))
+    rows = basis.rows
+    covariance = np.eye(len(rows)) + rows[:, basis.constants] @ rows[:, basis.constants].T
+    for term in terms:
+        columns = rows[:, list(term.columns)]
+        covariance += term.length**2 * columns @ columns.T
+
+    def density(more):
+        return multivariate_normal(np.zeros(len(rows)), covariance + more).logpdf(rows[:, 0])
+
+    alone = density(0.0)
+    gains = []
+    for name, places in basis.groups.items():
+        spread = rows[:, places] @ rows[:, places].T
+        price = basis.kinds[name].price + np.log(len(basis.groups))
+        gains += [
+            density(length**2 * spread) - alone + np.log(weight / LENGTH_WEIGHTS.sum()) - price
+            for length, weight in zip(LENGTHS, LENGTH_WEIGHTS)
+        ]
+    # Where nothing acts no group gains so much that its likeness to candidates would be asked for.
+    assert max(gains) < MATTERS
+    expected = np.log(1.0 - SECOND + SECOND * np.exp(logsumexp(gains)))
+    assert search._second(terms) == pytest.approx(float(expected), abs=1e-6)
+
+
+def test_what_two_groups_explain_is_no_effects():
+    def both(time):
+        fast = 1.2 * np.sin(2.0 * np.pi * time / 700.0) * (time > time.mean())
+        return fast + 0.8 * np.sin(2.0 * np.pi * time / 7000.0 + 1.0)
+
+    search = searched((), ids=("cube", "tilted"), added=both)
+    found = search.explanation([], "unknown")
+    assert found.group is not None
+    one = search.field_.condition(search.terms(found)).log_evidence - search.field_.condition([]).log_evidence
+    # More than averaging over one group's sizes can bring.
+    assert found.log_evidence > one + 5.0
 
 
 def test_probabilities_are_probabilities():
