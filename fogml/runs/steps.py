@@ -20,3 +20,16 @@ def recorded_step(values: FloatArray) -> float:
     least = float(steps.min())
     whole = steps / least
     return least if float(np.abs(whole - np.rint(whole)).max()) < _WHOLE else 0.0
+
+
+def to_steps(values: FloatArray, step: float) -> FloatArray:
+    """Values rounded to whole multiples of a step, both in the same unit, shape as given.
+
+    Of a step that divides 1, such as 0.01, they are the nearest numbers to the decimals, so that they
+    are written with no more digits than the sensor has.
+    """
+    whole = np.rint(values / step)
+    per_unit = np.rint(1.0 / step)
+    if abs(per_unit * step - 1.0) < 1e-9:
+        return np.asarray(whole / per_unit)
+    return np.asarray(whole * step)

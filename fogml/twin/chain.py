@@ -18,6 +18,7 @@ import numpy as np
 
 from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import FloatArray
+from fogml.runs.steps import to_steps
 from fogml.twin.effect import (
     BiasEffect,
     Effect,
@@ -194,7 +195,7 @@ def sensed(
     if errors.noise > 0.0:
         temperature = temperature + errors.noise * rng[name].standard_normal(len(temperature))
     if errors.resolution > 0.0:
-        temperature = errors.resolution * np.rint(temperature / errors.resolution)
+        temperature = to_steps(temperature, errors.resolution)
     return _falsified(twin, name, temperature, inputs, digitising=True)
 
 

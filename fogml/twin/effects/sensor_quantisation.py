@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from fogml.runs.run import FloatArray
-from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step
+from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step, to_steps
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
@@ -64,7 +64,7 @@ class SensorQuantisation(SensorEffect):
         """What the sensor `name` gives [degC] where its place has `temperature` [degC]; shape (n,)."""
         if amplitude == 0.0:
             return temperature
-        return amplitude * np.rint(temperature / amplitude)
+        return to_steps(temperature, amplitude)
 
     def _hidden(self, name: str, inputs: Inputs) -> FloatArray:
         """Temperature that a step hides, in steps, shape (n,); within half a step either way."""
