@@ -90,22 +90,48 @@ def judged(case: Case, made: Mapping[str, DriftModel]) -> list[Row]:
 def measure(
     cases: Callable[[bool], Iterable[Case]], quick: bool, repeats: int, folder: Path
 ) -> dict[str, Any]:
-    """All rows of some cases; models of one training are fitted once."""
+    """All rows of some cases."""
     budget = QUICK if quick else FULL
+    settings = {"settings": budget.settings, "folds": budget.folds, "most_rows": budget.most_rows}
+    return {"rows": rows_of(cases(quick), models(budget, quick)), "budget": settings}
+
+
+def rows_of(cases: Iterable[Case], made: Mapping[str, Callable[[], DriftModel]]) -> list[Row]:
+    """Rows of models on some cases; models of one training are fitted once."""
     rows: list[Row] = []
     fitted: dict[str, DriftModel] = {}
     trained: tuple[Any, ...] = ()
-    for case in cases(quick):
+    for case in cases:
         if trained is not case.train:
-            fitted, trained = {label: make() for label, make in models(budget, quick).items()}, case.train
+            fitted, trained = {label: make() for label, make in made.items()}, case.train
             for model in fitted.values():
                 model.fit(list(case.train))
         found = judged(case, fitted)
         told = {row["model"]: float(f"{row['rms'] / row['floor']:.3g}") for row in found}
         print(" ".join(case.labels.values()), told, file=sys.stderr, flush=True)
         rows += found
-    settings = {"settings": budget.settings, "folds": budget.folds, "most_rows": budget.most_rows}
-    return {"rows": rows, "budget": settings}
+    return rows
+
+
+def case_of(row: Row) -> tuple[Any, ...]:
+    """What is the same of the rows of one case."""
+    return row["group"], *(row.get(label) for label in _LABELS)
+
+
+def with_ours_again(found: Mapping[str, Any], rows: Sequence[Row], date: str) -> dict[str, Any]:
+    """A study's figures with rows of fogml's own models in place of those that were there.
+
+    Raises
+    ------
+    ValueError
+        If the rows are not of the same cases, judged on the same samples.
+    """
+    new = {(case_of(row), row["model"]): row for row in rows}
+    old = {(case_of(row), row["model"]): row for row in found["rows"] if row["model"] in OURS}
+    if set(new) != set(old) or any(not np.isclose(new[k]["floor"], old[k]["floor"]) for k in old):
+        raise ValueError("the cases changed: measure the whole study again")
+    rows = [new.get((case_of(row), row["model"]), row) for row in found["rows"]]
+    return {**found, "rows": rows, "ours_again": date}
 
 
 def over_floor(row: Row) -> float:
@@ -117,7 +143,7 @@ def table(rows: Sequence[Row], by: str, figure: Callable[[Row], float] = over_fl
     """Geometric means of a figure for each model, a column for each value of a label."""
     values = list(dict.fromkeys(row[by] for row in rows))
     labels = list(dict.fromkeys(row["model"] for row in rows))
-    cases = [tuple(value for key, value in row.items() if key in _LABELS) for row in rows]
+    cases = [case_of(row) for row in rows]
     least = {
         case: min(figure(row) for row, its in zip(rows, cases) if its == case)
         for case in dict.fromkeys(cases)
@@ -150,11 +176,13 @@ def mean(values: Sequence[float]) -> float:
 
 def _budget_words(found: Mapping[str, Any]) -> str:
     b = found["budget"]
+    again = found.get("ours_again")
+    later = f" fogml's own rows were measured again on {again}, the peers' are as they were." if again else ""
     return (
         f"Each peer tries {b['settings']} settings on the same {b['folds']} folds of time blocks of the "
         f"training rows, averaged to at most {b['most_rows']:,} rows or fewer as its line in the list of "
         "peers says; inputs T, dT and T·dT limited to the trained box. `fogml rbf` has the same inputs, "
-        "`fogml auto` chooses its own."
+        f"`fogml auto` chooses its own.{later}"
     )
 
 
@@ -215,13 +243,12 @@ def _real(quick: bool) -> Iterable[Case]:
     yield from cold_start(quick)
 
 
-ACCURACY_STUDIES = (
-    Study("accuracy-real", "accuracy on held-out real runs", partial(measure, _real), real_page),
-    Study("accuracy-twin", "accuracy on held-out twin runs", partial(measure, twin_runs), twin_page),
-    Study(
-        "accuracy-twin-quiet",
-        "accuracy on held-out twin runs, white noise only",
-        partial(measure, quiet_twin_runs),
-        quiet_page,
-    ),
+CASES = {"accuracy-real": _real, "accuracy-twin": twin_runs, "accuracy-twin-quiet": quiet_twin_runs}
+_TOLD = {
+    "accuracy-real": ("accuracy on held-out real runs", real_page),
+    "accuracy-twin": ("accuracy on held-out twin runs", twin_page),
+    "accuracy-twin-quiet": ("accuracy on held-out twin runs, white noise only", quiet_page),
+}
+ACCURACY_STUDIES = tuple(
+    Study(name, title, partial(measure, CASES[name]), page) for name, (title, page) in _TOLD.items()
 )

@@ -284,3 +284,18 @@ def test_names_are_told_apart():
 def test_what_is_not_installed_is_named():
     assert needs("numpy")() is None
     assert "no_such_package is not installed" in (needs("numpy", "no_such_package")() or "")
+
+
+def test_own_rows_take_the_place_of_those_of_the_same_cases():
+    def row(model: str, axis: str, rms: float) -> dict:
+        return {"group": "made", "axis": axis, "model": model, "floor": 0.1, "rms": rms}
+
+    own, peer = accuracy.OURS[0], "cubic"
+    found = {"rows": [row(own, "x", 1.0), row(peer, "x", 2.0), row(own, "y", 3.0)], "budget": {}}
+    new = accuracy.with_ours_again(found, [row(own, "y", 5.0), row(own, "x", 4.0)], "2026-11-22")
+    assert [each["rms"] for each in new["rows"]] == [4.0, 2.0, 5.0]
+    assert new["ours_again"] == "2026-11-22" and found["rows"][0]["rms"] == 1.0
+    moved = {**row(own, "x", 4.0), "floor": 0.2}
+    for other in ([row(own, "x", 4.0)], [moved, row(own, "y", 5.0)]):
+        with pytest.raises(ValueError, match="measure the whole study"):
+            accuracy.with_ours_again(found, other, "2026-11-22")

@@ -191,10 +191,11 @@ class Search:
         return first
 
     def _share_of(self, level: Level, shape: Shape) -> float:
-        """Share of rows that count as independent, by what a network leaves of them."""
-        if not level.in_time:
+        """Share of a level's rows that count as independent, by what a network leaves of fine ones."""
+        if not self._fine.in_time:
             return 1.0
-        share = independent_share(level.objective(True, 1.0)[0].residuals(shape))
+        share = independent_share(self._fine.objective(True, 1.0)[0].residuals(shape))
+        share *= len(self._fine) / len(level)
         return share if share < _NEARLY_INDEPENDENT else 1.0
 
     def _race(
