@@ -159,7 +159,7 @@ class Search:
             best = first[0] if same else self._race(sizes[0], starts, evidence)[0]
             values = {sizes[0]: best.reached[0]}
             for size in sizes[1:]:
-                tried = self._race(size, starts, evidence, best)[0]
+                tried = self._race(size, starts[:1], evidence, best)[0]
                 values[size] = tried.reached[0]
                 if tried.reached[0] >= best.reached[0]:
                     break
