@@ -53,14 +53,31 @@ def test_bad_input_is_status_2_and_one_line(run_files, tmp_path):
         assert not (tmp_path / "out").exists()
 
 
+WAITING_IN_THE_FIT = """
+import pathlib, time
+import sklearn.svm
+
+def fit(self, *rows, **more):
+    pathlib.Path("fitting").touch()
+    time.sleep(60.0)
+
+sklearn.svm.SVR.fit = fit
+from fogml.cli.main import main
+main()
+"""
+
+
 def test_an_interrupt_leaves_nothing(run_files, tmp_path):
-    # A run long enough that the signal comes while it is read and fitted.
     arguments = ["train", "a.csv", "--test", "b.csv", "--model", "sklearn.svm.SVR", "-o", "out"]
     process = subprocess.Popen(
-        [*PROGRAM, *arguments], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        [sys.executable, "-c", WAITING_IN_THE_FIT, *arguments],
+        cwd=tmp_path,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     )
     deadline = time.monotonic() + 60
-    while not list(tmp_path.glob(".partial-*")) and time.monotonic() < deadline:
+    while not (tmp_path / "fitting").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(process.pid, signal.SIGINT)
     _, errors = process.communicate(timeout=60)
