@@ -35,7 +35,6 @@ from fogml.gap.twin_model import TwinModel
 from fogml.outputs import whole_file
 from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
-from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin_file import load_twin
 
 HERE = Path(__file__).parent
@@ -95,7 +94,7 @@ def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
     model = TwinModel(load_twin("nominal"))
     given = read_contributions(folder.truth / f"{truth.case}.npz")
     runs = [observe(read_run(path), model) for path in case_files(folder.cases / truth.case).fit]
-    whiteners = [RunWhitener(_noise(truth), o, truth.nominal) for o in runs]
+    whiteners = [RunWhitener(truth.noise_model, o, truth.nominal) for o in runs]
     frame = Frame(runs, whiteners, model.constants, truth.nominal)
     rows = [
         np.column_stack([o.averaged(given[o.run.name, i]) for i in range(len(truth.effects))]) for o in runs
@@ -113,11 +112,6 @@ def _log_evidence(frame: Frame, forms: FloatArray) -> float:
     return float(-0.5 * inner[0, 0] + 0.5 * fit @ np.linalg.solve(own, fit) - 0.5 * np.linalg.slogdet(own)[1])
 
 
-def _noise(truth: Truth) -> NoiseModel:
-    value = {key: amount.value for key, amount in truth.noise.items()}
-    return NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
-
-
 def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool) -> float:
     given = read_contributions(folder.truth / f"{truth.case}.npz")
     runs = case_files(folder.cases / truth.case).fit
@@ -125,7 +119,7 @@ def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool
     if not counted:
         counted = list(range(len(truth.effects)))
     total = [sum(given[run.name, i] for i in counted) for run in runs]
-    likeness = Likeness(runs, [total], _noise(truth), truth.nominal)
+    likeness = Likeness(runs, [total], truth.noise_model, truth.nominal)
     shapes = {i["effect"]: {k: v["value"] for k, v in i["parameters"].items()} for i in named}
     return 0.5 * likeness.left(shapes)
 

@@ -129,6 +129,9 @@ def fit_model(
                 break
     jacobian = problem.jacobian(x)
     covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-14, hermitian=True)
+    # What nothing hangs on has no error, rather than one of rounding.
+    free = np.any(jacobian, axis=0)
+    covariance = np.where(np.outer(free, free), covariance, 0.0)
     scale = problem.scale
     found_constants, found_effects = problem.unpacked(x)
     data = residual[: problem.rows]

@@ -46,14 +46,7 @@ def found_effects(
         fit = fit_model(
             p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
         )
-    # A replay can't show what has another phase on each run: there the evidence has the amplitude.
-    seen = {
-        r.chosen.candidate: _rough(r, search, candidates)
-        for r in ranking.effects
-        if getattr(candidates[r.chosen.candidate], "drawn_per_run", False)
-    }
-    fit = replace(fit, effects=tuple(seen[e.id][0] if e.id in seen else e for e in fit.effects))
-    fitted = {e.id: e for e in fit.effects if e.id not in seen}
+    fitted = {e.id: e for e in fit.effects}
     errors = fit.standard_errors
     found = []
     for r in ranking.effects:
@@ -62,8 +55,11 @@ def found_effects(
         se = float(errors.get(f"{id}.amplitude", 0.0))
         shape_errors = {q.name: float(errors.get(f"{id}.{q.name}", 0.0)) for q in declared.shape}
         if value is None or se == 0.0:
-            value, se = seen.get(id) or _rough(r, search, candidates)
+            # Not fitted, or a line of any phase, which a replay can't show: the evidence has its size.
+            value, se = _rough(r, search, candidates)
             shape_errors = {q.name: _spread(r, search, q) for q in declared.shape if q.name in value.shape}
+            if id in fitted:
+                fitted[id] = value
         se = math.hypot(se, FORM_ERROR * value.amplitude)
         found.append(
             Found(
@@ -83,7 +79,7 @@ def found_effects(
                 },
             )
         )
-    return tuple(found), fit
+    return tuple(found), replace(fit, effects=tuple(fitted.values()))
 
 
 def _rough(ranked: Ranked, search: Search, candidates: Mapping[str, Candidate]) -> tuple[EffectValue, float]:

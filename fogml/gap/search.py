@@ -173,7 +173,7 @@ class Search:
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
         terms = self._terms(effects, group)
-        if rest == "unknown":
+        if rest == "unknown" and group is not None:
             averaged_rest += self._second(terms)
         evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
@@ -227,9 +227,9 @@ class Search:
         """
         basis = self.field_.basis
         gains = self.field_.condition(terms).group_gains[:, fit]
-        prices = np.array([kind.price for kind in map(basis.kinds.__getitem__, basis.groups)])
+        prices = np.array([basis.kinds[name].price for name in basis.groups])
         weights = np.log(LENGTH_WEIGHTS[fit] / LENGTH_WEIGHTS[fit].sum()) - prices[:, None]
-        weights -= math.log(max(len(basis.groups), 1))
+        weights -= math.log(len(basis.groups))
         if unlike:
             weights += self._unlike_shares(terms, gains, weights, LENGTHS[fit])[:, None]
         return gains, weights

@@ -46,9 +46,19 @@ KINDS = {
         Kind("mixture", SIZE, (SHARE,)),
         Kind("line", SIZE, (PERIOD, PHASE)),
         Kind("tilted", SIZE),
+        Kind("mute", SIZE),
     )
 }
 KINDS["bend_again"] = Kind("bend_again", SIZE, (PLACE, WIDTH))
+
+
+class DrawnPerRun(Kind):
+    """A candidate whose amplitude is another one on each run."""
+
+    drawn_per_run = True
+
+
+KINDS["cube_drawn"] = DrawnPerRun("cube_drawn", SIZE)
 
 
 @dataclass(frozen=True)
@@ -79,13 +89,13 @@ class OnRun:
         u, t = self.u, self.run.time - self.run.time[0]
         if id.startswith("bend"):
             return np.tanh((self.run.temperature() - shape["centre_temperature"]) / shape["width"])
-        if id == "cube":
+        if id.startswith("cube"):
             return u**3
         if id == "mixture":
             return u**2 + shape["share"] * np.sin(t / 700.0)
         if id == "line":
             return np.sin(2.0 * np.pi * t / shape["period"] + np.radians(shape["phase"]))
-        return 0.3 * u - 0.1
+        return 0.0 * u if id == "mute" else 0.3 * u - 0.1
 
 
 @dataclass(frozen=True)

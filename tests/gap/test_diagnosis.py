@@ -14,6 +14,7 @@ from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.gap import diagnose
 from fogml.gap.frame import Frame
+from fogml.gap.model import EffectValue
 from fogml.gap.observation import observe
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.twin_model import TwinModel
@@ -26,6 +27,7 @@ from fogml.twin.nominal import PRIOR_SD
 from fogml.twin.programme import load_programme
 from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin
+from tests.gap.small_model import SmallModel, noise_of, ramps, recorded
 
 TWIN = load_twin("nominal")
 NOISE = NoiseModel(TWIN.noise.N, TWIN.noise.B, TWIN.noise.K)
@@ -130,6 +132,20 @@ def test_a_line_has_its_amplitude_though_its_phase_is_another_one_on_each_run():
     assert one.parameters["frequency"].value == pytest.approx(frequency, rel=0.01)
     # The twin that is written has the same.
     assert [e.amplitude for e in found.effects] == [one.amplitude.value]
+
+
+def test_one_that_each_run_draws_anew_keeps_the_sign_of_its_amplitude():
+    model, rng = SmallModel(("bend", "cube_drawn")), np.random.default_rng(3)
+    acting, runs = (EffectValue("cube_drawn", -2.0, {}),), []
+    for name, turns in (("a", 2), ("b", 3), ("c", 4)):
+        run = ramps(name, count=400, turns=turns)
+        runs.append(recorded(run, model, {"offset": 1.0}, acting, noise_of(run, rng)))
+    found = diagnose(model, runs[:2], runs[2:], plan=False)
+    (one,) = found.named
+    assert abs(one.amplitude.value + 2.0) < 2.0 * one.amplitude.se < 1.0
+    assert [e.amplitude for e in found.effects] == [one.amplitude.value]
+    (far,) = found.how_far
+    assert far.after < 2.0 * far.floor < far.recalibrated
 
 
 @pytest.mark.parametrize("id", ["thermal_hysteresis"])

@@ -106,6 +106,23 @@ def test_draws_scatter_as_the_covariance_says():
     )
 
 
+def test_an_amplitude_that_no_output_hangs_on_has_no_error_and_stays():
+    mute = EffectValue("mute", 2.0, {})
+    model, frame = SmallModel(("bend", "mute")), ready(4)
+    fit = fit_model(
+        frame.observations, frame.whiteners, model.constants, [BEND, mute], model.candidates(), model.grade
+    )
+    without = fitted(frame, [BEND])
+    assert fit.effects[1].amplitude == 2.0
+    assert fit.standard_errors["mute.amplitude"] == 0.0
+    others = [name for name in fit.names if name in without.names]
+    np.testing.assert_allclose(
+        [fit.standard_errors[name] for name in others],
+        [without.standard_errors[name] for name in others],
+        rtol=1e-6,
+    )
+
+
 def test_an_amplitude_stays_within_its_limits():
     frame = ready(4, effects=(EffectValue("cube", -2.0),))
     (effect,) = fitted(frame, [EffectValue("cube", 0.5)]).effects

@@ -30,7 +30,7 @@ def nothing(time):
 
 
 @cache
-def searched(effects, ids=("bend", "cube", "mixture", "line"), added=nothing) -> Search:
+def searched(effects, ids=("bend", "cube", "mixture", "line"), added=nothing, grouped=True) -> Search:
     rng = np.random.default_rng(1)
     model, whole = SmallModel(ids), SmallModel()
     acting = tuple(EffectValue(id, size, dict(shape)) for id, size, shape in effects)
@@ -40,7 +40,7 @@ def searched(effects, ids=("bend", "cube", "mixture", "line"), added=nothing) ->
         made = recorded(run, whole, TRUE, acting, noise_of(run, rng))
         runs.append(made.with_columns(gyro=made.gyro + added(made.time)))
     frame = framed(runs, model)
-    groups = unknown_groups(frame.observations)
+    groups = unknown_groups(frame.observations) if grouped else []
     return Search(Field(build_basis(frame, model.candidates(), groups, model.grade)))
 
 
@@ -147,6 +147,12 @@ def test_what_two_groups_explain_is_no_effects():
     one = search.field_.condition(search.terms(found)).log_evidence - search.field_.condition([]).log_evidence
     # More than averaging over one group's sizes can bring.
     assert found.log_evidence > one + 5.0
+
+
+def test_with_no_groups_for_the_unknown_effects_are_found_all_the_same():
+    ranking, explanations = ranked(searched((CUBE,), grouped=False))
+    assert ranking.best.ids == {"cube"}
+    assert all(e.group is None for e in explanations)
 
 
 def test_probabilities_are_probabilities():

@@ -132,9 +132,7 @@ def relatives_of(folder: BlindFolder, truth: Truth) -> Callable[[str], bool] | N
         given = read_contributions(folder.truth / f"{truth.case}.npz")
         runs = case_files(folder.cases / truth.case).fit
         contributions = [[given[run.name, i] for run in runs] for i in places]
-        value = {name: amount.value for name, amount in truth.noise.items()}
-        noise = NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
-        return Likeness(runs, contributions, noise, truth.nominal)
+        return Likeness(runs, contributions, truth.noise_model, truth.nominal)
 
     @cache
     def relative(id: str) -> bool:

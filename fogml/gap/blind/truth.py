@@ -19,6 +19,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fogml.errors import InputError
 from fogml.outputs import whole_file
+from fogml.signals.noise_model import NoiseModel
 
 FloatArray = NDArray[np.float64]
 
@@ -179,6 +180,12 @@ class Truth(_Part):
     noise: dict[str, Amount] = Field(default_factory=dict)
     nominal: dict[str, float] = Field(default_factory=dict)
     thermal: str = ""
+
+    @property
+    def noise_model(self) -> NoiseModel:
+        """The true noise."""
+        value = {name: amount.value for name, amount in self.noise.items()}
+        return NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
 
     @property
     def known(self) -> tuple[TrueEffect, ...]:

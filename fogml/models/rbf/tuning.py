@@ -172,7 +172,7 @@ class Descent:
     ) -> None:
         self._function, self._variables, self._learn, self._watch = function, variables, learn, watch
         self._begin = self._values = variables.begin
-        self._steps = self._seen = 0
+        self._steps = 0
         self._ended = False
         self._asked: dict[bytes, tuple[float, FloatArray]] = {}
         self.value = float("inf")
@@ -219,8 +219,8 @@ class Descent:
         return other
 
     def _see(self, step: int, values: FloatArray) -> None:
-        if self._watch is not None and step > self._seen:
-            self._seen = step
+        # Steps that are taken once more were seen.
+        if self._watch is not None and step > self._steps:
             self._watch(self._variables.shape(values))
 
     def _pull(self, values: FloatArray) -> tuple[float, FloatArray]:

@@ -24,8 +24,7 @@ def oracle(folder: BlindFolder, truth: Truth, out: Path) -> None:
     """Answer one case of a suite with its truth at hand."""
     files = case_files(folder.cases / truth.case)
     given = read_contributions(folder.truth / f"{truth.case}.npz")
-    value = {name: amount.value for name, amount in truth.noise.items()}
-    noise = NoiseModel(value["N"], value.get("B", 0.0), value.get("K", 0.0))
+    noise = truth.noise_model
     fit, held_out = Stack(files.fit), Stack(files.held_out)
     contributions = [
         np.column_stack(
