@@ -44,6 +44,18 @@ SURE_NATS = 10.0
 GAIN_EDGES = (-np.inf, 4.0, 8.0, 12.0, 16.0, 24.0, 40.0, 80.0, np.inf)
 KINDS = ("one", "two", "three", "unknown_and_known")
 STRONG = 10.0
+SHOWN_NATS = 8.0
+UNKNOWNS = ("unknown_left_out", "unknown_invented")
+FIGURES = (
+    ("one effect, d′ over 10: class exact", ("one",), True, STRONG, True),
+    ("one effect, any d′: class exact", ("one",), True, 0.0, True),
+    ("two effects: class exact", ("two",), True, 0.0, True),
+    ("three effects: class exact", ("three",), True, 0.0, True),
+    ("unknown and known: known kept", ("unknown_and_known",), True, 0.0, False),
+    ("unknown, d′ over 10: said to be unknown", UNKNOWNS, False, STRONG, False),
+    ("unknown, any d′: said to be unknown", UNKNOWNS, False, 0.0, False),
+)
+"""Words, kinds, whether known effects count or unknown ones, least d′, whether a wrong name spoils it."""
 GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
 Row = dict[str, Any]
 
@@ -74,17 +86,17 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
     gap = json.loads(path.read_text())
     named = [item for item in gap["which"] if item["probability"] >= 0.5]
     held = {member for item in named for member in item["class"]}
-    effects = [
-        {"case": name, "kind": truth.kind, "effect": e.id, "d_prime": e.d_prime, "gain": gain}
-        | {"named": e.id in held}
-        for e, gain in zip(truth.effects, _gains(folder, truth))
-        if e in truth.known
-    ]
+    unknown = gap["unknown"]["probability"]
     wrong = [item["effect"] for item in named if not truth.right_names & set(item["class"])]
+    effects = [
+        {"case": name, "kind": truth.kind, "effect": e.name, "known": e in truth.known}
+        | {"d_prime": e.d_prime, "gain": gain, "wrong_beside": bool(wrong)}
+        | {"named": e.id in held if e in truth.known else unknown >= 0.5}
+        for e, gain in zip(truth.effects, _gains(folder, truth))
+    ]
     missed = sorted({e.id for e in truth.known if e.id} - held)
     if not (wrong or missed):
         return effects, None
-    unknown = gap["unknown"]["probability"]
     row = {"case": name, "kind": truth.kind, "wrong": wrong, "missed": missed, "unknown": unknown}
     return effects, row | {"nats": _distance(folder, truth, named, unknown >= 0.5)}
 
@@ -124,7 +136,8 @@ def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool
     return 0.5 * likeness.left(shapes)
 
 
-def _page(effects: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
+def _page(everything: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
+    effects = [row for row in everything if row["known"]]
     lines = [
         "# What the data allow",
         "",
@@ -146,8 +159,17 @@ def _page(effects: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
         label = f"over {low:g}" if high == np.inf else label
         cells = [_share([row for row in inside if row["kind"] == kind]) for kind in KINDS]
         lines.append(f"| {label} | {len(inside)} | {_share(inside)} | {' | '.join(cells)} |")
-    lines += ["", _ceiling(effects), ""]
     lines += [
+        "",
+        "## What of a figure is within reach",
+        "",
+        f"Share of cases in which the data show every effect that counts with {SHOWN_NATS:g} nats or more, "
+        "and share in which the answer has them all; for a class that is exact, with no wrong name beside.",
+        "",
+        "| figure | cases | the data show | the answer has |",
+        "|---|---:|---:|---:|",
+        *(_within_reach(everything, *figure) for figure in FIGURES),
+        "",
         "## How far wrong answers are from the truth",
         "",
         f"{len(wrong)} cases were answered with a wrong name or without an effect that acts. For each the "
@@ -174,15 +196,20 @@ def _share(rows: Sequence[Row]) -> str:
     return f"{np.mean([row['named'] for row in rows]):.2f} of {len(rows)}" if rows else "–"
 
 
-def _ceiling(effects: Sequence[Row]) -> str:
-    """Shares of the suite's effects that the data show at all."""
-    strong = [row for row in effects if row["kind"] == "one" and row["d_prime"] > STRONG]
-    beside = [row for row in effects if row["kind"] == "unknown_and_known"]
-    parts = []
-    for words, rows in (("of single effects with d′ over 10", strong), ("beside an unknown", beside)):
-        shown = float(np.mean([row["gain"] >= 8.0 for row in rows])) if rows else float("nan")
-        parts.append(f"{words} {shown:.2f}")
-    return f"Share that the data show with 8 nats or more: {', '.join(parts)}."
+def _within_reach(
+    effects: Sequence[Row], words: str, kinds: Sequence[str], known: bool, above: float, alone: bool
+) -> str:
+    """A line of the table: what the data show of a figure's cases, and what was answered."""
+    held: dict[str, list[Row]] = {}
+    for row in effects:
+        if row["kind"] in kinds and row["known"] == known:
+            held.setdefault(row["case"], []).append(row)
+    counted = [rows for rows in held.values() if min(row["d_prime"] for row in rows) > above]
+    if not counted:
+        return f"| {words} | 0 | – | – |"
+    shown = np.mean([all(row["gain"] >= SHOWN_NATS for row in rows) for rows in counted])
+    has = np.mean([all(r["named"] and not (alone and r["wrong_beside"]) for r in rows) for rows in counted])
+    return f"| {words} | {len(counted)} | {shown:.2f} | {has:.2f} |"
 
 
 if __name__ == "__main__":

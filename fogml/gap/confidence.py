@@ -18,9 +18,9 @@ FIRST_NAME = 1.5
 UNSURE = 0.49
 """Largest probability of an effect that is not named for another reason."""
 LARGEST_LOG_ODDS = 12.0
-NAMED = (0.4, 0.62, 0.1, -1.43, -1.2, -0.62)
+NAMED = (0.75, 0.5, 0.2, -0.75, -0.85, -0.53)
 """Logistic constants of a class's probability: constant, then one for each of `named_features`."""
-UNKNOWN = (-0.43, 0.391)
+UNKNOWN = (-0.37, 0.42)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 
 

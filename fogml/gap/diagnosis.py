@@ -114,7 +114,7 @@ def _result(
     if verdict == "unknown":
         found = ()
     after = fits if any(f.named for f in found) else p.recalibrated
-    gaps = gaps_on_runs(p, after, search, ranking)
+    gaps = gaps_on_runs(p, search, ranking)
     rng = np.random.default_rng(seed)
     tell("judging on held-out runs")
     far = tuple(how_far(o, p.model.constants, p.recalibrated, after, p.noise, rng) for o in p.held_out)
@@ -128,7 +128,7 @@ def _result(
         verdict=verdict,
         found=found,
         unknown=unknown,
-        where=where(gaps, stage_energies(p, after, candidates, search, ranking), p.noise),
+        where=where(gaps, stage_energies(candidates, search, ranking), p.noise),
         how_far=far,
         undetectable=undetectable,
         separating_run=next_run(p, found, undetectable, candidates, search, seed, tell) if plan else None,

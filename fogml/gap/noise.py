@@ -107,7 +107,7 @@ def noise_of(
         if explained is not None:
             # Scaled so that one prior standard deviation is plenty.
             columns += [column / max(float(np.abs(column).max()), 1e-300) for column in explained[r].T]
-        free.append(np.column_stack(columns)[used])
+        free.append(np.reshape(columns, (len(columns), len(o))).T[used])
         series.append((o.recorded - o.averaged(o.model.output(means)))[used])
         times.append(o.time[used])
     axes = _plain_axes(free, prior.centre.N * np.sqrt(3600.0 / observations[0].row_s))

@@ -97,9 +97,13 @@ def recalibrated_constants(
     return whiteners, fit
 
 
-def with_noise_beside(p: Prepared, explained: Sequence[FloatArray]) -> Prepared:
-    """The same with the noise fitted again beside what effects that were found can do, shape (m_r, k)."""
-    noise = noise_of(p.fit, p.model.constants, p.groups, p.noise_prior, p.noise.source, explained)
+def with_noise_beside(p: Prepared, explained: Sequence[FloatArray], *, alone: bool = False) -> Prepared:
+    """The same with the noise fitted again beside what effects that were found can do, shape (m_r, k).
+
+    Beside it `alone`, whatever else moves is noise; otherwise smooth unknowns are kept out of it.
+    """
+    groups = () if alone else p.groups
+    noise = noise_of(p.fit, p.model.constants, groups, p.noise_prior, p.noise.source, explained)
     whiteners, recalibrated = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=recalibrated)
 

@@ -1,7 +1,9 @@
 """Noise or effect: what came out as slow noise may be something unknown that moves as slowly.
 
-Where the runs' noise lies above what is known of it, the search is done with the known noise as well,
-and the noise and the explanation stand that are the more probable together.
+Where the runs' noise lies above what is known of it, the search is done with the known noise as well.
+It may be the other way round, too: smooth unknowns that are kept out of the noise take slow noise along.
+So the search is also done with whatever moves slowly taken for noise. The noise and the explanation stand
+that are the most probable together.
 """
 
 from __future__ import annotations
@@ -13,7 +15,7 @@ import numpy as np
 
 from fogml.gap.classes import UNEVEN, Ranking
 from fogml.gap.noise import deviations_above
-from fogml.gap.preparing import Prepared, recalibrated_constants
+from fogml.gap.preparing import Prepared, recalibrated_constants, with_noise_beside
 from fogml.gap.search import Search
 from fogml.signals.noise_model import NoiseModel
 
@@ -34,6 +36,11 @@ def quieter(p: Prepared) -> Prepared | None:
     noise = replace(p.noise, model=model, fit=replace(p.noise.fit, model=model))
     whiteners, constants = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=constants)
+
+
+def louder(p: Prepared) -> Prepared:
+    """The same with whatever the constants leave taken for noise."""
+    return with_noise_beside(p, [np.zeros((len(o), 0)) for o in p.fit], alone=True)
 
 
 def log_joint(p: Prepared, search: Search, ranking: Ranking) -> float:

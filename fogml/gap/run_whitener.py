@@ -58,3 +58,7 @@ class RunWhitener:
         """White rows of unit variance, shape as given: (m,) or (m, k)."""
         white = self._whitener.whiten(values)
         return np.asarray(white * (self.weights if white.ndim == 1 else self.weights[:, None]))
+
+    def colour(self, white: FloatArray) -> FloatArray:
+        """The inverse of `whiten` [deg/h], shape (m,)."""
+        return self._whitener.colour(white / self.weights)

@@ -18,8 +18,10 @@ from typing import Literal
 import numpy as np
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
+from fogml.gap.forms import Forms
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 from fogml.gap.unlike import Unlike
+from fogml.runs.run import FloatArray
 
 MOST_EFFECTS = 4
 SIZES = (0.4, 0.4, 0.15, 0.04, 0.01)
@@ -109,6 +111,10 @@ class Search:
     def _unlike(self) -> Unlike:
         return Unlike(self.field_)
 
+    @cached_property
+    def _forms(self) -> Forms:
+        return Forms(self.field_)
+
     def run(self) -> list[Explanation]:
         """Every explanation that was tried, the most probable first."""
         front = [self._best_of(())]
@@ -134,7 +140,7 @@ class Search:
         """The most probable explanation by a set, whatever acts beside it."""
         plain = self.explanation(effects)
         tried = [plain, self.explanation(effects, "unknown")]
-        if _form_room(plain.effects) >= LENGTHS[0]:
+        if form_room(plain.effects) >= LENGTHS[0]:
             tried.append(self.explanation(effects, "form"))
         return max(tried, key=lambda e: e.log_posterior)
 
@@ -185,7 +191,7 @@ class Search:
         if rest == "unknown":
             return prior + math.log(UNKNOWN)
         prior += math.log(1.0 - UNKNOWN)
-        if _form_room(effects) >= LENGTHS[0]:
+        if form_room(effects) >= LENGTHS[0]:
             prior += math.log(FORM if rest == "form" else 1.0 - FORM)
         return prior
 
@@ -205,11 +211,13 @@ class Search:
     ) -> tuple[tuple[str, float] | None, float]:
         """The best group for a rest beside a set and its length, and what averaging adds to its evidence."""
         names = list(self.field_.basis.groups)
-        small = _form_room(effects) >= LENGTHS
+        small = form_room(effects) >= LENGTHS
         fit = small if rest == "form" else ~small
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
         gains, weights = self._weighed(self._terms(effects, None), fit, rest == "unknown" and last)
+        if rest == "form":
+            weights += self._forms.log_weights([(c.node, form_room([c])) for c in effects])[:, fit]
         gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
         averaged = log_sum_exp(gains) - float(gains.max() - weights[row, column])
@@ -260,6 +268,21 @@ class Search:
         """An explanation's terms."""
         return self._terms(found.effects, found.group)
 
+    def estimates(self, found: Explanation) -> dict[str, FloatArray]:
+        """What each effect of an explanation, and its group, most probably makes, whitened, shape (n,)."""
+        parts = {c.candidate: self._terms([c], None) for c in found.effects}
+        if found.group is not None:
+            parts[found.group[0]] = [self._term(*found.group)]
+        if not parts:
+            return {}
+        mean, _ = self.field_.condition([t for terms in parts.values() for t in terms]).coefficients()
+        estimates, first = {}, 0
+        for name, terms in parts.items():
+            places = [place for t in terms for place in t.columns]
+            estimates[name] = self.field_.columns(places) @ mean[first : first + len(places)]
+            first += len(places)
+        return estimates
+
     def _terms(self, effects: Iterable[Chosen], group: tuple[str, float] | None) -> list[Term]:
         nodes = self.field_.basis.nodes
         terms = []
@@ -276,6 +299,6 @@ class Search:
         return Term(tuple(int(c) for c in self.field_.basis.groups[name]), length)
 
 
-def _form_room(effects: Sequence[Chosen]) -> float:
+def form_room(effects: Sequence[Chosen]) -> float:
     """Largest whitened length of a rest that is no more than a matter of form."""
     return FORM_ROOM * max((c.length for c in effects), default=0.0)

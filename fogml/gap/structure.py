@@ -1,4 +1,8 @@
-"""The structural gap of each run: what recalibration leaves, and the systematic part of it."""
+"""The structural gap of each run: what recalibration leaves, and the systematic part of it.
+
+The systematic part is what the evidence takes what acts for, named or not: a gap has its place though
+its cause may not be known.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fogml.gap.fitting import Fit
 from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate
 from fogml.gap.observation import Observation
@@ -23,14 +26,14 @@ GROUP_STAGE = {"table_rate": "scale_factor"}
 """Stage that a group of the unknown is booked on; bias for the others."""
 
 
-def gaps_on_runs(p: Prepared, after: Fit, search: Search, ranking: Ranking) -> list[GapOnRun]:
+def gaps_on_runs(p: Prepared, search: Search, ranking: Ranking) -> list[GapOnRun]:
     """The structural gap of the fit runs, with its systematic part."""
-    unknown = _beside_constants(p, unknown_parts(p, search, ranking))
+    frame = search.field_.basis.frame
+    white = sum(systematic_parts(search, ranking).values(), np.zeros(frame.runs[-1].stop))
     gaps = []
-    for o, more in zip(p.fit, unknown):
+    for o, part, whitener in zip(p.fit, frame.runs, frame.whiteners):
         recalibrated = o.averaged(o.model.output(p.recalibrated.constants, p.recalibrated.effects))
-        explained = o.averaged(o.model.output(after.constants, after.effects)) - recalibrated
-        gaps.append(GapOnRun(o, o.recorded - recalibrated, explained + more, _taken(p, o)))
+        gaps.append(GapOnRun(o, o.recorded - recalibrated, whitener.colour(white[part]), _taken(p, o)))
     return gaps
 
 
@@ -41,55 +44,27 @@ def _taken(p: Prepared, o: Observation) -> float:
     return float(np.mean(np.sum((rows @ p.recalibrated.covariance[:count, :count]) * rows, axis=1)))
 
 
-def stage_energies(
-    p: Prepared, after: Fit, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking
-) -> dict[str, float]:
+def stage_energies(candidates: Mapping[str, Candidate], search: Search, ranking: Ranking) -> dict[str, float]:
     """Energy of the systematic part by stage [(deg/h)^2], summed over the rows of all runs."""
+    frame = search.field_.basis.frame
     energies: dict[str, float] = {}
-
-    def book(stage: str, parts: list[FloatArray]) -> None:
-        energy = float(sum(np.sum(part**2) for part in parts))
+    for id, white in systematic_parts(search, ranking).items():
+        stage = candidates[id].stage if id in candidates else GROUP_STAGE.get(id, "bias")
+        values = [whitener.colour(white[part]) for part, whitener in zip(frame.runs, frame.whiteners)]
+        energy = float(sum(np.sum(v**2) for v in values))
         if energy > 0.0:
             energies[stage] = energies.get(stage, 0.0) + energy
-
-    for effect in after.effects:
-        others = tuple(e for e in after.effects if e.id != effect.id)
-        parts = [
-            o.averaged(
-                o.model.output(after.constants, after.effects) - o.model.output(after.constants, others)
-            )
-            for o in p.fit
-        ]
-        book(candidates[effect.id].stage, _beside_constants(p, parts))
-    if ranking.best.unknown is not None:
-        stage = GROUP_STAGE.get(ranking.best.unknown[0], "bias")
-        book(stage, _beside_constants(p, unknown_parts(p, search, ranking)))
     return energies
 
 
-def unknown_parts(p: Prepared, search: Search, ranking: Ranking) -> list[FloatArray]:
-    """The unknown's best estimate on each fit run [deg/h], shape (m,); zeros where there is none."""
-    if ranking.best.unknown is None:
-        return [np.zeros(len(o)) for o in p.fit]
-    name, _ = ranking.best.unknown
-    mean, _ = search.field_.condition(search.terms(ranking.best)).coefficients()
-    basis = search.field_.basis
-    own = mean[len(mean) - len(basis.groups[name]) :]
-    group = basis.kinds[name]
-    return [columns @ (basis.transforms[name] @ own) for columns in group.columns]
+def systematic_parts(search: Search, ranking: Ranking) -> dict[str, FloatArray]:
+    """What each part of the best explanation makes beside the constants, whitened, shape (n,).
 
-
-def _beside_constants(p: Prepared, parts: list[FloatArray]) -> list[FloatArray]:
-    """What of a signal the recalibrated constants leave, shape (m,) each."""
-    if not any(np.any(part) for part in parts):
-        return parts
-    fixed, columns = [], []
-    for o, whitener in zip(p.fit, p.whiteners):
-        own = constant_rows(o, p.model.constants)
-        fixed.append(own)
-        columns.append(whitener.whiten(own))
-    white = np.concatenate([w.whiten(part) for w, part in zip(p.whiteners, parts)])
-    every = np.concatenate(columns)
-    inner = every.T @ every + np.eye(every.shape[1])
-    taken = np.linalg.solve(inner, every.T @ white)
-    return [part - own @ taken for part, own in zip(parts, fixed)]
+    By ids of effects, and the name of the group of what acts besides; all as much smaller as it is
+    probable that nothing acts.
+    """
+    frame = search.field_.basis.frame
+    return {
+        name: (1.0 - ranking.nothing) * frame.without_constants(rows)
+        for name, rows in search.estimates(ranking.best).items()
+    }

@@ -7,7 +7,8 @@ are the most probable together; what the others hold for likely counts in its pr
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -23,7 +24,7 @@ from fogml.gap.model import Candidate
 from fogml.gap.near_library import near_library
 from fogml.gap.noise import Noise, tension
 from fogml.gap.preparing import Prepared, Progress, with_noise_beside
-from fogml.gap.quieter import log_joint, quieter
+from fogml.gap.quieter import log_joint, louder, quieter
 from fogml.gap.search import Explanation, Search
 from fogml.runs.run import FloatArray
 
@@ -50,20 +51,25 @@ class Trial:
         """Of the runs, the best explanation and the noise together."""
         return log_joint(self.prepared, self.search, self.ranking)
 
-    def beside(self, others: Sequence[Trial]) -> Trial:
-        """The same with probabilities that count what other trials hold for likely."""
+    @cached_property
+    def absolute(self) -> list[Explanation]:
+        """The explanations on a scale that all trials share."""
+        return _moved(self.explanations, self._log_runs)
+
+    def beside(self, others: Sequence[Explanation]) -> Trial:
+        """The same with probabilities that count what other trials hold for likely, on the shared scale."""
         if not others:
             return self
-        rivals = [
-            replace(e, log_posterior=e.log_posterior + other._log_runs - self._log_runs)
-            for other in others
-            for e in other.explanations
-        ]
+        rivals = _moved(others, -self._log_runs)
         return replace(self, ranking=_ranked(self.prepared, self.search, self.explanations, rivals))
 
     @property
     def _log_runs(self) -> float:
         return self.log_joint - self.ranking.best.log_posterior
+
+
+def _moved(explanations: Sequence[Explanation], nats: float) -> list[Explanation]:
+    return [replace(e, log_posterior=e.log_posterior + nats) for e in explanations]
 
 
 def best_trial(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress) -> Trial:
@@ -78,19 +84,34 @@ def best_trial(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress)
     tell
         Told what is being done.
     """
-    trials = [_trial(p, candidates, p.recalibrated.constants, tell)]
-    known = quieter(p)
-    if known is not None:
-        tell("searching with the noise as it is known")
-        trials.append(_trial(known, candidates, known.recalibrated.constants, tell))
-        if trials[1].log_joint > trials[0].log_joint - REACH:
-            trials += _again(trials[1], candidates, tell)
-    best = max(trials, key=lambda t: t.log_joint)
-    if best not in trials[2:]:
-        again = _again(best, candidates, tell)
-        trials += again
-        best = again[0] if again else best
-    return best.beside([t for t in trials if t is not best])
+    # Of those that don't stand the explanations alone are kept: a basis is large.
+    others: list[Explanation] = []
+    running = _trials(p, candidates, tell)
+    best = next(running)
+    for trial in running:
+        best, worse = (trial, best) if trial.log_joint > best.log_joint else (best, trial)
+        others += worse.absolute
+    return best.beside(others)
+
+
+def _trials(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress) -> Iterator[Trial]:
+    """A search under each noise to start from, and with the noise fitted beside what it found."""
+    top = -math.inf
+    for start, words, alone in (
+        (p, "the noise of the runs", False),
+        (quieter(p), "the noise as it is known", False),
+        (louder(p), "whatever moves slowly taken for noise", True),
+    ):
+        if start is None or (alone and not _differ(p.noise, start.noise)):
+            continue
+        tell(f"searching with {words}")
+        trial = _trial(start, candidates, start.recalibrated.constants, tell)
+        top = max(top, trial.log_joint)
+        yield trial
+        if trial.log_joint > top - REACH:
+            for again in _again(trial, candidates, tell, alone=alone):
+                top = max(top, again.log_joint)
+                yield again
 
 
 def _trial(
@@ -118,7 +139,9 @@ def _ranked(
     return rank(search, explanations, tension(p.noise, p.noise_prior), rivals)
 
 
-def _again(trial: Trial, candidates: Mapping[str, Candidate], tell: Progress) -> list[Trial]:
+def _again(
+    trial: Trial, candidates: Mapping[str, Candidate], tell: Progress, *, alone: bool = False
+) -> list[Trial]:
     """The search with the noise fitted beside what a trial found; none where that changes nothing.
 
     What was taken for noise may have been the effect, and the constants may have made up for it.
@@ -130,25 +153,28 @@ def _again(trial: Trial, candidates: Mapping[str, Candidate], tell: Progress) ->
     values = p.recalibrated.constants
     if best.effects:
         values = found_effects(p, candidates, trial.search, trial.ranking)[1].constants
-    again = with_noise_beside(p, _explained(trial))
-    if not (_differ(p.noise, again.noise) or _act_on_inputs(candidates, trial.ranking)):
+    again = with_noise_beside(p, _explained(trial, candidates), alone=alone)
+    on_inputs = not alone and _act_on_inputs(candidates, trial.ranking)
+    if not (_differ(p.noise, again.noise) or on_inputs):
         return []
     return [_trial(again, candidates, values, tell)]
 
 
-def _explained(trial: Trial) -> list[FloatArray]:
+def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatArray]:
     """Rows of what the effects of the best explanation can do, and its unknown, on each run."""
     p, basis, best = trial.prepared, trial.basis, trial.ranking.best
     rows = []
     for r, o in enumerate(p.fit):
-        columns = [
-            o.response(c.candidate, shape, basis.frame.values)[:, None]
-            for c in best.effects
-            for shape in basis.nodes[c.node].node.draws[:MOST_DRAWS]
-        ]
+        columns = []
+        for c in best.effects:
+            shapes = basis.nodes[c.node].node.draws[:MOST_DRAWS]
+            own = np.column_stack([o.response(c.candidate, s, basis.frame.values) for s in shapes])
+            # One that each run draws anew has columns of its own on each.
+            apart = getattr(candidates[c.candidate], "drawn_per_run", False)
+            columns += [own * (i == r) for i in range(len(p.fit))] if apart else [own]
         if best.unknown is not None:
             columns.append(basis.kinds[best.unknown[0]].columns[r])
-        rows.append(np.concatenate(columns, axis=1))
+        rows.append(np.concatenate([np.zeros((len(o), 0)), *columns], axis=1))
     return rows
 
 

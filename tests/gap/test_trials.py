@@ -75,6 +75,30 @@ def test_nothing_is_named_where_slow_noise_is_all_there_is():
     assert loud.ranking.nothing > 0.02
 
 
+def test_slow_noise_is_seen_though_smooth_unknowns_could_make_it_up():
+    loud = NoiseModel(NOISE.N, 0.1 * NOISE.B, 9.0 * NOISE.K)
+    p = made(noise=loud)
+    found = trial(p)
+    # Kept out of the noise, smooth unknowns take most of a random walk along.
+    assert p.noise.fit.model.K < 0.5 * loud.K
+    assert loud.K / 2.0 < found.prepared.noise.fit.model.K < 2.0 * loud.K
+    assert not found.ranking.best.ids and found.ranking.best.unknown is None
+
+
+def test_an_effect_that_each_run_draws_anew_is_no_noise():
+    rng, model = np.random.default_rng(5), SmallModel(ids=("bend", "cube_drawn"))
+    done = []
+    for name, turns, size in (("a", 2, 2.0), ("b", 3, -1.0), ("c", 4, 1.0)):
+        run = ramps(name, count=400, turns=turns)
+        done.append(
+            recorded(run, model, {"offset": 0.5}, (EffectValue("cube_drawn", size),), noise_of(run, rng))
+        )
+    found = trial(prepare(model, done[:2], done[2:], None))
+    assert found.ranking.best.ids == {"cube_drawn"}
+    # Taken for noise, twice the one run's cube less the other's would be a random walk of 0.9.
+    assert found.prepared.noise.fit.model.K < 3.0 * NOISE.K
+
+
 def test_a_first_name_has_to_be_more_probable_than_none():
     assert named_probability(FIRST_NAME - 0.01, alone=True) < 0.5 < named_probability(FIRST_NAME, alone=True)
     assert named_probability(FIRST_NAME - 0.01) > 0.5
