@@ -89,11 +89,10 @@ def table(rows: list[dict[str, Any]]) -> str:
 def summary(rows: list[dict[str, Any]]) -> str:
     """How often something was named, and what that was worth on the leg held out."""
     named = [r for r in rows if r["named"]]
-    better = [r for r in named if (r["closed"] or 0.0) >= 0.5]
     harm = [r for r in named if r["after"] > r["recalibrated"]]
     return (
         f"Something is named in {len(named)} of {len(rows)} diagnoses. On the leg held out it closes half\n"
-        f"of the gap or more in {len(better)} of these and makes it larger in {len(harm)}."
+        f"of the gap or more in {_closed_half(named)} of these and makes it larger in {len(harm)}."
     )
 
 
@@ -105,6 +104,9 @@ def facts(rows: list[dict[str, Any]]) -> dict[str, Any]:
     named = [r for r in rows if r["named"]]
     sure = [r for r in named if max(n["probability"] for n in r["named"]) >= 0.8]
     widest = [r for r in rows if r["axis"] == "x"]
+    parts = {
+        words: [r for r in named if r["noise"] == label] for words, label in zip(("wide", "near"), PRIORS)
+    }
     return {
         "widest": len(widest),
         "least_unknown": min(r["unknown"] for r in widest),
@@ -112,12 +114,19 @@ def facts(rows: list[dict[str, Any]]) -> dict[str, Any]:
         "walk": max(r["walk"] for r in wide),
         "most": max(r["after"] / r["floor"] for r in rows),
         "named": len(named),
-        "better": len([r for r in named if (r["closed"] or 0.0) >= 0.5]),
+        "better": _closed_half(named),
+        **{f"{label}_named": len(of) for label, of in parts.items()},
+        **{f"{label}_better": _closed_half(of) for label, of in parts.items()},
         "harm": len([r for r in named if r["after"] > r["recalibrated"]]),
         "certain": max(n["probability"] for r in named for n in r["named"]),
         "sure": len(sure),
-        "kept": len([r for r in sure if (r["closed"] or 0.0) >= 0.5]) or "none",
+        "kept": _closed_half(sure),
     }
+
+
+def _closed_half(rows: list[dict[str, Any]]) -> int:
+    """Diagnoses after which half of the gap or more is closed on the leg held out."""
+    return len([r for r in rows if (r["closed"] or 0.0) >= 0.5])
 
 
 def page(rows: list[dict[str, Any]]) -> str:
@@ -167,17 +176,19 @@ VERDICT = """## Verdict
 
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
-- **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something,
-  {better} close half of the gap or more on the leg held out, and {harm} make it larger. On x, where the loop
-  is widest, the unknown is at {least_unknown:.2f} or more in all {widest} diagnoses, whatever else is named.
+- **Not closed:** the rest, up to {most:.0f} times the floor. Of {named} diagnoses that name something
+  half of the gap or more is closed on the leg held out in {better}, and it is made larger in {harm}. On x,
+  where the loop is widest, the unknown is at {least_unknown:.2f} or more in all {widest} diagnoses, whatever
+  else is named.
 - **Named, and not to be believed:** names come with probabilities up to {certain:.2f}, and of {sure}
-  diagnoses with a name at 0.8 or more, {kept} close half of the gap or more. A probability is of the fit
+  diagnoses with a name at 0.8 or more half of the gap is closed in {kept}. A probability is of the fit
   runs: one leg down and one up, in which temperature, its rate and time go together, and a transition whose
   place and width are free bends a polynomial wherever that helps. That an unknown is likely as well, and
   `after` beside `recalibrated`, are what tells; nothing on the two legs could.
 - **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
   for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
-  With B and K pulled to a data sheet's more is named and no more is closed.
+  With B and K pulled to a data sheet's, something is named in {near_named} diagnoses, and half of the gap
+  is closed in {near_better} of them; without, in {wide_named} and {wide_better}.
 - **Leg `down` held out:** nobody recorded what the unit had been through before it, so that relaxation and
   hysteresis start from rest there, and do harm.
 

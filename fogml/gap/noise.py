@@ -32,6 +32,9 @@ BESIDE = (
     "table_rate",
 )
 """Groups of the unknown that are kept out of the noise."""
+FROM_RUNS = "the runs themselves, what moves with temperature taken out"
+FROM_RUNS_ALONE = "the runs themselves, what was found taken out"
+"""Where the noise comes from if no static run tells it: with smooth unknowns kept out, or without."""
 MOST_ROWS = 1500
 FREE_DEG_H = 5.0
 """Prior standard deviation of what smooth unknowns add [deg/h]."""
@@ -62,7 +65,7 @@ def prior_of(model: GyroModel, noise_run: Run | None) -> tuple[NoisePrior, str]:
     factor = (stated.factor_N, stated.factor_B, stated.factor_K)
     wide = NoisePrior(centre, tuple(max(f, 1.001) for f in factor))  # type: ignore[arg-type]
     if noise_run is None:
-        return wide, "the runs themselves, what moves with temperature taken out"
+        return wide, FROM_RUNS
     if np.any(noise_run.rate):
         raise InputError(f"{noise_run.name}: the table turns in it; a noise run is a static one")
     values = noise_run.gyro_deg_h

@@ -12,7 +12,7 @@ from fogml.gap.dictionary import unknown_groups
 from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.group import Group
 from fogml.gap.model import GyroModel
-from fogml.gap.noise import Noise, noise_of, prior_of
+from fogml.gap.noise import FROM_RUNS, FROM_RUNS_ALONE, Noise, noise_of, prior_of
 from fogml.gap.observation import Observation, Unusable, observe
 from fogml.gap.run_whitener import RunWhitener
 from fogml.runs.run import FloatArray, Run
@@ -102,8 +102,10 @@ def with_noise_beside(p: Prepared, explained: Sequence[FloatArray], *, alone: bo
 
     Beside it `alone`, whatever else moves is noise; otherwise smooth unknowns are kept out of it.
     """
-    groups = () if alone else p.groups
-    noise = noise_of(p.fit, p.model.constants, groups, p.noise_prior, p.noise.source, explained)
+    groups, source = p.groups, p.noise.source
+    if alone:
+        groups, source = (), FROM_RUNS_ALONE if source == FROM_RUNS else source
+    noise = noise_of(p.fit, p.model.constants, groups, p.noise_prior, source, explained)
     whiteners, recalibrated = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=recalibrated)
 
