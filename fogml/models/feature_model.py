@@ -40,7 +40,8 @@ from fogml.models.table import (
     run_rows,
     table_of_rows,
 )
-from fogml.models.tall_least_squares import Part, one_blas_thread
+from fogml.models.tall_least_squares import Part
+from fogml.models.threads import one_thread
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import BoolArray, FloatArray, Run
 
@@ -147,7 +148,7 @@ class FeatureModel(DriftModel):
         drift = np.empty(len(atoms))
         step = max(1, _PREDICTED_VALUES // len(self.features_))
         # Products of a matrix this narrow with a vector gain nothing from threads, but wait for them.
-        with one_blas_thread() if isinstance(self.regressor_, LinearRegressor) else nullcontext():
+        with one_thread("blas") if isinstance(self.regressor_, LinearRegressor) else nullcontext():
             for start in range(0, len(atoms), step):
                 piece = slice(start, start + step)
                 drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))

@@ -22,17 +22,16 @@ number that is 1e15 already for raw powers up to T**7.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.models.threads import available_cores, one_thread
 from fogml.runs.run import FloatArray
 
 PIECE_ROWS = 4096
@@ -88,7 +87,7 @@ class Condensed:
 def condense(parts: Sequence[Part], n_folds: int) -> Condensed:
     """Bring the rows of all parts down to one small factor for each fold."""
     # Threads within BLAS only slow matrices this narrow; rows are shared among threads instead.
-    with one_blas_thread():
+    with one_thread("blas"):
         return _condense(parts, n_folds)
 
 
@@ -210,21 +209,3 @@ def _run_streams(parts: Sequence[Part], stream: Callable[[list[tuple[Part, slice
     shares = [pieces[start:stop] for start, stop in pairwise(edges)]
     with ThreadPoolExecutor(max_workers=min(_STREAMS, available_cores())) as pool:
         return list(pool.map(stream, shares))
-
-
-def available_cores() -> int:
-    """Cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def one_blas_thread() -> Any:
-    """A context in which BLAS calls use one thread each."""
-    return _controller().limit(limits=1, user_api="blas")
-
-
-@cache
-def _controller() -> Any:
-    # Looking the libraries up takes milliseconds; they stay where they are.
-    from threadpoolctl import ThreadpoolController
-
-    return ThreadpoolController()

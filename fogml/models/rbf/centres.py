@@ -7,6 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.models.threads import one_thread
+
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
@@ -30,14 +32,13 @@ def thinned_rows(count: int, most: int) -> IndexArray:
 def kmeans_centres(rows: FloatArray, count: int, seed: int) -> FloatArray:
     """Centres of `count` clusters of the rows, or of as many as there are distinct rows; shape (j, d)."""
     from sklearn.cluster import KMeans
-    from threadpoolctl import threadpool_limits
 
     sample = thinned(rows)
     distinct = np.unique(sample, axis=0)
     if len(distinct) <= count:
         return distinct
     # Threads would add up in an order that changes from call to call.
-    with threadpool_limits(limits=1, user_api="openmp"):
+    with one_thread("openmp"):
         found = KMeans(count, n_init=1, max_iter=30, random_state=seed).fit(sample)
     return np.asarray(found.cluster_centers_, dtype=np.float64)
 

@@ -22,7 +22,7 @@ from fogml.models.rbf.tuning import (
     SharedVariables,
     TuningSettings,
 )
-from fogml.models.tall_least_squares import one_blas_thread
+from fogml.models.threads import one_thread
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -151,7 +151,7 @@ class Search:
         if dimensions == 0 or not sizes or self._linear_suffices():
             return Found(Shape(np.empty((0, dimensions)), np.empty((0, dimensions)), 0.0), {0: 0.0}, 1.0)
         evidence = self.settings.evidence
-        with one_blas_thread(), _one_torch_thread(), self._beside_others():
+        with one_thread("blas"), _one_torch_thread(), self._beside_others():
             first = self._first(min(sizes[0], _TRIED_CENTRES))
             starts = [tried.log_widths for tried in first]
             # With fewer independent rows another optimum is the better one, and not near the first.
