@@ -36,8 +36,6 @@ class Basis:
         Groups of the unknown.
     groups
         Columns of each group.
-    transforms
-        What makes each group's own columns into those of the basis, shape (k, columns).
     nodes
         Candidates' nodes.
     within_constants
@@ -49,7 +47,6 @@ class Basis:
     constants: NDArray[np.intp]
     kinds: Mapping[str, Group]
     groups: Mapping[str, NDArray[np.intp]]
-    transforms: Mapping[str, FloatArray]
     nodes: tuple[NodeColumns, ...]
     within_constants: tuple[str, ...]
 
@@ -78,14 +75,12 @@ def build_basis(
     """
     blocks = [frame.residual, frame.fixed]
     places: dict[str, NDArray[np.intp]] = {}
-    transforms: dict[str, FloatArray] = {}
     first = 1 + frame.fixed.shape[1]
     for group in groups:
         whitened = frame.white(group.columns)
         transform = main_axes(frame.beside(whitened), 1e-4)
         if transform.shape[1] == 0:
             continue
-        transforms[group.name] = transform
         blocks.append(whitened @ transform)
         places[group.name] = np.arange(first, first + transform.shape[1])
         first += transform.shape[1]
@@ -106,4 +101,4 @@ def build_basis(
     rows = np.concatenate(blocks, axis=1)
     constants = np.arange(1, 1 + frame.fixed.shape[1])
     kinds = {group.name: group for group in groups if group.name in places}
-    return Basis(frame, rows, constants, kinds, places, transforms, tuple(nodes), tuple(within))
+    return Basis(frame, rows, constants, kinds, places, tuple(nodes), tuple(within))

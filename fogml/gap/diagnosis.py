@@ -24,7 +24,7 @@ from fogml.gap.reports import (
     with_run_amplitudes,
 )
 from fogml.gap.result import Diagnosis, Found, HowFar, Unknown, Verdict
-from fogml.gap.structure import gaps_on_runs, stage_energies
+from fogml.gap.structure import gaps_on_runs, stage_energies, systematic_parts
 from fogml.gap.trials import Trial, best_trial
 from fogml.gap.where import where
 from fogml.runs.run import Run
@@ -114,7 +114,8 @@ def _result(
     if verdict == "unknown":
         found = ()
     after = fits if any(f.named for f in found) else p.recalibrated
-    gaps = gaps_on_runs(p, search, ranking)
+    systematic = systematic_parts(search, ranking)
+    gaps = gaps_on_runs(p, systematic)
     rng = np.random.default_rng(seed)
     tell("judging on held-out runs")
     far = tuple(how_far(o, p.model.constants, p.recalibrated, after, p.noise, rng) for o in p.held_out)
@@ -128,7 +129,7 @@ def _result(
         verdict=verdict,
         found=found,
         unknown=unknown,
-        where=where(gaps, stage_energies(candidates, search, ranking), p.noise),
+        where=where(gaps, stage_energies(candidates, systematic), p.noise),
         how_far=far,
         undetectable=undetectable,
         separating_run=next_run(p, found, undetectable, candidates, search, seed, tell) if plan else None,

@@ -6,6 +6,7 @@ A rest that no effect of a set could make anything of is another cause, however 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 
@@ -49,9 +50,16 @@ class Forms:
             own = np.array(self._field.basis.nodes[node].columns, dtype=np.intp)
             whole = float(np.trace(gram[np.ix_(own, own)]))
             shares = []
-            for places in self._field.basis.groups.values():
+            for places, inverse in zip(self._field.basis.groups.values(), self._inverses):
                 across = gram[np.ix_(places, own)]
-                inverse = np.linalg.pinv(gram[np.ix_(places, places)], rcond=_ROUNDING, hermitian=True)
                 shares.append(float(np.sum(across * (inverse @ across))) / whole)
             self._made[node] = np.clip(shares, 0.0, 1.0)
         return self._made[node]
+
+    @cached_property
+    def _inverses(self) -> list[FloatArray]:
+        """Of each group's inner products beside the constants."""
+        inner = (self._field.gram[np.ix_(places, places)] for places in self._field.basis.groups.values())
+        return [
+            np.asarray(np.linalg.pinv(block, rcond=_ROUNDING, hermitian=True), np.float64) for block in inner
+        ]

@@ -12,7 +12,7 @@ from fogml.gap.dictionary import unknown_groups
 from fogml.gap.fitting import Fit, fit_model
 from fogml.gap.group import Group
 from fogml.gap.model import GyroModel
-from fogml.gap.noise import FROM_RUNS, FROM_RUNS_ALONE, Noise, noise_of, prior_of
+from fogml.gap.noise import FROM_RUNS_ALONE, Noise, noise_of, prior_of
 from fogml.gap.observation import Observation, Unusable, observe
 from fogml.gap.run_whitener import RunWhitener
 from fogml.runs.run import FloatArray, Run
@@ -97,14 +97,16 @@ def recalibrated_constants(
     return whiteners, fit
 
 
-def with_noise_beside(p: Prepared, explained: Sequence[FloatArray], *, alone: bool = False) -> Prepared:
+def with_noise_beside(
+    p: Prepared, explained: Sequence[FloatArray] | None, *, alone: bool = False
+) -> Prepared:
     """The same with the noise fitted again beside what effects that were found can do, shape (m_r, k).
 
     Beside it `alone`, whatever else moves is noise; otherwise smooth unknowns are kept out of it.
     """
     groups, source = p.groups, p.noise.source
     if alone:
-        groups, source = (), FROM_RUNS_ALONE if source == FROM_RUNS else source
+        groups, source = (), source if p.noise_run else FROM_RUNS_ALONE
     noise = noise_of(p.fit, p.model.constants, groups, p.noise_prior, source, explained)
     whiteners, recalibrated = recalibrated_constants(p.model, p.fit, noise)
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=recalibrated)

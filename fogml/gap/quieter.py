@@ -40,7 +40,7 @@ def quieter(p: Prepared) -> Prepared | None:
 
 def louder(p: Prepared) -> Prepared:
     """The same with whatever the constants leave taken for noise."""
-    return with_noise_beside(p, [np.zeros((len(o), 0)) for o in p.fit], alone=True)
+    return with_noise_beside(p, None, alone=True)
 
 
 def log_joint(p: Prepared, search: Search, ranking: Ranking) -> float:

@@ -140,7 +140,7 @@ class Search:
         """The most probable explanation by a set, whatever acts beside it."""
         plain = self.explanation(effects)
         tried = [plain, self.explanation(effects, "unknown")]
-        if form_room(plain.effects) >= LENGTHS[0]:
+        if _form_room(plain.effects) >= LENGTHS[0]:
             tried.append(self.explanation(effects, "form"))
         return max(tried, key=lambda e: e.log_posterior)
 
@@ -191,7 +191,7 @@ class Search:
         if rest == "unknown":
             return prior + math.log(UNKNOWN)
         prior += math.log(1.0 - UNKNOWN)
-        if form_room(effects) >= LENGTHS[0]:
+        if _form_room(effects) >= LENGTHS[0]:
             prior += math.log(FORM if rest == "form" else 1.0 - FORM)
         return prior
 
@@ -211,13 +211,13 @@ class Search:
     ) -> tuple[tuple[str, float] | None, float]:
         """The best group for a rest beside a set and its length, and what averaging adds to its evidence."""
         names = list(self.field_.basis.groups)
-        small = form_room(effects) >= LENGTHS
+        small = _form_room(effects) >= LENGTHS
         fit = small if rest == "form" else ~small
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
         gains, weights = self._weighed(self._terms(effects, None), fit, rest == "unknown" and last)
         if rest == "form":
-            weights += self._forms.log_weights([(c.node, form_room([c])) for c in effects])[:, fit]
+            weights += self._forms.log_weights([(c.node, _form_room([c])) for c in effects])[:, fit]
         gains = gains + weights
         row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
         averaged = log_sum_exp(gains) - float(gains.max() - weights[row, column])
@@ -299,6 +299,6 @@ class Search:
         return Term(tuple(int(c) for c in self.field_.basis.groups[name]), length)
 
 
-def form_room(effects: Sequence[Chosen]) -> float:
+def _form_room(effects: Sequence[Chosen]) -> float:
     """Largest whitened length of a rest that is no more than a matter of form."""
     return FORM_ROOM * max((c.length for c in effects), default=0.0)

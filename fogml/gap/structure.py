@@ -6,7 +6,7 @@ its cause may not be known.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -26,14 +26,13 @@ GROUP_STAGE = {"table_rate": "scale_factor"}
 """Stage that a group of the unknown is booked on; bias for the others."""
 
 
-def gaps_on_runs(p: Prepared, search: Search, ranking: Ranking) -> list[GapOnRun]:
-    """The structural gap of the fit runs, with its systematic part."""
-    frame = search.field_.basis.frame
-    white = sum(systematic_parts(search, ranking).values(), np.zeros(frame.runs[-1].stop))
+def gaps_on_runs(p: Prepared, parts: Mapping[str, Sequence[FloatArray]]) -> list[GapOnRun]:
+    """The structural gap of the fit runs, with its systematic part: the sum of `systematic_parts`."""
     gaps = []
-    for o, part, whitener in zip(p.fit, frame.runs, frame.whiteners):
+    for r, o in enumerate(p.fit):
         recalibrated = o.averaged(o.model.output(p.recalibrated.constants, p.recalibrated.effects))
-        gaps.append(GapOnRun(o, o.recorded - recalibrated, whitener.colour(white[part]), _taken(p, o)))
+        systematic = sum((runs[r] for runs in parts.values()), np.zeros(len(o)))
+        gaps.append(GapOnRun(o, o.recorded - recalibrated, systematic, _taken(p, o)))
     return gaps
 
 
@@ -44,27 +43,28 @@ def _taken(p: Prepared, o: Observation) -> float:
     return float(np.mean(np.sum((rows @ p.recalibrated.covariance[:count, :count]) * rows, axis=1)))
 
 
-def stage_energies(candidates: Mapping[str, Candidate], search: Search, ranking: Ranking) -> dict[str, float]:
-    """Energy of the systematic part by stage [(deg/h)^2], summed over the rows of all runs."""
-    frame = search.field_.basis.frame
+def stage_energies(
+    candidates: Mapping[str, Candidate], parts: Mapping[str, Sequence[FloatArray]]
+) -> dict[str, float]:
+    """Energy of `systematic_parts` by stage [(deg/h)^2], summed over the rows of all runs."""
     energies: dict[str, float] = {}
-    for id, white in systematic_parts(search, ranking).items():
+    for id, runs in parts.items():
         stage = candidates[id].stage if id in candidates else GROUP_STAGE.get(id, "bias")
-        values = [whitener.colour(white[part]) for part, whitener in zip(frame.runs, frame.whiteners)]
-        energy = float(sum(np.sum(v**2) for v in values))
+        energy = float(sum(np.sum(values**2) for values in runs))
         if energy > 0.0:
             energies[stage] = energies.get(stage, 0.0) + energy
     return energies
 
 
-def systematic_parts(search: Search, ranking: Ranking) -> dict[str, FloatArray]:
-    """What each part of the best explanation makes beside the constants, whitened, shape (n,).
+def systematic_parts(search: Search, ranking: Ranking) -> dict[str, list[FloatArray]]:
+    """What each part of the best explanation makes on each run beside the constants [deg/h], shape (m,).
 
     By ids of effects, and the name of the group of what acts besides; all as much smaller as it is
     probable that nothing acts.
     """
     frame = search.field_.basis.frame
-    return {
-        name: (1.0 - ranking.nothing) * frame.without_constants(rows)
-        for name, rows in search.estimates(ranking.best).items()
-    }
+    parts = {}
+    for name, rows in search.estimates(ranking.best).items():
+        white = (1.0 - ranking.nothing) * frame.without_constants(rows)
+        parts[name] = [whitener.colour(white[part]) for part, whitener in zip(frame.runs, frame.whiteners)]
+    return parts

@@ -174,7 +174,7 @@ def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatA
             columns += [own * (i == r) for i in range(len(p.fit))] if apart else [own]
         if best.unknown is not None:
             columns.append(basis.kinds[best.unknown[0]].columns[r])
-        rows.append(np.concatenate([np.zeros((len(o), 0)), *columns], axis=1))
+        rows.append(np.concatenate(columns, axis=1))
     return rows
 
 

@@ -9,7 +9,7 @@ from scipy.linalg import block_diag
 from fogml.gap.frame import constant_rows
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
-from fogml.gap.structure import gaps_on_runs, stage_energies
+from fogml.gap.structure import gaps_on_runs, stage_energies, systematic_parts
 from fogml.gap.trials import best_trial
 from tests.gap.small_model import SmallModel, dense, noise_of, ramps, recorded
 
@@ -54,11 +54,11 @@ def test_an_effect_of_another_amplitude_on_each_run_has_its_gap_on_each():
     acting = [(EffectValue("cube", size, {}),) for size in CUBE]
     found = trial(("bend", "cube_drawn"), acting)
     assert found.ranking.best.ids == {"cube_drawn"}
-    gaps = gaps_on_runs(found.prepared, found.search, found.ranking)
+    gaps = gaps_on_runs(found.prepared, systematic_parts(found.search, found.ranking))
     true = beside_constants(found.prepared, cubes(found.prepared))
     for gap, expected in zip(gaps, true):
         assert np.sqrt(np.mean((gap.systematic - expected) ** 2)) < 0.2 * np.sqrt(np.mean(expected**2))
-    stages = stage_energies(found.prepared.model.candidates(), found.search, found.ranking)
+    stages = stage_energies(found.prepared.model.candidates(), systematic_parts(found.search, found.ranking))
     energy = sum(float(np.sum(part**2)) for part in true)
     assert set(stages) == {"bias"} and stages["bias"] == pytest.approx(energy, rel=0.2)
 
@@ -66,13 +66,13 @@ def test_an_effect_of_another_amplitude_on_each_run_has_its_gap_on_each():
 def test_what_has_no_name_has_its_place_all_the_same():
     found = trial(("cube",), [(), ()], lambda run: 0.6 * np.sin(2.0 * np.pi * run.time / 2000.0))
     assert found.ranking.unknown > 0.5
-    gaps = gaps_on_runs(found.prepared, found.search, found.ranking)
+    gaps = gaps_on_runs(found.prepared, systematic_parts(found.search, found.ranking))
     true = [0.6 * np.sin(2.0 * np.pi * o.time / 2000.0) for o in found.prepared.fit]
     assert correlation([g.systematic for g in gaps], true) > 0.9
 
 
 def test_where_nothing_acts_next_to_nothing_is_systematic():
     found = trial(("bend", "cube"), [(), ()])
-    gaps = gaps_on_runs(found.prepared, found.search, found.ranking)
+    gaps = gaps_on_runs(found.prepared, systematic_parts(found.search, found.ranking))
     for gap in gaps:
         assert np.std(gap.systematic) < 0.2 * np.std(gap.gap)
