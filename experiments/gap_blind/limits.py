@@ -8,7 +8,8 @@ name it from much under 8: a choice of 36 costs 4, its size and shape about as m
 For each wrong name, and each effect that was missed, the distance between what truly acts and what was
 answered is ``||r||^2 / 2`` nats: r is what the answered effects, at the shapes stated and the best
 amplitudes, leave of the true contributions, both whitened by the true noise, beside the nominal constants.
-Where the answer says that something unknown acts, what truly is unknown counts as answered.
+Where the answer says that something unknown acts, what truly is unknown counts as answered. Relatives of
+an effect that was left out are no wrong names, as in the score.
 
 ``python -m experiments.gap_blind.limits DIR`` writes ``limits.json`` and ``limits.md`` beside itself.
 """
@@ -26,7 +27,7 @@ import numpy as np
 from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.relatives import Likeness
+from fogml.gap.blind.relatives import Likeness, relatives_of
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
@@ -56,6 +57,16 @@ FIGURES = (
     ("unknown, any d′: said to be unknown", UNKNOWNS, False, 0.0, False),
 )
 """Words, kinds, whether known effects count or unknown ones, least d′, whether a wrong name spoils it."""
+WRONG_NAMES = (
+    ("one effect, d′ over 10", ("one",), STRONG),
+    ("one effect, any d′", ("one",), 0.0),
+    ("two effects", ("two",), 0.0),
+    ("three effects", ("three",), 0.0),
+    ("unknown, d′ over 10", UNKNOWNS, STRONG),
+    ("unknown, any d′", UNKNOWNS, 0.0),
+    ("unknown and known", ("unknown_and_known",), 0.0),
+)
+"""Words, kinds, least d′."""
 GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
 Row = dict[str, Any]
 
@@ -87,7 +98,12 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
     named = [item for item in gap["which"] if item["probability"] >= 0.5]
     held = {member for item in named for member in item["class"]}
     unknown = gap["unknown"]["probability"]
-    wrong = [item["effect"] for item in named if not truth.right_names & set(item["class"])]
+    relative = relatives_of(folder, truth) or (lambda id: False)
+    wrong = [
+        item["effect"]
+        for item in named
+        if not truth.right_names & set(item["class"]) and not any(relative(id) for id in item["class"])
+    ]
     effects = [
         {"case": name, "kind": truth.kind, "effect": e.name, "known": e in truth.known}
         | {"d_prime": e.d_prime, "gain": gain, "wrong_beside": bool(wrong)}
@@ -170,6 +186,15 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
         "|---|---:|---:|---:|",
         *(_within_reach(everything, *figure) for figure in FIGURES),
         "",
+        "## Wrong names that the data could have told",
+        "",
+        f"Share of cases with a wrong name, and with one that the truth is {SHOWN_NATS:g} nats or more away "
+        "from: what is nearer is as good an explanation for one who has to choose.",
+        "",
+        "| figure | cases | a wrong name | that the data tell |",
+        "|---|---:|---:|---:|",
+        *(_wrong_names(everything, wrong, *figure) for figure in WRONG_NAMES),
+        "",
         "## How far wrong answers are from the truth",
         "",
         f"{len(wrong)} cases were answered with a wrong name or without an effect that acts. For each the "
@@ -200,16 +225,33 @@ def _within_reach(
     effects: Sequence[Row], words: str, kinds: Sequence[str], known: bool, above: float, alone: bool
 ) -> str:
     """A line of the table: what the data show of a figure's cases, and what was answered."""
-    held: dict[str, list[Row]] = {}
-    for row in effects:
-        if row["kind"] in kinds and row["known"] == known:
-            held.setdefault(row["case"], []).append(row)
-    counted = [rows for rows in held.values() if min(row["d_prime"] for row in rows) > above]
+    counted = list(_cases([row for row in effects if row["known"] == known], kinds, above).values())
     if not counted:
         return f"| {words} | 0 | – | – |"
     shown = np.mean([all(row["gain"] >= SHOWN_NATS for row in rows) for rows in counted])
     has = np.mean([all(r["named"] and not (alone and r["wrong_beside"]) for r in rows) for rows in counted])
     return f"| {words} | {len(counted)} | {shown:.2f} | {has:.2f} |"
+
+
+def _wrong_names(
+    effects: Sequence[Row], wrong: Sequence[Row], words: str, kinds: Sequence[str], above: float
+) -> str:
+    """A line of the table: how many cases have a wrong name, and one that is far from the truth."""
+    counted = _cases(effects, kinds, above)
+    if not counted:
+        return f"| {words} | 0 | – | – |"
+    nats = [row["nats"] for row in wrong if row["wrong"] and row["case"] in counted]
+    far = sum(value >= SHOWN_NATS for value in nats)
+    return f"| {words} | {len(counted)} | {len(nats) / len(counted):.2f} | {far / len(counted):.2f} |"
+
+
+def _cases(effects: Sequence[Row], kinds: Sequence[str], above: float) -> dict[str, list[Row]]:
+    """Effects by case, of cases of these kinds whose weakest effect has a d' above a limit."""
+    held: dict[str, list[Row]] = {}
+    for row in effects:
+        if row["kind"] in kinds:
+            held.setdefault(row["case"], []).append(row)
+    return {case: rows for case, rows in held.items() if min(row["d_prime"] for row in rows) > above}
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.gap.frame import Frame
-from fogml.gap.model import Candidate
+from fogml.gap.model import Candidate, drawn_per_run
 from fogml.gap.priors import plausible_lengths
 from fogml.gap.screening import Screening
 from fogml.gap.shapes import Node, grid
@@ -70,17 +70,18 @@ def candidate_columns(
     widest = max(frame.observations, key=lambda o: float(np.ptp(o.temperature)))
     nodes = grid(candidate, grade, lambda s: widest.response(candidate.id, s, frame.values), frame.spans)
     count = len(nodes)
-    nodes = tuple(nodes[i] for i in screening.lines(nodes))
+    lines, middle = screening.lines(nodes)
+    nodes = tuple(nodes[i] for i in (*lines, *([] if middle is None else [middle])))
     columns = frame.responses(candidate.id, [shape for node in nodes for shape in node.draws])
     if not np.any(columns):
         return []
-    apart = frame.runs if getattr(candidate, "drawn_per_run", False) and len(frame.runs) > 1 else []
+    apart = frame.runs if drawn_per_run(candidate) and len(frame.runs) > 1 else []
     widths = [len(node.draws) for node in nodes]
     starts = np.cumsum([0, *widths])[:-1]
     usual = abs(candidate.amplitude.typical(grade))  # type: ignore[arg-type]
     signed = candidate.amplitude.signed or candidate.amplitude.range(grade)[0] < 0.0  # type: ignore[arg-type]
     found = []
-    for i in _kept(columns, starts.tolist(), apart, screening):
+    for i, stands_for in _kept(columns, starts.tolist(), apart, screening, count, middle is not None):
         part = columns[:, starts[i] : starts[i] + widths[i]]
         mix = nodes[i].mix
         if apart:
@@ -91,7 +92,7 @@ def candidate_columns(
             continue
         rank = LARGEST_RANK * max(len(apart), 1)
         basis, length = _on_axes(part, frame.beside(part), mix, rank)
-        weights = plausible_lengths(candidate, 1.0 / length) - np.log(count)
+        weights = plausible_lengths(candidate, 1.0 / length) + np.log(stands_for / count)
         weights += getattr(candidate, "log_prior", 0.0)
         one_way = basis.shape[1] == 1 and not signed
         if one_way and basis[:, 0] @ part[:, 0] < 0.0:
@@ -102,15 +103,30 @@ def candidate_columns(
 
 
 def _kept(
-    columns: FloatArray, starts: Sequence[int], apart: Sequence[slice], screening: Screening
-) -> Sequence[int]:
-    """The nodes that fit best, of many."""
-    if len(starts) <= SEARCHED_FROM:
-        return range(len(starts))
-    parts = [_only(columns, run) for run in apart] if apart else [columns]
-    gains = [screening.gains(part, starts) for part in parts]
-    order = [np.argsort(sum(gain))[::-1][:MOST_NODES] for gain in zip(*gains)]
-    return sorted(set(np.concatenate(order).tolist()))
+    columns: FloatArray,
+    starts: Sequence[int],
+    apart: Sequence[slice],
+    screening: Screening,
+    count: int,
+    has_middle: bool,
+) -> list[tuple[int, int]]:
+    """The nodes that fit best, of many, and the middle one of the others, with how many each stands for.
+
+    Without the middle one an effect would count for less where the nodes are all alike. It is the last node
+    where `has_middle`; `count` is the number of nodes before any was left out.
+    """
+    places = list(range(len(starts)))
+    middle = places.pop() if has_middle else None
+    if len(places) > SEARCHED_FROM:
+        parts = [_only(columns, run) for run in apart] if apart else [columns]
+        gains = [np.sum(gain, axis=0) for gain in zip(*(screening.gains(part, starts) for part in parts))]
+        best = {i for gain in gains for i in np.argsort(gain[: len(places)])[::-1][:MOST_NODES].tolist()}
+        if middle is None:
+            others = [i for i in np.argsort(np.sum(gains, axis=0)).tolist() if i not in best]
+            middle = others[len(others) // 2] if others else None
+        places = sorted(best)
+    kept = [(i, 1) for i in places]
+    return kept if middle is None else [*kept, (middle, count - len(places))]
 
 
 def _only(columns: FloatArray, run: slice) -> FloatArray:

@@ -41,6 +41,8 @@ class Ranked:
         Share of the explanation's gain that needs other forms than the catalogue's.
     rest
         Length of what acts beside the set over that of the effect; 0 where nothing does.
+    unrealised
+        Gain that its own form, as fitted, does not bring, which the margin is less by [nats].
     """
 
     chosen: Chosen
@@ -49,6 +51,7 @@ class Ranked:
     margin: float
     form_share: float = 0.0
     rest: float = 0.0
+    unrealised: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,11 @@ class Ranking:
     log_odds: float
     noise: UnevenNoise
     nothing: float
+
+    @property
+    def named(self) -> frozenset[str]:
+        """Ids of the best explanation's effects that are named."""
+        return self.best.ids & {r.chosen.candidate for r in self.effects if r.probability >= 0.5}
 
 
 def rank(
@@ -110,12 +118,12 @@ def rank(
     taken: set[str] = set()
     for chosen in best.effects:
         members = classes[chosen.candidate]
-        ranked.append(_ranked(search, best, chosen, members, whole, weights))
+        ranked.append(_ranked(search, best, chosen, members, whole))
         taken |= set(members)
     for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
-        other = _ranked(search, with_it, chosen, (id,), whole, weights)
+        other = _ranked(search, with_it, chosen, (id,), whole)
         # Named is what the best explanation holds, and what is fitted.
         other = replace(other, probability=min(other.probability, UNSURE))
         if other.margin >= LEAST_MARGIN:
@@ -159,6 +167,12 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
         swapped = search.explanation((*others, search._best(other, gains)), best.rest)
         if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
+    # One that takes the place with something else beside it is no less likely to act.
+    for tried in search.tried:
+        news, behind = tried.ids - best.ids, best.log_posterior - tried.log_posterior
+        if len(news) == 1 and tried.ids - news == best.ids - {id} and behind < nats:
+            other = min(news)
+            members[other] = max(members.get(other, -math.inf), best.log_evidence - behind)
     rest = sorted((m for m in members if m != id), key=lambda m: -members[m])
     return (id, *rest)
 
@@ -169,16 +183,14 @@ def _ranked(
     chosen: Chosen,
     members: tuple[str, ...],
     explanations: Sequence[Explanation],
-    weights: np.ndarray,
 ) -> Ranked:
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
-    probability = min(float(weights[inside].sum()), 1.0)
-    without = max((e.log_posterior for e, i in zip(explanations, inside) if not i), default=-math.inf)
-    with_it = max(e.log_posterior for e, i in zip(explanations, inside) if i)
-    margin = with_it - without
-    if len(inside) > int(inside.sum()):
+    logs = np.array([e.log_posterior for e in explanations])
+    with_it, without = logs[inside], logs[~inside]
+    margin = float(with_it.max() - without.max(initial=-math.inf))
+    if len(without):
         # The smaller of the two: many weak sets without the class may outweigh the best of them.
-        margin = min(margin, math.log(max(probability, 1e-300)) - math.log(max(1.0 - probability, 1e-14)))
+        margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
     rest = held.group[1] / chosen.length if held.unknown is not None and held.group is not None else 0.0
     share = search.form_share(held)
     alone = len(held.effects) == 1 and held.unknown is None

@@ -9,12 +9,13 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.assumptions import assumptions
 from fogml.gap.describe import describe_unknown
-from fogml.gap.found import found_effects
+from fogml.gap.found import fit_named, found_effects
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.left_out import doubted, with_look_alikes
 from fogml.gap.model import Candidate, GyroModel
 from fogml.gap.next_run import next_run
 from fogml.gap.preparing import Prepared, Progress, prepare
+from fogml.gap.realised import realised
 from fogml.gap.reports import (
     candidate_evidence,
     constant_fits,
@@ -103,9 +104,13 @@ def _result(
     plan: bool,
     tell: Progress,
 ) -> Diagnosis:
-    p, basis, search, ranking = trial.prepared, trial.basis, trial.search, trial.ranking
+    p, basis, search = trial.prepared, trial.basis, trial.search
     tell("fitting what was found")
-    found, fits = found_effects(p, candidates, search, ranking)
+    fit = fit_named(p, candidates, search, trial.ranking)
+    ranking = realised(p, candidates, search, trial.ranking, fit)
+    if ranking.named != trial.ranking.named:
+        fit = fit_named(p, candidates, search, ranking)
+    found, fits = found_effects(candidates, search, ranking, fit)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
     found = with_look_alikes(search, ranking.best, found, left_out, p.model.grade)
     looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""

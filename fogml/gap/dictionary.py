@@ -53,6 +53,9 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
         ("start", "decays from the start of a run or a power-on", _decays(observations)),
         ("time", "drifts with time, the same way on every run", [_drifts(o) for o in observations]),
     ]
+    constants = _constants(observations)
+    if constants[0].shape[1] > 1:
+        groups.append(("power_cycle", "is another constant after each power-on", constants))
     if high - low > 2.0:
         half = 0.5 * (high - low)
         u = [(t - 0.5 * (low + high)) / half for t in temperatures]
@@ -106,6 +109,16 @@ def _decays(observations: Sequence[Observation]) -> list[FloatArray]:
             since.append(o.averaged(o.run.columns["time_on"]) if "time_on" in o.run.columns else start)
         blocks.append(np.concatenate([np.exp(-s[:, None] / np.array(DECAYS_S)) for s in since], axis=1))
     return blocks
+
+
+def _constants(observations: Sequence[Observation]) -> list[FloatArray]:
+    """Ones from each power-on to the next, on each run in columns of their own."""
+    parts = []
+    for o in observations:
+        since = o.run.columns.get("time_on", o.run.time)
+        cycle = np.cumsum(np.diff(since, prepend=since[0]) < 0.0)
+        parts.append(np.column_stack([o.averaged((cycle == k).astype(float)) for k in range(cycle[-1] + 1)]))
+    return list(side_by_side(parts))
 
 
 def _drifts(o: Observation) -> FloatArray:

@@ -27,12 +27,10 @@ FORM_ERROR = 0.12
 FULL_TURN_DEG = 360.0
 
 
-def found_effects(
-    p: Prepared, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking
-) -> tuple[tuple[Found, ...], Fit]:
-    """Effects with numbers, and the fit with those that are named."""
+def fit_named(p: Prepared, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking) -> Fit:
+    """The model fitted with the effects that are named."""
     basis = search.field_.basis
-    named = [r for r in ranking.effects if r.probability >= 0.5 and r.chosen.candidate in ranking.best.ids]
+    named = [r for r in ranking.effects if r.chosen.candidate in ranking.named]
     starts = starting_values(
         p.fit,
         p.whiteners,
@@ -41,11 +39,17 @@ def found_effects(
         [(r.chosen.candidate, basis.nodes[r.chosen.node].node.shape) for r in named],
         candidates,
     )
-    fit = p.recalibrated
-    if starts:
-        fit = fit_model(
-            p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
-        )
+    if not starts:
+        return p.recalibrated
+    return fit_model(
+        p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
+    )
+
+
+def found_effects(
+    candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
+) -> tuple[tuple[Found, ...], Fit]:
+    """Effects with numbers, and the fit with those of lines and draws that a replay can't show."""
     fitted = {e.id: e for e in fit.effects}
     errors = fit.standard_errors
     found = []
@@ -68,6 +72,7 @@ def found_effects(
                 members=r.members,
                 probability=r.probability,
                 margin=r.margin,
+                unrealised=r.unrealised,
                 form_share=r.form_share,
                 rest=r.rest,
                 length=r.chosen.length,

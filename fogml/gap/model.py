@@ -89,6 +89,11 @@ class Candidate(Protocol):
         """Id of a look-alike to what separates the two; may be empty."""
 
 
+def drawn_per_run(candidate: Candidate) -> bool:
+    """Whether a candidate is drawn anew on each run, which it says by an attribute of this name."""
+    return bool(getattr(candidate, "drawn_per_run", False))
+
+
 class Responding(Protocol):
     """What gives responses of candidates."""
 

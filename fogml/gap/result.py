@@ -56,7 +56,9 @@ class Found:
     parameters
         Shape parameters by name.
     margin
-        By how much the evidence falls without the class [nats].
+        By how much the evidence falls without the class, less what is `unrealised` [nats].
+    unrealised
+        Gain that the evidence credits it with, and that its own form as fitted does not bring [nats].
     form_share
         Share of the gain that needs another form than the catalogue's.
     rest
@@ -80,6 +82,7 @@ class Found:
     by_run: tuple[RunAmplitude, ...] = ()
     consistent: bool = True
     margin: float = 0.0
+    unrealised: float = 0.0
     form_share: float = 0.0
     rest: float = 0.0
     length: float = 0.0

@@ -57,6 +57,7 @@ def _found(found: Found) -> dict[str, Any]:
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
         "margin": found.margin,
+        "unrealised": found.unrealised,
         "form_share": found.form_share,
         "rest": found.rest,
         "length": found.length,

@@ -56,12 +56,16 @@ class Screening:
             gains.append(gain)
         return gains
 
-    def lines(self, nodes: Sequence[Node]) -> list[int]:
-        """The nodes whose frequencies stand out in the periodogram; all where they are no lines in time."""
+    def lines(self, nodes: Sequence[Node]) -> tuple[list[int], int | None]:
+        """The nodes whose frequencies stand out in the periodogram, and the middle one of the others.
+
+        All and None where they are no lines in time.
+        """
         frequencies = np.array([np.nan if n.frequency_hz is None else n.frequency_hz for n in nodes])
         if np.isnan(frequencies).any() or len(nodes) <= MOST_LINES_TRIED:
-            return list(range(len(nodes)))
+            return list(range(len(nodes))), None
         kept: set[int] = set()
+        total = np.zeros(len(nodes))
         for _, _, left in self._sets:
             power = np.zeros(len(nodes))
             for run, step in zip(self._runs, self._steps_s):
@@ -71,7 +75,9 @@ class Screening:
                 places = np.rint(frequencies * step * length).astype(np.intp)
                 power += spectrum[np.minimum(places, len(spectrum) - 1)]
             kept |= set(np.argsort(power)[::-1][: MOST_LINES_TRIED // 2].tolist())
-        return sorted(kept)
+            total += power
+        others = [i for i in np.argsort(total).tolist() if i not in kept]
+        return sorted(kept), others[len(others) // 2] if others else None
 
 
 def _even_gains(

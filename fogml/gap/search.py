@@ -129,12 +129,17 @@ class Search:
             front = ranked[: BEAM[min(size, len(BEAM) - 1)]]
             if size >= 2 and ranked[0].log_posterior < self.best.log_posterior - 6.0:
                 break
-        return sorted(self._held.values(), key=lambda e: -e.log_posterior)
+        return sorted(self.tried, key=lambda e: -e.log_posterior)
+
+    @property
+    def tried(self) -> tuple[Explanation, ...]:
+        """Every explanation so far."""
+        return tuple(self._held.values())
 
     @property
     def best(self) -> Explanation:
         """The most probable explanation so far."""
-        return max(self._held.values(), key=lambda e: e.log_posterior)
+        return max(self.tried, key=lambda e: e.log_posterior)
 
     def _best_of(self, effects: Sequence[Chosen]) -> Explanation:
         """The most probable explanation by a set, whatever acts beside it."""

@@ -18,9 +18,9 @@ from fogml.gap.basis import Basis, build_basis
 from fogml.gap.classes import Ranking, rank
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field
-from fogml.gap.found import found_effects
+from fogml.gap.found import fit_named
 from fogml.gap.frame import Frame
-from fogml.gap.model import Candidate
+from fogml.gap.model import Candidate, drawn_per_run
 from fogml.gap.near_library import near_library
 from fogml.gap.noise import Noise, tension
 from fogml.gap.preparing import Prepared, Progress, with_noise_beside
@@ -152,7 +152,7 @@ def _again(
     tell("fitting the noise beside what was found")
     values = p.recalibrated.constants
     if best.effects:
-        values = found_effects(p, candidates, trial.search, trial.ranking)[1].constants
+        values = fit_named(p, candidates, trial.search, trial.ranking).constants
     again = with_noise_beside(p, _explained(trial, candidates), alone=alone)
     on_inputs = not alone and _act_on_inputs(candidates, trial.ranking)
     if not (_differ(p.noise, again.noise) or on_inputs):
@@ -170,7 +170,7 @@ def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatA
             shapes = basis.nodes[c.node].node.draws[:MOST_DRAWS]
             own = np.column_stack([o.response(c.candidate, s, basis.frame.values) for s in shapes])
             # One that each run draws anew has columns of its own on each.
-            apart = getattr(candidates[c.candidate], "drawn_per_run", False)
+            apart = drawn_per_run(candidates[c.candidate])
             columns += [own * (i == r) for i in range(len(p.fit))] if apart else [own]
         if best.unknown is not None:
             columns.append(basis.kinds[best.unknown[0]].columns[r])

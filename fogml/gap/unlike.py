@@ -23,6 +23,8 @@ LEAST_AXIS = 0.1
 """Axes of a candidate's node with less of the first one's energy are left out."""
 NEAR = 0.6
 """Squared cosine of the mean signal with a node, under which no draw is near it."""
+MOSTLY = 0.5
+"""Share of a group's signals that may be like a candidate's for it to count as an unknown in full."""
 _LARGEST = 1.0 - 1.0 / DRAWS
 
 
@@ -78,7 +80,8 @@ class Unlike:
         after = self._like(name, mean[-k:] + self._normal[:, :k] @ factor.T)
         if name not in self._prior:
             self._prior[name] = self._like(name, self._normal[:, :k])
-        before = self._prior[name]
+        # A group that holds hardly anything but a candidate is no unknown, however alike all its signals are.
+        before = min(self._prior[name], MOSTLY)
         return math.log1p(-after * _LARGEST) - math.log1p(-before * _LARGEST)
 
     def _like(self, name: str, draws: FloatArray) -> float:

@@ -45,6 +45,7 @@ KINDS = {
         Kind("cube", POSITIVE),
         Kind("mixture", SIZE, (SHARE,)),
         Kind("line", SIZE, (PERIOD, PHASE)),
+        Kind("rippled", SIZE, (PERIOD, PHASE)),
         Kind("tilted", SIZE),
         Kind("mute", SIZE),
     )
@@ -89,6 +90,9 @@ class OnRun:
         u, t = self.u, self.run.time - self.run.time[0]
         if id.startswith("bend"):
             return np.tanh((self.run.temperature() - shape["centre_temperature"]) / shape["width"])
+        if id == "rippled":
+            phase = 2.0 * np.pi * t / shape["period"] + np.radians(shape["phase"])
+            return u**3 + 1e-3 * np.sin(phase)
         if id.startswith("cube"):
             return u**3
         if id == "mixture":

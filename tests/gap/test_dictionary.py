@@ -51,6 +51,7 @@ def test_each_group_spans_its_kind_of_cause_and_others_do_not(groups, observatio
         "past": [Memory().lag("l", o.time, o.temperature, 2500.0) - o.temperature for o in observations],
         "start": [np.exp(-(o.time - o.time[0]) / 900.0) for o in observations],
         "time": [np.sqrt((o.time - o.time[0]) / 3600.0) for o in observations],
+        "power_cycle": [np.full(len(o), value) for o, value in zip(observations, (0.3, -1.0))],
     }
     for name, signal in signals.items():
         assert left_share(groups[name], signal) < 0.03, name
@@ -71,6 +72,15 @@ def test_wandering_of_each_run_is_its_own(groups, observations):
         wander.append(sum(waves))
     assert left_share(fast, wander) < 0.05
     assert left_share(fast, [np.sin(2.0 * np.pi * o.time / 300.0) for o in observations]) > 0.9
+
+
+def test_a_power_on_within_a_run_starts_another_constant():
+    run = ramps("p", count=600, step=10.0)
+    switched = np.where(run.time < 2000.0, 500.0 + run.time, run.time - 2000.0)
+    o = observe(run.with_columns(time_on=switched), SmallModel())
+    group = next(g for g in unknown_groups([o]) if g.name == "power_cycle")
+    assert left_share(group, [np.where(o.time < 2000.0, 0.3, -0.1)]) < 1e-9
+    assert left_share(group, [np.where(o.time < 3000.0, 0.3, -0.1)]) > 0.2
 
 
 def test_groups_are_only_there_where_their_cause_moves():

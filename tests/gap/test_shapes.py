@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp
 
 from fogml.gap.candidate_columns import candidate_columns
 from fogml.gap.model import EffectValue
@@ -83,8 +84,8 @@ def test_the_true_line_is_kept_of_many(period):
     frame = with_line(period)
     screening = Screening(frame, [])
     nodes = grid_of("line")
-    kept = screening.lines(nodes)
-    assert len(kept) < len(nodes) / 2
+    kept, middle = screening.lines(nodes)
+    assert len(kept) < len(nodes) / 2 and middle not in kept
     nearest = min(range(len(nodes)), key=lambda i: abs(nodes[i].frequency_hz - 1.0 / period))
     assert nearest in kept
     found = candidate_columns(KINDS["line"], frame, "tactical", screening)
@@ -97,6 +98,31 @@ def test_the_true_line_is_kept_of_many(period):
         gains.append(-float(np.sum(left**2)))
     best = found[int(np.argmax(gains))][0]
     assert abs(best.node.frequency_hz - 1.0 / period) < 0.5 / RUN.span_s
+
+
+def test_nodes_that_are_left_out_count_through_the_middle_one(monkeypatch):
+    # A cube with a ripple on top that is next to nothing: all frequencies do as well.
+    frame = framed([recorded(RUN, MODEL, {}, (EffectValue("cube", 0.4),))], MODEL)
+
+    def evidence():
+        found = candidate_columns(KINDS["rippled"], frame, "tactical", Screening(frame, []))
+        (left,) = frame.beside(np.concatenate([frame.residual, *(c for _, c in found)], axis=1))[:1]
+        gains, first = [], 1
+        for node, columns in found:
+            gram = frame.beside(columns)
+            fit = left[first : first + columns.shape[1]]
+            inner = np.eye(len(fit)) + 400.0 * gram
+            gain = 200.0 * fit @ np.linalg.solve(inner, fit) - 0.5 * np.linalg.slogdet(inner)[1]
+            gains.append(gain + node.log_weights[2])
+            first += columns.shape[1]
+        return float(logsumexp(gains)), len(found)
+
+    some, count = evidence()
+    monkeypatch.setattr("fogml.gap.screening.MOST_LINES_TRIED", 10**6)
+    monkeypatch.setattr("fogml.gap.candidate_columns.SEARCHED_FROM", 10**6)
+    every, whole = evidence()
+    assert count < whole / 3
+    assert some == pytest.approx(every, abs=0.3)
 
 
 def test_gains_of_screening_are_what_least_squares_gains():

@@ -1,0 +1,80 @@
+"""What evidence credits an effect with, and the fitted effect does not bring."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.gap.basis import build_basis
+from fogml.gap.classes import rank
+from fogml.gap.evidence import Field
+from fogml.gap.found import fit_named
+from fogml.gap.frame import Frame
+from fogml.gap.model import EffectValue
+from fogml.gap.preparing import prepare
+from fogml.gap.realised import FORM_SHARE, realised, unrealised
+from fogml.gap.search import Search
+from tests.gap.small_model import SmallModel, dense, noise_of, ramps, recorded
+
+MODEL = SmallModel(("mixture", "cube"))
+MEANS = {"offset": 0.0, "slope": 0.0}
+
+
+def searched(share=None, against=0.0):
+    """Runs, what is found of them where nothing is unknown, and the fit of it."""
+    rng = np.random.default_rng(5)
+    effects = () if share is None else (EffectValue("mixture", 0.8, {"share": share}),)
+    made = []
+    for name, turns in zip("abc", (2, 3, 2)):
+        run = ramps(name, count=300, turns=turns)
+        run = recorded(run, MODEL, {"offset": 0.5}, effects, noise_of(run, rng))
+        # Both parts of the mixture, with a share that is none.
+        part = np.sin(run.time / 700.0) - 0.5 * ((run.temperature() - 20.0) / 20.0) ** 2
+        made.append(run.with_columns(gyro=run.gyro + against * part))
+    p = prepare(MODEL, made[:2], made[2:], None)
+    frame = Frame(p.fit, p.whiteners, MODEL.constants, p.recalibrated.constants)
+    search = Search(Field(build_basis(frame, MODEL.candidates(), (), MODEL.grade)))
+    ranking = rank(search, search.run())
+    assert ranking.named == {"mixture"}
+    candidates = MODEL.candidates()
+    return p, candidates, search, ranking, fit_named(p, candidates, search, ranking)
+
+
+def test_an_effect_that_does_what_it_is_credited_with_keeps_its_name():
+    found = searched(share=0.7)
+    ranking = realised(*found)
+    assert ranking.named == {"mixture"} and ranking.unknown == pytest.approx(found[3].unknown)
+    assert [(r.margin, r.unrealised) for r in ranking.effects] == [(r.margin, 0.0) for r in found[3].effects]
+
+
+def test_what_no_share_of_the_parts_makes_is_not_named_for_them():
+    found = searched(against=0.2)
+    ranking = realised(*found)
+    assert not ranking.named and ranking.unknown > 0.5 > found[3].unknown
+    for before, after in zip(found[3].effects, ranking.effects):
+        assert after.margin == pytest.approx(before.margin - after.unrealised)
+
+
+def test_what_is_brought_is_the_likelihood_ratio_of_the_fitted_replay():
+    p, candidates, search, ranking, fit = searched(against=0.4)
+    (effect,) = fit.effects
+    gap = np.concatenate([o.recorded - o.model.output(MEANS) for o in p.fit])
+    make = np.concatenate([o.model.response("mixture", effect.shape, MEANS) for o in p.fit])
+    columns = [np.column_stack([c.sd * o.model.columns()[c.name] for c in MODEL.constants]) for o in p.fit]
+    constants = np.concatenate(columns)
+    covariance = constants @ constants.T
+    first = 0
+    for o in p.fit:
+        rows = slice(first, first + len(o))
+        covariance[rows, rows] += dense(o.run.time, o.run.sample_s, p.noise.model)
+        first += len(o)
+    inverse = np.linalg.inv(covariance)
+    brought = 0.5 * (make @ inverse @ gap) ** 2 / (make @ inverse @ make)
+    frame = search.field_.basis.frame
+    left, part = (
+        frame.without_constants(rows)
+        for rows in (frame.residual[:, 0], search.estimates(ranking.best)["mixture"])
+    )
+    credited = left @ part - 0.5 * part @ part
+    lost = unrealised(p, candidates, search, ranking, fit)["mixture"]
+    assert lost == pytest.approx((1.0 - FORM_SHARE) * credited - brought, rel=0.03) and lost > 5.0
