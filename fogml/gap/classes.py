@@ -107,7 +107,7 @@ def rank(
         Explanations under other noise, on the same scale.
     """
     best = explanations[0]
-    classes = {c.candidate: _members(search, best, c.candidate) for c in best.effects}
+    classes = {c.candidate: _members(search, best, c.candidate, rivals) for c in best.effects}
     whole = _merged(explanations, rivals)
     weights = _weights(whole)
     unknown = float(sum(w for e, w in zip(whole, weights) if e.unknown is not None))
@@ -149,7 +149,7 @@ def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
     return np.asarray(np.exp(logs - log_sum_exp(logs)))
 
 
-def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
+def _members(search: Search, best: Explanation, id: str, rivals: Sequence[Explanation]) -> tuple[str, ...]:
     """The effect and those that take its place at less than `SAME_CLASS_NATS` of evidence."""
     others = tuple(c for c in best.effects if c.candidate != id)
     held = search.field_.condition(search._terms(others, best.group))
@@ -167,8 +167,8 @@ def _members(search: Search, best: Explanation, id: str) -> tuple[str, ...]:
         swapped = search.explanation((*others, search._best(other, gains)), best.rest)
         if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
-    # One that takes the place with something else beside it is no less likely to act.
-    for tried in search.tried:
+    # One that takes the place with something else beside it, or under other noise, is no less likely to act.
+    for tried in (*search.tried, *rivals):
         news, behind = tried.ids - best.ids, best.log_posterior - tried.log_posterior
         if len(news) == 1 and tried.ids - news == best.ids - {id} and behind < nats:
             other = min(news)

@@ -35,14 +35,14 @@ def fit_named(p: Prepared, candidates: Mapping[str, Candidate], search: Search, 
         p.fit,
         p.whiteners,
         p.model.constants,
-        p.recalibrated.constants,
+        basis.frame.values,
         [(r.chosen.candidate, basis.nodes[r.chosen.node].node.shape) for r in named],
         candidates,
     )
     if not starts:
         return p.recalibrated
     return fit_model(
-        p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, p.recalibrated.constants
+        p.fit, p.whiteners, p.model.constants, starts, candidates, p.model.grade, basis.frame.values
     )
 
 
