@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 from itertools import combinations
 
@@ -88,6 +89,19 @@ def test_two_that_are_alike_form_a_class_whose_probability_is_of_both():
     (one,) = (r for r in ranking.effects if r.probability >= 0.5)
     assert set(one.members) == {"bend", "bend_again"} and one.members[0] == one.chosen.candidate
     assert one.probability > 0.7 and one.margin > 5.0
+
+
+@pytest.mark.parametrize("behind, alike", [(1.0, True), (30.0, False)])
+def test_what_takes_the_place_under_other_noise_or_beside_an_unknown_is_of_the_class(behind, alike):
+    search = searched((BEND, LINE))
+    ranking, explanations = ranked(search)
+    best = ranking.best
+    assert best.ids == {"bend", "line"}
+    swapped = tuple(replace(c, candidate="cube") if c.candidate == "bend" else c for c in best.effects)
+    rival = replace(best, effects=swapped, rest="unknown", log_posterior=best.log_posterior - behind)
+    told = rank(search, explanations, rivals=[rival])
+    classes = {r.chosen.candidate: set(r.members) for r in told.effects}
+    assert ("cube" in classes["bend"]) == alike and "cube" not in classes["line"]
 
 
 def test_one_that_nothing_else_is_like_stands_alone():
