@@ -55,7 +55,7 @@ def unknown_groups(observations: Sequence[Observation]) -> list[Group]:
     ]
     constants = _constants(observations)
     if constants[0].shape[1] > 1:
-        groups.append(("power_cycle", "is another constant after each power-on", constants))
+        groups.append(("power_cycle", "is another constant on each run, or after each power-on", constants))
     if high - low > 2.0:
         half = 0.5 * (high - low)
         u = [(t - 0.5 * (low + high)) / half for t in temperatures]
