@@ -167,8 +167,13 @@ def _members(search: Search, best: Explanation, id: str, rivals: Sequence[Explan
         swapped = search.explanation((*others, search._best(other, gains)), best.rest)
         if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
-    # One that takes the place with something else beside it, or under other noise, is no less likely to act.
-    for tried in (*search.tried, *rivals):
+    # One that takes the place with something else beside it, or under other noise, is no less likely to act;
+    # unless what is beside it takes the place alone.
+    pool = (*search.tried, *rivals)
+    alone = {e.rest: e.log_posterior for e in _merged(pool, ()) if e.ids == best.ids - {id}}
+    for tried in pool:
+        if tried.log_posterior <= alone.get(tried.rest, -math.inf):
+            continue
         news, behind = tried.ids - best.ids, best.log_posterior - tried.log_posterior
         if len(news) == 1 and tried.ids - news == best.ids - {id} and behind < nats:
             other = min(news)

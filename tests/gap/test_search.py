@@ -102,6 +102,11 @@ def test_what_takes_the_place_under_other_noise_or_beside_an_unknown_is_of_the_c
     told = rank(search, explanations, rivals=[rival])
     classes = {r.chosen.candidate: set(r.members) for r in told.effects}
     assert ("cube" in classes["bend"]) == alike and "cube" not in classes["line"]
+    # What does as well without it makes a passenger of it.
+    line = tuple(c for c in best.effects if c.candidate == "line")
+    without = replace(rival, effects=line, log_posterior=rival.log_posterior + 0.5)
+    told = rank(search, explanations, rivals=[rival, without])
+    assert all("cube" not in r.members for r in told.effects if r.chosen.candidate == "bend")
 
 
 def test_one_that_nothing_else_is_like_stands_alone():
