@@ -53,8 +53,10 @@ def test_bad_input_is_status_2_and_one_line(run_files, tmp_path):
         assert not (tmp_path / "out").exists()
 
 
+# Under a job in the background an interrupt is ignored from the start.
 WAITING_IN_THE_FIT = """
-import pathlib, time
+import pathlib, signal, time
+signal.signal(signal.SIGINT, signal.default_int_handler)
 import sklearn.svm
 
 def fit(self, *rows, **more):
