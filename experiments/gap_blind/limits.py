@@ -28,6 +28,8 @@ from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness, relatives_of
+from fogml.gap.blind.scoring.answers import NAMED, read_answer
+from fogml.gap.blind.scoring.marks import mark
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
@@ -95,15 +97,11 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
     if not path.is_file() or not truth.effects:
         return [], None
     gap = json.loads(path.read_text())
-    named = [item for item in gap["which"] if item["probability"] >= 0.5]
+    marked = mark(truth, read_answer(folder.answers() / name), relatives_of(folder, truth))
+    named = [item for item in gap["which"] if item["probability"] >= NAMED]
     held = {member for item in named for member in item["class"]}
     unknown = gap["unknown"]["probability"]
-    relative = relatives_of(folder, truth) or (lambda id: False)
-    wrong = [
-        item["effect"]
-        for item in named
-        if not truth.right_names & set(item["class"]) and not any(relative(id) for id in item["class"])
-    ]
+    wrong = [item.effect for item in marked.named if not item.right]
     effects = [
         {"case": name, "kind": truth.kind, "effect": e.name, "known": e in truth.known}
         | {"d_prime": e.d_prime, "gain": gain, "wrong_beside": bool(wrong)}

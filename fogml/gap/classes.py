@@ -169,13 +169,12 @@ def _members(search: Search, best: Explanation, id: str, rivals: Sequence[Explan
             members[other] = swapped.log_evidence
     # One that takes the place with something else beside it, or under other noise, is no less likely to act;
     # unless what is beside it takes the place alone.
-    pool = (*search.tried, *rivals)
-    alone = {e.rest: e.log_posterior for e in _merged(pool, ()) if e.ids == best.ids - {id}}
+    pool, kept = _merged(search.tried, rivals), best.ids - {id}
+    alone = {e.rest: e.log_posterior for e in pool if e.ids == kept}
     for tried in pool:
-        if tried.log_posterior <= alone.get(tried.rest, -math.inf):
-            continue
         news, behind = tried.ids - best.ids, best.log_posterior - tried.log_posterior
-        if len(news) == 1 and tried.ids - news == best.ids - {id} and behind < nats:
+        swaps = len(news) == 1 and tried.ids - news == kept
+        if swaps and behind < nats and tried.log_posterior > alone.get(tried.rest, -math.inf):
             other = min(news)
             members[other] = max(members.get(other, -math.inf), best.log_evidence - behind)
     rest = sorted((m for m in members if m != id), key=lambda m: -members[m])

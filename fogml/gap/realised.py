@@ -10,8 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-import numpy as np
-
 from fogml.gap.classes import LEAST_MARGIN, Ranking
 from fogml.gap.confidence import named_probability
 from fogml.gap.fitting import Fit
@@ -69,6 +67,7 @@ def unrealised(
     """
     frame = search.field_.basis.frame
     estimates = search.estimates(ranking.best)
+    rest = frame.without_constants(frame.residual[:, 0] - sum(estimates.values(), 0.0))
     whole = [o.averaged(o.model.output(fit.constants, fit.effects)) for o in p.fit]
     lost = {}
     for effect in fit.effects:
@@ -80,16 +79,11 @@ def unrealised(
             (rows - o.averaged(o.model.output(fit.constants, others)))[:, None]
             for rows, o in zip(whole, p.fit)
         ]
-        left = frame.residual[:, 0] - _total(estimates, effect.id, len(frame.residual))
-        left, columns, replay = (
-            frame.without_constants(rows) for rows in (left, estimates[effect.id], frame.white(made)[:, 0])
-        )
+        columns = frame.without_constants(estimates[effect.id])
+        replay = frame.without_constants(frame.white(made)[:, 0])
+        left = rest + columns
         credited = float(columns @ left - 0.5 * columns @ columns)
         along = max(float(replay @ left), 0.0)
         brought = 0.5 * along**2 / max(float(replay @ replay), 1e-300)
         lost[effect.id] = max((1.0 - FORM_SHARE) * credited - brought, 0.0)
     return lost
-
-
-def _total(estimates: Mapping[str, np.ndarray], without: str, rows: int) -> np.ndarray:
-    return sum((part for name, part in estimates.items() if name != without), np.zeros(rows))
