@@ -50,6 +50,20 @@ def test_rows_out_of_order_are_averaged_with_those_near_in_the_inputs() -> None:
     np.testing.assert_allclose(found.target, expected, atol=0.02)
 
 
+def test_blocks_of_a_long_run_are_averaged_with_those_near_in_the_inputs() -> None:
+    # Ten rows to a period: a hundred rows in a block average everything out, six nothing.
+    draw = np.random.default_rng(2)
+    rows = np.sin(2.0 * np.pi * np.arange(50_000)[:, None] / 97.0)
+    target = rows[:, 0] ** 2 + 0.1 * draw.standard_normal(len(rows))
+    found = average_in_blocks(rows, target, 500)
+    assert not found.in_time
+    assert found.per_row == pytest.approx(len(rows) / len(found.target))
+    assert np.ptp(found.inputs) > 1.95
+    # Blocks, not rows, are what is near: of each no more than the curvature within is lost.
+    np.testing.assert_allclose(found.target.mean(), target.mean(), atol=2e-3)
+    np.testing.assert_allclose(found.target, found.inputs[:, 0] ** 2, atol=0.05)
+
+
 @pytest.mark.parametrize("name", ["groups", "time"])
 def test_labels_of_another_length_are_refused(name: str) -> None:
     with pytest.raises(InputError, match=name):

@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
-from fogml.signals.averages import block_averages
+from fogml.signals.averages import BlockAverages, block_averages
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
 _MIXED = 0.05
 """Share of an input's variance within blocks beyond which rows are taken not to be in order of time."""
+_FINER = 16
+"""Shorter blocks to a block, whose rows are alike in a long run, before those near in the inputs are averaged."""
 
 
 @dataclass(frozen=True)
@@ -69,17 +71,30 @@ def average_in_blocks(
     clock = _one_clock(count, groups, time)
     if count <= rows:
         return AveragedRows(inputs, target, 1.0, True)
+    blocks = _alike_in_blocks(clock, inputs, target, rows)
+    if blocks is not None:
+        return AveragedRows(blocks.values[0], blocks.values[1], float(np.mean(blocks.counts)), True)
+    weights = np.ones(count)
+    finer = _alike_in_blocks(clock, inputs, target, _FINER * rows) if count > 2 * _FINER * rows else None
+    if finer is not None:
+        (inputs, target), weights = finer.values, finer.counts.astype(np.float64)
+    label = _cells(inputs, rows)
+    totals = np.bincount(label, weights=weights)
+    means = [np.bincount(label, weights=weights * x) / totals for x in (*inputs.T, target)]
+    return AveragedRows(np.column_stack(means[:-1]), means[-1], count / len(totals), False)
+
+
+def _alike_in_blocks(
+    clock: FloatArray, inputs: FloatArray, target: FloatArray, rows: int
+) -> BlockAverages | None:
+    """Averages of about `rows` blocks of time; None where the inputs scatter within them."""
     interval = float(np.median(np.diff(clock)))
-    window = interval * int(np.ceil(count / rows))
+    window = interval * int(np.ceil(len(clock) / rows))
     blocks = block_averages(clock, inputs, target, window_s=window)
     spread = inputs.var(axis=0)
     between = blocks.values[0].var(axis=0)
-    if len(blocks) >= rows / 4 and np.all(spread - between <= _MIXED * spread + 1e-12):
-        return AveragedRows(blocks.values[0], blocks.values[1], float(np.mean(blocks.counts)), True)
-    label = _cells(inputs, rows)
-    counts = np.bincount(label)
-    means = [np.bincount(label, weights=column) / counts for column in (*inputs.T, target)]
-    return AveragedRows(np.column_stack(means[:-1]), means[-1], count / len(counts), False)
+    alike = len(blocks) >= rows / 4 and np.all(spread - between <= _MIXED * spread + 1e-12)
+    return blocks if alike else None
 
 
 def _one_clock(count: int, groups: ArrayLike | None, time: ArrayLike | None) -> FloatArray:

@@ -188,7 +188,8 @@ class RBFRegressor(NetworkRegressor):
         self.notes_ = list(getattr(self, "_told", ()))
         if not rows.in_time:
             self.notes_.append(
-                "rows are not in order of time: rows near in the inputs were averaged for tuning"
+                "rows near in the inputs were averaged for tuning: rows are not in order of time, or the "
+                "run is so long that the inputs move within one of the blocks to average in"
             )
         return self
 
