@@ -55,7 +55,7 @@ def unit() -> Twin:
         .with_noise(N=0.047 * np.sqrt(SAMPLE_S) / 60.0)
         .with_effect("bias_polynomial", 0.15, quartic_ratio=0.0, quintic_ratio=0.0)
         .with_effect("shupe_mohr", 0.5, linear_coefficient=4e-3, quadratic_coefficient=0.0)
-        .with_effect("shupe_pure", 4.0)
+        .with_effect("shupe_pure", 4.5)
         .with_effect("azimuthal_gradient", 0.8)
         .with_effect("thermal_hysteresis", 0.03, half_width=8.0)
         .with_effect("polarization_nonreciprocity", 0.02)

@@ -1,8 +1,6 @@
-"""Temperature readings: their noise, their steps, and temperatures without either."""
+"""Temperature readings: their usual steps, and temperatures without noise and steps."""
 
 from __future__ import annotations
-
-import numpy as np
 
 from fogml.runs.run import FloatArray, Run
 
@@ -27,15 +25,3 @@ def smoothed(run: Run, temperature: FloatArray) -> FloatArray:
         if part.stop - part.start >= width:
             smooth[part] = savgol_filter(temperature[part], width, 2)
     return smooth
-
-
-def reading_noise(temperature: FloatArray) -> float:
-    """Standard deviation of a temperature's readings [degC]."""
-    if len(temperature) < 16:
-        return 0.0
-    second = np.abs(np.diff(temperature, 2))
-    steps = np.abs(np.diff(temperature))
-    steps = steps[steps > 1e-9]
-    least = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
-    quantised = least / np.sqrt(12.0) if len(np.unique(temperature)) < len(temperature) / 2 else 0.0
-    return float(max(np.median(second) / 0.6745 / np.sqrt(6.0), quantised))

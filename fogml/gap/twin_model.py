@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
-from fogml.gap.readings import USUAL_STEP_DEGC, reading_noise, smoothed
+from fogml.gap.readings import USUAL_STEP_DEGC, smoothed
 from fogml.gap.seen_as import AS_CANDIDATE, line_response
 from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.gap.twin_on_means import TwinOnMeans, shapes_to_compare
 from fogml.runs.run import FloatArray, Run
-from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step
+from fogml.runs.steps import FINEST_STEP_DEGC, reading_noise, recorded_step
 from fogml.twin.effect import Effect, NoiseEffect, SensorEffect
 from fogml.twin.inputs import STAND_INS, Inputs
 from fogml.twin.nominal import (

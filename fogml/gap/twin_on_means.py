@@ -75,6 +75,7 @@ class TwinOnMeans:
             power_ons_s=inputs.power_ons_s,
             drives={name: mean(drive) for name, drive in inputs.drives.items()},
             rate_window_s=inputs.rate_window_s,
+            hindsight=inputs.hindsight,
             mean_dT=lambda name: mean(inputs.afresh().dT(name)),
         )
 

@@ -1,4 +1,4 @@
-"""The steps that a recorded temperature comes in."""
+"""The steps that a recorded temperature comes in, and its noise."""
 
 from __future__ import annotations
 
@@ -33,3 +33,15 @@ def to_steps(values: FloatArray, step: float) -> FloatArray:
     if abs(per_unit * step - 1.0) < 1e-9:
         return np.asarray(whole / per_unit)
     return np.asarray(whole * step)
+
+
+def reading_noise(temperature: FloatArray) -> float:
+    """Standard deviation of a temperature's readings [degC]."""
+    if len(temperature) < 16:
+        return 0.0
+    second = np.abs(np.diff(temperature, 2))
+    steps = np.abs(np.diff(temperature))
+    steps = steps[steps > 1e-9]
+    least = float(np.quantile(steps, 0.01)) if len(steps) else 0.0
+    quantised = least / np.sqrt(12.0) if len(np.unique(temperature)) < len(temperature) / 2 else 0.0
+    return float(max(np.median(second) / 0.6745 / np.sqrt(6.0), quantised))

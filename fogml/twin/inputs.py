@@ -73,7 +73,9 @@ class Inputs:
     drives
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
-        Window of temperature rates [s]; 0 for neighbouring samples.
+        Window of rates [s]; 0 for neighbouring samples.
+    hindsight
+        Whether these are all samples of a recording, so that a rate may look ahead as far as back.
     output
         The output that the effect meets [deg/h], shape (n,); for loop, sensor and logger effects.
     slopes
@@ -93,6 +95,7 @@ class Inputs:
     power_ons_s: tuple[float, ...] = ()
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     rate_window_s: float = 64.0
+    hindsight: bool = False
     output: FloatArray | None = None
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
@@ -129,9 +132,20 @@ class Inputs:
         """Rate of a temperature [degC/min], shape (n,)."""
         key = f"dT({self.place(name)})"
         if key not in self.cache:
-            rate = self.memory.rate(key, self.time, self.temperature(name), self.rate_window_s)
-            self.cache[key] = rate
+            self.cache[key] = self.rate_per_minute(key, self.temperature(name))
         return self.cache[key]
+
+    def rate_per_minute(self, key: str, values: FloatArray) -> FloatArray:
+        """Rate of anything that was recorded, shape (n,); `key` names it in `memory`.
+
+        From windows before each sample, or with `hindsight` about it: those before tell the rate of a
+        window ago.
+        """
+        if not self.hindsight:
+            return self.memory.rate(key, self.time, values, self.rate_window_s)
+        from fogml.signals.centred_rate import centred_rate
+
+        return 60.0 * centred_rate(self.time, values, self.rate_window_s)
 
     @cached_property
     def gradient(self) -> FloatArray:
@@ -151,6 +165,18 @@ class Inputs:
             step = self.time - self.memory.previous("angle time", self.time)
             self.cache["angle"] = self.memory.total("angle", step * self.table_rate)
         return self.cache["angle"]
+
+    def mean_cosine(self, phase_deg: float) -> FloatArray:
+        """Mean of cos(table angle - phase) since the sample before, shape (n,).
+
+        Of a table that turns by less than half a turn between samples.
+        """
+        angle = self.angle_deg
+        if "turned" not in self.cache:
+            turned = angle - self.memory.previous("angle before", angle)
+            self.cache["turned"] = (turned + 180.0) % 360.0 - 180.0
+        half = 0.5 * np.radians(self.cache["turned"])
+        return np.asarray(np.cos(np.radians(angle - phase_deg) - half) * np.sinc(half / np.pi))
 
     @cached_property
     def time_on_s(self) -> FloatArray:

@@ -13,6 +13,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.steps import reading_noise
 from fogml.twin.chain import heading_of, hidden, logged, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
@@ -22,6 +23,8 @@ from fogml.twin.truth import Truth
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
 
 _CACHE_BYTES = 256_000_000
+QUIET_DEGC = 2.5e-4
+"""Readings with less noise give their rates from neighbour to neighbour, as true nodes do."""
 
 
 def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None = None) -> FloatArray:
@@ -75,6 +78,8 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
                 continue
     drives = {name: run.columns[name] for name in (*REST, "angle") if name in run.columns}
     heading = heading_of(run.facts, drives["angle"]) if "angle" in drives else None
+    # The air itself is never quiet.
+    noisy = any(reading_noise(t) > QUIET_DEGC for name, t in temperatures.items() if name != "T_chamber")
     # A table that turns about the input axis does not change its heading.
     if heading is not None and not run.rate.any():
         drives["heading"] = heading
@@ -87,7 +92,8 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         powered_on_s=windows[0][0] if windows else -math.inf,
         power_ons_s=tuple(on for on, _ in windows[1:]),
         drives=drives,
-        rate_window_s=RATE_WINDOW_S,
+        rate_window_s=RATE_WINDOW_S if noisy else 0.0,
+        hindsight=noisy,
     )
     return inputs, windows
 
@@ -105,7 +111,7 @@ def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
         powered_on_s=ons[0],
         power_ons_s=tuple(ons[1:]),
         drives=truth.drives,
-        rate_window_s=RATE_WINDOW_S,
+        rate_window_s=0.0,
     )
 
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from fogml.twin.truth import Truth
 
 RATE_WINDOW_S = 64.0
-"""Window of the temperature rates that effects are defined with [s]."""
+"""Window before and after a recorded sample that its rates are taken over [s]."""
 NOISE_FACTOR = 3.0
 """Factor of the log-normal priors of N, B and K where no noise run is given."""
 

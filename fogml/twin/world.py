@@ -19,7 +19,7 @@ from fogml.twin.plant.network import AIR, PlantState
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
 from fogml.twin.timeline import TimelineBlock, timeline
-from fogml.twin.twin import RATE_WINDOW_S, Twin
+from fogml.twin.twin import Twin
 
 _ALL_DRIVES = (
     "angle",
@@ -185,7 +185,7 @@ class World:
                 powered_on_s=self._power_ons[0],
                 power_ons_s=tuple(self._power_ons[1:]),
                 drives=drives_on,
-                rate_window_s=RATE_WINDOW_S,
+                rate_window_s=0.0,
                 memory=branch.memory,
             )
 

@@ -12,6 +12,7 @@ from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.twin import simulate as simulating
 from fogml.twin.effect import NoiseEffect, SensorEffect
+from fogml.twin.inputs import Inputs
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effect, effects
@@ -207,3 +208,32 @@ def test_without_temperatures_the_message_says_so():
     run = Run.from_columns("none", time=np.arange(10.0), gyro=np.zeros(10))
     with pytest.raises(InputError, match="no temperature"):
         replay(load_twin("tactical"), run)
+
+
+def test_rates_of_noisy_readings_come_without_delay():
+    """Windows on both sides of a sample: what the replay makes is where the truth is, not a window later."""
+    twin = Twin(nominal=CONSTANTS, sensors=Sensors(SensorErrors(noise=0.002))).with_effect("shupe_pure", 10.0)
+    made = simulate(PROGRAMME, twin, seed=2, truth=True)
+    true = made.truth.contributions["shupe_pure"]
+    found = replay(twin, made.run, only="shupe_pure")
+    shifts = (-60, -20, 0, 20, 60)
+    inner = slice(100, -100)
+    off = [np.std((np.roll(found, -shift) - true)[inner]) for shift in shifts]
+    assert shifts[int(np.argmin(off))] == 0
+    assert off[2] < 0.3 * np.std(true)
+
+
+def test_a_steady_turn_dims_a_side_on_gradient_as_its_mean_over_the_sample():
+    """Half a turn and more between samples: the mean of the cosine, worked out over fine steps."""
+    time = 10.0 * np.arange(200.0)
+    given = Inputs(
+        time=time,
+        temperatures={"T_in": 25.0 - time / 60.0, "T_out": 25.0 + time / 60.0},
+        table_rate=np.full(200, 9.0),
+        drives={"angle": (9.0 * time) % 360.0},
+        rate_window_s=0.0,
+    )
+    found = effect("azimuthal_gradient").signature(given, phase=40.0)
+    fine = (np.arange(1000) + 0.5) / 1000.0
+    angles = 9.0 * (time[1:, None] - 10.0 + 10.0 * fine)
+    np.testing.assert_allclose(found[1:], 2.0 * np.cos(np.radians(angles - 40.0)).mean(axis=1), atol=1e-4)

@@ -16,7 +16,7 @@ IndexArray = NDArray[np.intp]
 _MIXED = 0.05
 """Share of an input's variance within blocks beyond which rows are taken not to be in order of time."""
 _FINER = 16
-"""Shorter blocks to a block, whose rows are alike in a long run, before those near in the inputs are averaged."""
+"""So many shorter blocks to each, in which a long run's rows are alike, are averaged with those near them."""
 
 
 @dataclass(frozen=True)

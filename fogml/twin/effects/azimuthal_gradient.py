@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
@@ -17,8 +15,9 @@ class AzimuthalGradient(BiasEffect):
 
         b = S_az cos(psi - psi_0) d(T_out - T_in)/dt
 
-    psi is the table's angle, psi_0 the shape's ``phase``. The gradient from face to face stands for
-    the horizontal one, which the same heat flow drives. S_az in deg/h per degC/min.
+    psi is the table's angle, psi_0 the shape's ``phase``; the cosine is its mean over the sample. The
+    gradient from face to face stands for the horizontal one, which the same heat flow drives. S_az in
+    deg/h per degC/min.
 
     Source: Shupe's integral for a side-on gradient (derived); range 0.1 to 0.3 of S_g of shupe_pure
     (engineering).
@@ -45,5 +44,4 @@ class AzimuthalGradient(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h/(degC/min) [deg/h], shape (n,)."""
-        exposure = np.cos(np.radians(inputs.angle_deg - shape["phase"]))
-        return exposure * (inputs.dT("T_out") - inputs.dT("T_in"))
+        return inputs.mean_cosine(shape["phase"]) * (inputs.dT("T_out") - inputs.dT("T_in"))

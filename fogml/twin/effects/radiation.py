@@ -45,6 +45,5 @@ class Radiation(ScaleFactorEffect):
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per ppm [ppm], shape (n,)."""
         dose = np.maximum(inputs.drive("dose"), 0.0)
-        per_minute = inputs.memory.rate(self.id, inputs.time, dose, inputs.rate_window_s)
-        per_hour = 60.0 * np.maximum(per_minute, 0.0)
+        per_hour = 60.0 * np.maximum(inputs.rate_per_minute(self.id, dose), 0.0)
         return dose ** shape["dose_exponent"] * per_hour ** shape["rate_exponent"]
