@@ -86,11 +86,11 @@ class Field:
     def slack(self, node: int) -> tuple[int, ...]:
         """Columns of what the form of a node's effect may differ by, a length of 1 in all."""
         if node not in self._slacks:
-            self._slacks[node] = self._append(slack_columns(self.basis, node))
+            self._slacks[node] = self.append(slack_columns(self.basis, node))
         return self._slacks[node]
 
-    def _append(self, columns: FloatArray) -> tuple[int, ...]:
-        """Add whitened columns to the field, shape (n, k)."""
+    def append(self, columns: FloatArray) -> tuple[int, ...]:
+        """Add whitened columns, shape (n, k); gives the indices that terms name them by."""
         first, width = len(self.gram), columns.shape[1]
         if width == 0:
             return ()

@@ -2,7 +2,8 @@
 
 Evidence is linear: a shape parameter that the response is in proportion to has a coefficient of its own,
 and a large effect has room for another form. Together they may follow what no shape within its limits
-makes. What the fitted effect itself does not bring is no evidence for it, but for something unknown.
+makes. What the fitted effect itself does not bring is no evidence for it, but for something unknown;
+unless another of its class does bring it.
 """
 
 from __future__ import annotations
@@ -10,9 +11,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from fogml.gap.classes import LEAST_MARGIN, Ranking
+import numpy as np
+
+from fogml.gap.classes import LEAST_MARGIN, Ranked, Ranking
 from fogml.gap.confidence import named_probability
+from fogml.gap.evidence import Term
 from fogml.gap.fitting import Fit
+from fogml.gap.found import fit_named
 from fogml.gap.model import Candidate, drawn_per_run
 from fogml.gap.preparing import Prepared
 from fogml.gap.search import Search
@@ -26,7 +31,8 @@ def realised(
 ) -> Ranking:
     """The ranking with margins of the fitted effects less what their own forms don't bring.
 
-    The unknown becomes more probable by what the names become less so.
+    Of a class that member stands first which brings the most. The unknown becomes more probable by what
+    the names become less so.
 
     Parameters
     ----------
@@ -40,6 +46,7 @@ def realised(
         The named effects, fitted on the replay.
     """
     lost = unrealised(p, candidates, search, ranking, fit)
+    ranking, lost = _best_heads(p, candidates, search, ranking, lost)
     alone = len(ranking.best.effects) == 1 and ranking.best.unknown is None
     effects, known = [], 1.0 - ranking.unknown
     for r in ranking.effects:
@@ -60,18 +67,16 @@ def realised(
 def unrealised(
     p: Prepared, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
 ) -> dict[str, float]:
-    """Gain of each fitted effect's columns that its fitted replay does not have, `FORM_SHARE` apart [nats].
+    """Evidence that each fitted effect's columns have and its replay has not, `FORM_SHARE` apart [nats].
 
-    Gains are those over what everything else of the best explanation leaves; the size of the fitted
-    effect is at its best.
+    Beside everything else of the best explanation; the size of the fitted effect is averaged over.
     """
-    frame = search.field_.basis.frame
-    estimates = search.estimates(ranking.best)
-    rest = frame.without_constants(frame.residual[:, 0] - sum(estimates.values(), 0.0))
+    field, frame, best = search.field_, search.field_.basis.frame, ranking.best
     whole = [o.averaged(o.model.output(fit.constants, fit.effects)) for o in p.fit]
     lost = {}
     for effect in fit.effects:
-        if effect.id not in estimates or drawn_per_run(candidates[effect.id]):
+        chosen = next((c for c in best.effects if c.candidate == effect.id), None)
+        if chosen is None or drawn_per_run(candidates[effect.id]):
             # Of what each run draws anew a replay has one draw for all.
             continue
         others = tuple(e for e in fit.effects if e.id != effect.id)
@@ -79,11 +84,59 @@ def unrealised(
             (rows - o.averaged(o.model.output(fit.constants, others)))[:, None]
             for rows, o in zip(whole, p.fit)
         ]
-        columns = frame.without_constants(estimates[effect.id])
-        replay = frame.without_constants(frame.white(made)[:, 0])
-        left = rest + columns
-        credited = float(columns @ left - 0.5 * columns @ columns)
-        along = max(float(replay @ left), 0.0)
-        brought = 0.5 * along**2 / max(float(replay @ replay), 1e-300)
+        replay = frame.white(made)
+        length = float(np.linalg.norm(frame.without_constants(replay[:, 0])))
+        beside = search.beside(best, effect.id)
+        nothing = field.condition(beside).log_evidence
+        credited = field.condition(search.terms(best)).log_evidence - nothing
+        brought = 0.0
+        if length > 0.0:
+            term = Term(field.append(replay / length), chosen.length)
+            brought = field.condition([*beside, term]).log_evidence - nothing
         lost[effect.id] = max((1.0 - FORM_SHARE) * credited - brought, 0.0)
     return lost
+
+
+def _best_heads(
+    p: Prepared,
+    candidates: Mapping[str, Candidate],
+    search: Search,
+    ranking: Ranking,
+    lost: dict[str, float],
+) -> tuple[Ranking, dict[str, float]]:
+    """The ranking with that member of each class first which brings the most, and what is lost with it."""
+    paid: dict[str, float] = {}
+    for r in ranking.effects:
+        id = r.chosen.candidate
+        least, before = lost.get(id, 0.0), ranking
+        for member in r.members[1:]:
+            swapped = _headed_by(search, before, r, member)
+            if swapped is None or drawn_per_run(candidates[member]):
+                continue
+            behind = max(before.best.log_posterior - swapped.best.log_posterior, 0.0)
+            if behind >= least:
+                continue
+            found = unrealised(p, candidates, search, swapped, fit_named(p, candidates, search, swapped))
+            if behind + found.get(member, 0.0) < least:
+                least = behind + found.get(member, 0.0)
+                ranking, lost = swapped, found
+                paid = {other: nats for other, nats in paid.items() if other != id} | {member: behind}
+    return ranking, {i: lost.get(i, 0.0) + paid.get(i, 0.0) for i in lost.keys() | paid.keys()}
+
+
+def _headed_by(search: Search, ranking: Ranking, ranked: Ranked, member: str) -> Ranking | None:
+    """The ranking with another member first of a class; None where it was not tried in its place."""
+    ids = (ranking.best.ids - {ranked.chosen.candidate}) | {member}
+    tried = next((e for e in search.tried if e.ids == ids and e.rest == ranking.best.rest), None)
+    if tried is None:
+        return None
+    chosen = {c.candidate: c for c in tried.effects}
+    head = replace(
+        ranked, chosen=chosen[member], members=(member, *(m for m in ranked.members if m != member))
+    )
+    others = [
+        replace(r, chosen=chosen.get(r.chosen.candidate, r.chosen))
+        for r in ranking.effects
+        if r.chosen.candidate != ranked.chosen.candidate
+    ]
+    return replace(ranking, best=tried, effects=(head, *others))

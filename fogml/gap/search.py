@@ -273,6 +273,10 @@ class Search:
         """An explanation's terms."""
         return self._terms(found.effects, found.group)
 
+    def beside(self, found: Explanation, id: str) -> list[Term]:
+        """The terms of an explanation without one of its effects."""
+        return self._terms([c for c in found.effects if c.candidate != id], found.group)
+
     def estimates(self, found: Explanation) -> dict[str, FloatArray]:
         """What each effect of an explanation, and its group, most probably makes, whitened, shape (n,)."""
         parts = {c.candidate: self._terms([c], None) for c in found.effects}

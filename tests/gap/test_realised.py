@@ -50,12 +50,12 @@ def test_an_effect_that_does_what_it_is_credited_with_keeps_its_name():
 def test_what_no_share_of_the_parts_makes_is_not_named_for_them():
     found = searched(against=0.2)
     ranking = realised(*found)
-    assert not ranking.named and ranking.unknown > 0.5 > found[3].unknown
+    assert not ranking.named and ranking.unknown > 0.4 > found[3].unknown
     for before, after in zip(found[3].effects, ranking.effects):
         assert after.margin == pytest.approx(before.margin - after.unrealised)
 
 
-def test_what_is_brought_is_the_likelihood_ratio_of_the_fitted_replay():
+def test_what_is_brought_is_the_evidence_of_the_fitted_replay():
     p, candidates, search, ranking, fit = searched(against=0.4)
     (effect,) = fit.effects
     gap = np.concatenate([o.recorded - o.model.output(MEANS) for o in p.fit])
@@ -69,12 +69,46 @@ def test_what_is_brought_is_the_likelihood_ratio_of_the_fitted_replay():
         covariance[rows, rows] += dense(o.run.time, o.run.sample_s, p.noise.model)
         first += len(o)
     inverse = np.linalg.inv(covariance)
-    brought = 0.5 * (make @ inverse @ gap) ** 2 / (make @ inverse @ make)
-    frame = search.field_.basis.frame
-    left, part = (
-        frame.without_constants(rows)
-        for rows in (frame.residual[:, 0], search.estimates(ranking.best)["mixture"])
-    )
-    credited = left @ part - 0.5 * part @ part
+    (chosen,) = ranking.best.effects
+    fits, size = make @ inverse @ gap, make @ inverse @ make
+    # A normal amplitude whose standard deviation makes a whitened length of the chosen one.
+    square = chosen.length**2
+    brought = 0.5 * square / (1.0 + square) * fits**2 / size - 0.5 * np.log1p(square)
+    field = search.field_
+    credited = field.condition(search.terms(ranking.best)).log_evidence - field.condition([]).log_evidence
     lost = unrealised(p, candidates, search, ranking, fit)["mixture"]
     assert lost == pytest.approx((1.0 - FORM_SHARE) * credited - brought, rel=0.03) and lost > 5.0
+
+
+def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
+    """One that takes the place at 2 nats and brings its gain, before one that falls short of its own by 9."""
+    from dataclasses import replace as changed
+
+    from fogml.gap import realised as module
+
+    p, candidates, search, ranking, fit = searched(share=0.7)
+    (mixture,) = ranking.effects
+    whole = next(e for e in search.tried if e.ids == {"mixture"} and e.rest == "nothing")
+    cube = changed(
+        whole,
+        effects=(changed(whole.effects[0], candidate="cube"),),
+        log_posterior=whole.log_posterior - 2.0,
+    )
+    search._held[(frozenset({"cube"}), "nothing")] = cube
+    both = changed(ranking, effects=(changed(mixture, members=("mixture", "cube"), margin=12.0),))
+    lost = {"mixture": 9.0, "cube": 0.0}
+    monkeypatch.setattr(module, "fit_named", lambda p, candidates, search, ranking: ranking)
+    monkeypatch.setattr(
+        module,
+        "unrealised",
+        lambda p, c, s, r, fit: {i: lost[i] for i in r.best.ids if lost[i] or i == "cube"},
+    )
+    found = realised(p, candidates, search, both, fit)
+    assert [r.members for r in found.effects] == [("cube", "mixture")]
+    assert found.best.ids == {"cube"}
+    assert found.effects[0].margin == pytest.approx(10.0)
+    # With as little to choose between them the first one stays.
+    lost["mixture"] = 1.5
+    kept = realised(p, candidates, search, both, fit)
+    assert [r.members for r in kept.effects] == [("mixture", "cube")]
+    assert kept.effects[0].margin == pytest.approx(10.5)
