@@ -103,6 +103,7 @@ class MemsOnRun:
             temperatures={"T": temperature},
             table_rate=np.zeros(len(time)),
             rate_window_s=RATE_WINDOW_S,
+            hindsight=True,
         )
 
     def columns(self) -> Mapping[str, FloatArray]:
