@@ -152,7 +152,7 @@ def _weights(explanations: Sequence[Explanation]) -> np.ndarray:
 def _members(search: Search, best: Explanation, id: str, rivals: Sequence[Explanation]) -> tuple[str, ...]:
     """The effect and those that take its place at less than `SAME_CLASS_NATS` of evidence."""
     others = tuple(c for c in best.effects if c.candidate != id)
-    held = search.field_.condition(search._terms(others, best.group))
+    held = search.field_.condition(search.beside(best, id))
     gains = held.node_gains()
     members = {id: best.log_evidence}
     # No form is known to the last per cent: of a large effect more nats hang on that.

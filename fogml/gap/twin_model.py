@@ -34,7 +34,7 @@ from fogml.twin.plant.estimate import estimate_nodes
 from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.registry import effect, effects
-from fogml.twin.replay import Replayer, inputs_of_run
+from fogml.twin.replay import Replayer
 from fogml.twin.set_up import Sensors
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
@@ -145,9 +145,8 @@ class TwinOnRun:
                 f"{run.name}: holds no temperature; a replay needs a column 'T [degC]' or 'T_in [degC]'"
             )
         self._twin, self._run = twin, run
-        self._recorded, windows = inputs_of_run(run)
         self._replayer = Replayer(run)
-        self._windows = windows
+        self._recorded, self._windows = self._replayer.recorded, self._replayer.windows
         self._missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
         nodes = self._nodes(twin.network)
         # Responses to rates of temperature would be blurred by the readings' noise.

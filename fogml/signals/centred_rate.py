@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from fogml.signals.clock import FloatArray
 
 
 def centred_rate(time: FloatArray, x: FloatArray, window_s: float) -> FloatArray:

@@ -133,14 +133,21 @@ class Replayer:
         The run.
     truth
         Its truth, where that is to be replayed.
+
+    Attributes
+    ----------
+    recorded
+        What the run recorded, or the truth, as inputs.
+    windows
+        When the unit was on, as recorded; none with a truth.
     """
 
     def __init__(self, run: Run, truth: Truth | None = None) -> None:
         self.truth = truth
         if truth is None:
-            self._recorded, self._windows = inputs_of_run(run)
+            self.recorded, self.windows = inputs_of_run(run)
         else:
-            self._recorded, self._windows = inputs_of_truth(truth, run), ()
+            self.recorded, self.windows = inputs_of_truth(truth, run), ()
         self._given: dict[Hashable, _Given] = {}
         self._signatures: OrderedDict[Hashable, FloatArray] = OrderedDict()
 
@@ -199,7 +206,7 @@ class Replayer:
 
     def _inputs(self, twin: Twin) -> _Given:
         """Inputs for a twin: recorded, or with the nodes that its effects ask for besides."""
-        recorded = self._recorded
+        recorded = self.recorded
         needed = {need for declared, _ in twin.on for need in declared.needs if need in STAND_INS}
         missing = needed - set(recorded.temperatures) - ({"T"} if recorded.place("T") else set())
         if self.truth is not None or not missing or not recorded.temperatures:
@@ -211,7 +218,7 @@ class Replayer:
                 twin.network,
                 recorded.time,
                 recorded.temperatures,
-                powered=self._windows,
+                powered=self.windows,
                 fan=recorded.drives.get("fan"),
                 table_rate=recorded.table_rate,
             )

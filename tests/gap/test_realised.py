@@ -51,8 +51,12 @@ def test_what_no_share_of_the_parts_makes_is_not_named_for_them():
     found = searched(against=0.2)
     ranking = realised(*found)
     assert not ranking.named and ranking.unknown > 0.4 > found[3].unknown
-    for before, after in zip(found[3].effects, ranking.effects):
-        assert after.margin == pytest.approx(before.margin - after.unrealised)
+    (before,), (after,) = found[3].effects, ranking.effects
+    assert after.margin == pytest.approx(before.margin - after.unrealised)
+    # Something acts for certain: the unknown takes over what the name gives up.
+    given_up = before.probability - after.probability
+    assert 1.0 - ranking.unknown == pytest.approx((1.0 - found[3].unknown) * (1.0 - given_up))
+    assert after.probability < 0.5 < before.probability
 
 
 def test_what_is_brought_is_the_evidence_of_the_fitted_replay():

@@ -51,7 +51,7 @@ def test_rows_out_of_order_are_averaged_with_those_near_in_the_inputs() -> None:
 
 
 def test_blocks_of_a_long_run_are_averaged_with_those_near_in_the_inputs() -> None:
-    # Ten rows to a period: a hundred rows in a block average everything out, six nothing.
+    # 97 rows to a period: a hundred rows in a block average it out, six of them keep it.
     draw = np.random.default_rng(2)
     rows = np.sin(2.0 * np.pi * np.arange(50_000)[:, None] / 97.0)
     target = rows[:, 0] ** 2 + 0.1 * draw.standard_normal(len(rows))

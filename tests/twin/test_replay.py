@@ -224,7 +224,7 @@ def test_rates_of_noisy_readings_come_without_delay():
 
 
 def test_a_steady_turn_dims_a_side_on_gradient_as_its_mean_over_the_sample():
-    """Half a turn and more between samples: the mean of the cosine, worked out over fine steps."""
+    """A quarter of a turn from sample to sample: the mean of the cosine, worked out over fine steps."""
     time = 10.0 * np.arange(200.0)
     given = Inputs(
         time=time,

@@ -71,11 +71,14 @@ def average_in_blocks(
     clock = _one_clock(count, groups, time)
     if count <= rows:
         return AveragedRows(inputs, target, 1.0, True)
-    blocks = _alike_in_blocks(clock, inputs, target, rows)
+    interval, spread = float(np.median(np.diff(clock))), inputs.var(axis=0)
+    blocks = _alike_in_blocks(clock, inputs, target, rows, interval, spread)
     if blocks is not None:
         return AveragedRows(blocks.values[0], blocks.values[1], float(np.mean(blocks.counts)), True)
     weights = np.ones(count)
-    finer = _alike_in_blocks(clock, inputs, target, _FINER * rows) if count > 2 * _FINER * rows else None
+    finer = None
+    if count > 2 * _FINER * rows:
+        finer = _alike_in_blocks(clock, inputs, target, _FINER * rows, interval, spread)
     if finer is not None:
         (inputs, target), weights = finer.values, finer.counts.astype(np.float64)
     label = _cells(inputs, rows)
@@ -85,13 +88,19 @@ def average_in_blocks(
 
 
 def _alike_in_blocks(
-    clock: FloatArray, inputs: FloatArray, target: FloatArray, rows: int
+    clock: FloatArray,
+    inputs: FloatArray,
+    target: FloatArray,
+    rows: int,
+    interval: float,
+    spread: FloatArray,
 ) -> BlockAverages | None:
-    """Averages of about `rows` blocks of time; None where the inputs scatter within them."""
-    interval = float(np.median(np.diff(clock)))
+    """Averages of about `rows` blocks of time; None where the inputs scatter within them.
+
+    `interval` is that of the clock, `spread` the variance of the inputs, shape (k,).
+    """
     window = interval * int(np.ceil(len(clock) / rows))
     blocks = block_averages(clock, inputs, target, window_s=window)
-    spread = inputs.var(axis=0)
     between = blocks.values[0].var(axis=0)
     alike = len(blocks) >= rows / 4 and np.all(spread - between <= _MIXED * spread + 1e-12)
     return blocks if alike else None
