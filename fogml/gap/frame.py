@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -62,15 +62,7 @@ class Frame:
 
     def responses(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of a candidate at several shapes, shape (n, shapes)."""
-        return self.white(self.rows(lambda o, s: o.response(id, s, self.values), shapes))
-
-    def rows(
-        self,
-        of: Callable[[Observation, Mapping[str, float]], FloatArray],
-        shapes: Sequence[Mapping[str, float]],
-    ) -> list[FloatArray]:
-        """Rows of each run at several shapes, shape (m_r, shapes)."""
-        return [np.column_stack([of(o, shape) for shape in shapes]) for o in self.observations]
+        return self.white([o.responses.at(id, shapes, self.values) for o in self.observations])
 
     @cached_property
     def residual(self) -> FloatArray:

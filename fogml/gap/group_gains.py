@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from fogml.gap.evidence import Conditioned
 
 
+_CORNER = 1e14
+"""Over the squared length of v: above v' M^-1 v, as M is no nearer to singular than rounding."""
+
+
 def group_gains(held: Conditioned, names: Sequence[str]) -> FloatArray:
     """Gain in log evidence of groups of the unknown at each of `LENGTHS`, shape (groups, lengths).
 
@@ -49,8 +53,13 @@ def group_gains(held: Conditioned, names: Sequence[str]) -> FloatArray:
         sides[i] = (weighed @ fit).reshape(count, k)
         gains[i] = weights @ fit**2 - np.log(wider).sum(axis=1)
     if k:
-        inner = np.eye(k) - inner
-        gains += np.einsum("glk,glk->gl", sides, np.linalg.solve(inner, sides[..., None])[..., 0])
-        factors = np.linalg.cholesky(inner)
-        gains -= 2.0 * np.log(np.diagonal(factors, axis1=2, axis2=3)).sum(axis=2)
+        # The factor of M with v as one row more ends in v' L^-1, whatever its last corner is.
+        whole = np.empty((len(names), count, k + 1, k + 1))
+        whole[..., :k, :k] = np.eye(k) - inner
+        whole[..., k, :k] = sides
+        whole[..., k, k] = _CORNER * (1.0 + np.einsum("glk,glk->gl", sides, sides))
+        factors = np.linalg.cholesky(whole)
+        last = factors[..., k, :k]
+        gains += np.einsum("glk,glk->gl", last, last)
+        gains -= 2.0 * np.log(np.diagonal(factors, axis1=2, axis2=3)[..., :k]).sum(axis=2)
     return np.asarray(0.5 * gains)

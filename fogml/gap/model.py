@@ -134,6 +134,14 @@ class OtherOrders(Protocol):
 
 
 @runtime_checkable
+class Foreseeable(Protocol):
+    """A `ModelOnRun` that knows which responses stay as they are at other constants."""
+
+    def depends_on_constants(self, id: str, shape: Mapping[str, float]) -> bool:
+        """Whether a candidate's response is another one at other constants."""
+
+
+@runtime_checkable
 class Decimating(Protocol):
     """A `ModelOnRun` that also gives responses on means over blocks of samples."""
 

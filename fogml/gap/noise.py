@@ -35,7 +35,8 @@ BESIDE = (
 FROM_RUNS = "the runs themselves, what moves with temperature taken out"
 FROM_RUNS_ALONE = "the runs themselves, what was found taken out"
 """Where the noise comes from if no static run tells it: with smooth unknowns kept out, or without."""
-MOST_ROWS = 1500
+MOST_ROWS, MOST_OF_ALL, FEWEST_ROWS = 1500, 3000, 600
+"""Rows of a run whose likelihood is exact: at most, of all runs together, and of each at least."""
 FREE_DEG_H = 5.0
 """Prior standard deviation of what smooth unknowns add [deg/h]."""
 LEAST_SHARE_OF_WHITE = 0.02
@@ -123,7 +124,7 @@ def noise_of(
         prior=prior,
         deviations=deviations,
         averaging_s=observations[0].row_s,
-        most=MOST_ROWS,
+        most=min(MOST_ROWS, max(MOST_OF_ALL // len(observations), FEWEST_ROWS)),
     )
     return Noise(_on_the_safe_side(fit), fit, source)
 

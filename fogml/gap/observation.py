@@ -19,6 +19,10 @@ from fogml.runs.run import FloatArray, Run
 
 LARGEST_ROWS = 8192
 """A run with more samples is averaged over blocks of neighbours down to about this many rows."""
+ROW_S = 10.0
+"""Rows need be no shorter: the fastest line of the catalogue has a period of five of them [s]."""
+ENOUGH_ROWS = 2048
+"""A short run's rows are shorter than that, until there are about so many."""
 FEWEST_ROWS = 32
 SHORTEST_S = 600.0
 """A run must last this long to say anything about temperature effects [s]."""
@@ -131,7 +135,8 @@ def observe(run: Run, model: GyroModel, *, largest_rows: int = LARGEST_ROWS) -> 
         )
     if run.span_s < SHORTEST_S:
         raise Unusable(f"{run.name}: lasts {run.span_s:.0f} s; a diagnosis needs at least {SHORTEST_S:.0f} s")
-    width = max(1, -(-len(run) // largest_rows))
+    slow_enough = min(round(ROW_S / run.sample_s), len(run) // ENOUGH_ROWS)
+    width = max(1, -(-len(run) // largest_rows), slow_enough)
     starts, stops = _blocks(run, width, model.memory_s)
     if len(starts) < FEWEST_ROWS:
         raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")

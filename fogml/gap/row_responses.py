@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.block_means import BlockMeans
-from fogml.gap.model import Decimating, Responding
+from fogml.gap.model import Decimating, Foreseeable, Responding
 from fogml.runs.run import FloatArray, Run
 
 if TYPE_CHECKING:
@@ -18,6 +18,8 @@ if TYPE_CHECKING:
 
 LARGEST_SHARE = 1e-3
 """A response taken on means differs by no more than this share of its rms from the mean response."""
+MOST_KEPT_BYTES = 160e6
+"""Responses of a run that are kept for the next search."""
 PARTS = (1, 3, 9, 27)
 """Parts of a row that inputs are averaged over; the fewest that do are taken."""
 
@@ -38,6 +40,7 @@ class RowResponses:
         self._observation = observation
         self._settled: dict[str, OnMeans | None] = {}
         self._finer: dict[int, OnMeans] = {}
+        self._kept: dict[str, tuple[list[Mapping[str, float]], FloatArray]] = {}
 
     @property
     def on_means(self) -> frozenset[str]:
@@ -53,6 +56,24 @@ class RowResponses:
         if means is None:
             return o.averaged(o.model.response(id, shape, constants))
         return means.response(id, shape, constants)
+
+    def at(
+        self, id: str, shapes: Sequence[Mapping[str, float]], constants: Mapping[str, float]
+    ) -> FloatArray:
+        """Responses at several shapes [deg/h], shape (m, shapes).
+
+        Those that stay as they are at other constants are kept.
+        """
+        held = self._kept.get(id)
+        if held is not None and held[0] == shapes:
+            return held[1]
+        rows = np.column_stack([self.of(id, shape, constants) for shape in shapes])
+        model = self._observation.model
+        kept = sum(other.nbytes for _, other in self._kept.values())
+        if isinstance(model, Foreseeable) and kept + rows.nbytes <= MOST_KEPT_BYTES:
+            if not any(model.depends_on_constants(id, shape) for shape in shapes):
+                self._kept[id] = list(shapes), rows
+        return rows
 
     def _settle(self, id: str, constants: Mapping[str, float]) -> OnMeans | None:
         """The coarsest means that give an effect's response as it is."""

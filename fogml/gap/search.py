@@ -32,9 +32,13 @@ SECOND = 0.2
 """Prior probability that a second group is needed where an unknown acts."""
 FORM, FORM_ROOM = 0.3, 0.25
 """Prior probability of a rest of form where it can be seen, and its largest length over the effects'."""
-BEAM = (8, 6, 4)
+BEAM = (5, 4, 3)
 """Sets that grow further, by their size."""
-BRANCHES = 5
+HOPELESS = 25.0
+"""Sets that are so many nats behind the best one of their size don't grow."""
+BEHIND = (4.0, 5.0, 6.0)
+"""Sets of one effect, of two, and of more, don't grow where all are so many nats behind a smaller one."""
+BRANCHES = 4
 MATTERS = 8.0
 """Groups that are so many nats behind the best one, or gain less, are not compared with candidates."""
 Rest = Literal["nothing", "form", "unknown"]
@@ -126,9 +130,10 @@ class Search:
             if not grown:
                 break
             ranked = sorted(grown.values(), key=lambda e: -e.log_posterior)
-            front = ranked[: BEAM[min(size, len(BEAM) - 1)]]
-            if size >= 2 and ranked[0].log_posterior < self.best.log_posterior - 6.0:
+            top = ranked[0].log_posterior
+            if top < self.best.log_posterior - BEHIND[min(size, len(BEHIND) - 1)]:
                 break
+            front = [e for e in ranked[: BEAM[min(size, len(BEAM) - 1)]] if e.log_posterior > top - HOPELESS]
         return sorted(self.tried, key=lambda e: -e.log_posterior)
 
     @property

@@ -220,6 +220,10 @@ class TwinOnRun:
             return []
         return [self._responded(declared, shape, constants, inputs) for inputs in self._others]
 
+    def depends_on_constants(self, id: str, shape: Mapping[str, float]) -> bool:
+        """Whether a response is another one at other constants: where it goes with output or slopes."""
+        return AT_AMPLITUDE in shape or self._meets_output(effect(id))
+
     def shapes_to_compare(self, id: str) -> tuple[Mapping[str, float], ...]:
         """Shapes at which a response on means has to agree with the full one; none where it can't."""
         return shapes_to_compare(effect(id), self._full, self._twin.grade)

@@ -32,6 +32,8 @@ _ROUNDS, _POINTS = 2, 64
 """Rounds of importance sampling, each about the moments of the one before, and points of each."""
 _FEWEST = 12.0
 """Points that have to matter for their moments to be taken."""
+_ENOUGH = 40.0
+"""Where so many matter, the guess was like the posterior, and another round would bring nothing."""
 _TAILS, _WIDER = 5.0, 1.3
 """Degrees of freedom of its Student's t, and its width over the guess."""
 
@@ -160,13 +162,15 @@ def fit_noise(
     # Curvature below the prior's, of a likelihood that bends the other way, is no knowledge.
     values, vectors = np.linalg.eigh(curvature)
     mean, inverse = found.x, (vectors / np.maximum(values, 1.0)) @ vectors.T
-    for _ in range(_ROUNDS):
-        mean, inverse = _moments(objective, mean, inverse, float(found.fun))
+    rounds, matter = 0, 0.0
+    while rounds < _ROUNDS and matter < _ENOUGH:
+        mean, inverse, matter = _moments(objective, mean, inverse, float(found.fun))
+        rounds += 1
     covariance = np.zeros((3, 3))
     covariance[np.ix_(free, free)] = inverse * np.outer(spread, spread)
     factors = np.ones(3)
     factors[free] = np.exp(mean * spread)
-    evaluations = int(found.nfev) + _ROUNDS * _POINTS
+    evaluations = int(found.nfev) + rounds * _POINTS
     return NoiseFit(_scaled(prior.centre, factors), covariance, prior, -float(found.fun), evaluations)
 
 
@@ -225,8 +229,8 @@ def _levels_log_likelihood(levels: Sequence[Level], model: NoiseModel) -> float:
 
 def _moments(
     objective: Callable[[FloatArray], float], mean: FloatArray, covariance: FloatArray, least: float
-) -> tuple[FloatArray, FloatArray]:
-    """Mean and covariance of the posterior by importance sampling about a guess of them.
+) -> tuple[FloatArray, FloatArray, float]:
+    """Mean and covariance of the posterior by importance sampling about a guess; how many points matter.
 
     Where the data bound a coefficient from above alone, the posterior leans, and curvature at its
     top says too little. The points are those of a Sobol sequence, always the same, for
@@ -243,11 +247,12 @@ def _moments(
     weight = np.array([least - objective(point) for point in points]) - proposal
     weight = np.exp(weight - weight.max())
     weight /= weight.sum()
-    if 1.0 / np.sum(weight**2) < _FEWEST:
-        # Too few of the points matter: the guess is the better one.
-        return mean, covariance
+    matter = float(1.0 / np.sum(weight**2))
+    if matter < _FEWEST:
+        # The guess is the better one.
+        return mean, covariance, matter
     centre = weight @ points
-    return centre, (weight[:, None] * (points - centre)).T @ (points - centre)
+    return centre, (weight[:, None] * (points - centre)).T @ (points - centre), matter
 
 
 def _curvature(function: Callable[[FloatArray], float], at: FloatArray, steps: FloatArray) -> FloatArray:
