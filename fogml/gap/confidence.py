@@ -15,6 +15,8 @@ LEAST_MARGIN = -3.0
 SMALL_LENGTH = 5.0
 FIRST_NAME = 1.5
 """Least margin of an effect that nothing else is named beside [nats]: a false name costs more than none."""
+MOSTLY_FORM = 0.5
+"""Share of a gain that needs another form beyond which it is not the effect's."""
 UNSURE = 0.49
 """Largest probability of an effect that is not named for another reason."""
 LARGEST_LOG_ODDS = 12.0
@@ -52,10 +54,12 @@ def named_probability(
 ) -> float:
     """Probability that a class is right; for the parameters see `named_features`.
 
-    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none.
+    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none; and
+    no name is given for a gain that is `MOSTLY_FORM`.
     """
     probability = _logistic(NAMED, named_features(margin, form_share, rest, length))
-    return min(probability, UNSURE) if alone and margin < FIRST_NAME else probability
+    unsure = (alone and margin < FIRST_NAME) or form_share > MOSTLY_FORM
+    return min(probability, UNSURE) if unsure else probability
 
 
 def unknown_probability(log_odds: float) -> float:

@@ -1,4 +1,4 @@
-"""Whether a named effect does what the evidence credits it with: the fitted replay against the columns.
+"""Whether a named effect does what the evidence credits it with: its fitted shape against the columns.
 
 Evidence is linear: a shape parameter that the response is in proportion to has a coefficient of its own,
 and a large effect has room for another form. Together they may follow what no shape within its limits
@@ -21,6 +21,7 @@ from fogml.gap.found import fit_named
 from fogml.gap.model import Candidate, drawn_per_run
 from fogml.gap.preparing import Prepared
 from fogml.gap.search import Search
+from fogml.gap.shapes import AT_AMPLITUDE
 
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
@@ -67,31 +68,28 @@ def realised(
 def unrealised(
     p: Prepared, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
 ) -> dict[str, float]:
-    """Evidence that each fitted effect's columns have and its replay has not, `FORM_SHARE` apart [nats].
+    """Evidence that each effect's columns have and its fitted shape has not, `FORM_SHARE` apart [nats].
 
     Beside everything else of the best explanation; the size of the fitted effect is averaged over.
     """
     field, frame, best = search.field_, search.field_.basis.frame, ranking.best
-    whole = [o.averaged(o.model.output(fit.constants, fit.effects)) for o in p.fit]
     lost = {}
     for effect in fit.effects:
         chosen = next((c for c in best.effects if c.candidate == effect.id), None)
         if chosen is None or drawn_per_run(candidates[effect.id]):
-            # Of what each run draws anew a replay has one draw for all.
+            # What each run draws anew has no shape that all share.
             continue
-        others = tuple(e for e in fit.effects if e.id != effect.id)
-        made = [
-            (rows - o.averaged(o.model.output(fit.constants, others)))[:, None]
-            for rows, o in zip(whole, p.fit)
-        ]
-        replay = frame.white(made)
-        length = float(np.linalg.norm(frame.without_constants(replay[:, 0])))
+        shape = dict(effect.shape)
+        if getattr(candidates[effect.id], "amplitudes", ()):
+            shape[AT_AMPLITUDE] = effect.amplitude
+        response = frame.white([o.response(effect.id, shape, frame.values)[:, None] for o in p.fit])
+        length = float(np.linalg.norm(frame.without_constants(response[:, 0])))
         beside = search.beside(best, effect.id)
         nothing = field.condition(beside).log_evidence
         credited = field.condition(search.terms(best)).log_evidence - nothing
         brought = 0.0
         if length > 0.0:
-            term = Term(field.append(replay / length), chosen.length)
+            term = Term(field.append(response / length), chosen.length)
             brought = field.condition([*beside, term]).log_evidence - nothing
         lost[effect.id] = max((1.0 - FORM_SHARE) * credited - brought, 0.0)
     return lost

@@ -174,6 +174,12 @@ class TwinOnRun:
         return replace(self._recorded, temperatures=smooth, cache={})
 
     @cached_property
+    def _quiet_replayer(self) -> Replayer:
+        """Replays of temperatures without the noise of their readings."""
+        recorded = self._recorded.temperatures
+        return self._replayer.with_temperatures({name: smoothed(self._run, t) for name, t in recorded.items()})
+
+    @cached_property
     def _step_degC(self) -> float:
         """The coarsest steps that a temperature was recorded in."""
         return max(recorded_step(t) for t in self._recorded.temperatures.values())
@@ -204,7 +210,10 @@ class TwinOnRun:
             about = EffectValue(
                 id, shape[AT_AMPLITUDE], {k: v for k, v in shape.items() if k != AT_AMPLITUDE}
             )
-            return (self.output(constants, (about,)) - self.output(constants)) / about.amplitude
+            # The gyro itself does not know the readings' noise, which a difference would have twice.
+            without, delayed = (with_effects(self._twin, constants, effects) for effects in ((), (about,)))
+            changed = self._quiet_replayer.output(delayed) - self._quiet_replayer.output(without)
+            return np.asarray(changed / about.amplitude)
         return self._responded(
             declared, shape, constants, self._raw if declared.stage == "sensor" else self._full
         )

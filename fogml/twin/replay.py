@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import OrderedDict
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from weakref import WeakKeyDictionary
 
@@ -150,6 +151,13 @@ class Replayer:
             self.recorded, self.windows = inputs_of_truth(truth, run), ()
         self._given: dict[Hashable, _Given] = {}
         self._signatures: OrderedDict[Hashable, FloatArray] = OrderedDict()
+
+    def with_temperatures(self, temperatures: Mapping[str, FloatArray]) -> Replayer:
+        """Replays of the same run with its recorded temperatures changed [degC], shape (n,) each."""
+        other = copy(self)
+        other.recorded = replace(self.recorded.afresh(), temperatures=temperatures, cache={})
+        other._given, other._signatures = {}, OrderedDict()
+        return other
 
     def output(self, twin: Twin) -> FloatArray:
         """Noise-free output [deg/h], shape (n,)."""
