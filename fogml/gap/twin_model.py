@@ -177,7 +177,9 @@ class TwinOnRun:
     def _quiet_replayer(self) -> Replayer:
         """Replays of temperatures without the noise of their readings."""
         recorded = self._recorded.temperatures
-        return self._replayer.with_temperatures({name: smoothed(self._run, t) for name, t in recorded.items()})
+        return self._replayer.with_temperatures(
+            {name: smoothed(self._run, t) for name, t in recorded.items()}
+        )
 
     @cached_property
     def _step_degC(self) -> float:

@@ -39,6 +39,16 @@ def test_rows_are_plain_means_over_their_blocks():
     assert o.stops[-1] - o.starts[-1] == 1003 - 11 * 91
 
 
+def test_rows_need_be_no_shorter_than_ten_seconds_where_there_are_enough_of_them():
+    assert observe(run_at(np.arange(0.0, 36_001.0)), MODEL).row_s == 10.0
+    # 3,000 s in rows of 10 s would be 300 of them.
+    assert observe(run_at(np.arange(0.0, 3000.0)), MODEL).row_s == 1.0
+    assert observe(run_at(np.arange(0.0, 5000.0)), MODEL).row_s == 2.0
+    # Of a long run the bound on rows counts.
+    week = observe(run_at(np.arange(0.0, 604_800.0, 10.0)), MODEL)
+    assert week.row_s == 80.0 and len(week) <= 8192
+
+
 def test_blocks_do_not_reach_over_a_gap():
     time = np.concatenate([np.arange(0.0, 605.0), np.arange(2000.0, 2700.0)])
     gyro = np.where(time < 1000.0, 1.0, 5.0)

@@ -47,6 +47,19 @@ def test_an_effect_that_does_what_it_is_credited_with_keeps_its_name():
     assert [(r.margin, r.unrealised) for r in ranking.effects] == [(r.margin, 0.0) for r in found[3].effects]
 
 
+def _blurred(on, constants, effects=()):
+    """A replay whose effects see readings with noise."""
+    noise = np.random.default_rng(len(on.run)).standard_normal(len(on.run))
+    return 0.0 * on.run.time + sum(e.amplitude for e in effects) * noise
+
+
+def test_what_readings_noise_makes_of_a_replay_is_no_loss(monkeypatch):
+    """A replay of noisy readings falls short of its effect; the effect's own response does not."""
+    p, candidates, search, ranking, fit = searched(share=0.7)
+    monkeypatch.setattr(type(p.fit[0].model), "output", _blurred)
+    assert unrealised(p, candidates, search, ranking, fit) == {"mixture": 0.0}
+
+
 def test_what_no_share_of_the_parts_makes_is_not_named_for_them():
     found = searched(against=0.2)
     ranking = realised(*found)

@@ -140,6 +140,40 @@ def test_what_means_would_blur_is_averaged_from_the_samples():
         np.testing.assert_allclose(taken, wanted, atol=0.0 if not held else 2e-3)
 
 
+def test_responses_that_stay_as_they_are_are_kept_for_other_constants(run, monkeypatch):
+    o = observe(run, MODEL, largest_rows=1000)
+    others = {name: 2.0 * value for name, value in VALUES.items()}
+    asked = []
+    respond = type(o.model).response
+    monkeypatch.setattr(
+        type(o.model), "response", lambda on, id, *more: asked.append(id) or respond(on, id, *more)
+    )
+    for id in ("shupe_pure", "deadband", "sensor_lag", "logger_skew"):
+        shapes = [usual(id), usual(id)]
+        for values in (VALUES, others):
+            found = o.responses.at(id, shapes, values)
+            wanted = [o.averaged(respond(o.model, id, shape, values)) for shape in shapes]
+            np.testing.assert_allclose(found, np.column_stack(wanted), rtol=1e-9, atol=1e-12)
+        asked.clear()
+        o.responses.at(id, shapes, others)
+        # Those of the output, or of its slopes, are other ones at other constants.
+        assert bool(asked) == (id != "shupe_pure"), id
+    # Other shapes are not taken for those that are kept.
+    other = o.responses.at("hidden_thermal_node", [usual("hidden_thermal_node")], VALUES)
+    changed = {name: 1.5 * value for name, value in usual("hidden_thermal_node").items()}
+    assert not np.allclose(o.responses.at("hidden_thermal_node", [changed], VALUES), other)
+
+
+def test_no_more_responses_are_kept_than_there_is_room_for(run, monkeypatch):
+    from fogml.gap import row_responses
+
+    o = observe(run, MODEL, largest_rows=1000)
+    monkeypatch.setattr(row_responses, "MOST_KEPT_BYTES", 8.0 * len(o))
+    for id in ("shupe_pure", "ageing"):
+        o.responses.at(id, [usual(id)], VALUES)
+    assert set(o.responses._kept) == {"shupe_pure"}
+
+
 def test_the_result_says_what_was_taken_on_means(run):
     def said(o) -> str:
         noise = SimpleNamespace(source="these runs")

@@ -7,6 +7,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, EffectValue, NoisePrior
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
@@ -125,6 +126,23 @@ def test_reading_noise_is_the_scatter_of_replays_of_noisy_temperatures(run):
     still = rate == 0.0
     for part in (still, ~still):
         assert np.median(told[part]) == pytest.approx(np.median(outputs.std(axis=0)[part]), rel=0.2)
+
+
+def test_a_delays_response_does_not_hold_the_noise_of_the_readings_twice(run):
+    shape = {"growth": 0.0, AT_AMPLITUDE: 20.0}
+    rng = np.random.default_rng(4)
+    noisy = run.with_columns(
+        **{name: run.columns[name] + 0.05 * rng.standard_normal(len(run)) for name in run.temperature_columns}
+    )
+    clean, found = (TwinModel(TWIN).on(r).response("logger_skew", shape, VALUES) for r in (run, noisy))
+    replayed = [
+        TwinModel(TWIN).on(noisy).output(VALUES, effects)
+        for effects in ((EffectValue("logger_skew", 20.0, {"growth": 0.0}),), ())
+    ]
+    # Between turns the table tells nothing, and a difference of two replays is mostly noise.
+    still = ~np.convolve(np.abs(run.rate) > 0.0, np.ones(7), mode="same").astype(bool)
+    off, twice = (np.std((x - clean)[still]) for x in (found, (replayed[0] - replayed[1]) / 20.0))
+    assert off < 0.4 * twice
 
 
 def test_nuisances_have_the_same_names_on_every_run_and_follow_the_rate(on):
