@@ -14,7 +14,8 @@ from fogml.gap.observation import observe
 from fogml.gap.programme_design import Design
 from fogml.gap.programme_family import Family
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.twin_model import TwinModel, TwinOnRun
+from fogml.gap.twin_model import TwinModel
+from fogml.gap.twin_on_run import TwinOnRun
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel

@@ -69,10 +69,13 @@ class RowResponses:
             return held[1]
         rows = np.column_stack([self.of(id, shape, constants) for shape in shapes])
         model = self._observation.model
-        kept = sum(other.nbytes for _, other in self._kept.values())
-        if isinstance(model, Foreseeable) and kept + rows.nbytes <= MOST_KEPT_BYTES:
-            if not any(model.depends_on_constants(id, shape) for shape in shapes):
-                self._kept[id] = list(shapes), rows
+        room = MOST_KEPT_BYTES - sum(other.nbytes for _, other in self._kept.values())
+        if (
+            isinstance(model, Foreseeable)
+            and rows.nbytes <= room
+            and not any(model.depends_on_constants(id, shape) for shape in shapes)
+        ):
+            self._kept[id] = list(shapes), rows
         return rows
 
     def _settle(self, id: str, constants: Mapping[str, float]) -> OnMeans | None:
