@@ -28,8 +28,9 @@ from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness, relatives_of
-from fogml.gap.blind.scoring.answers import NAMED, read_answer
+from fogml.gap.blind.scoring.answers import read_answer
 from fogml.gap.blind.scoring.marks import mark
+from fogml.gap.blind.scoring.statistics import open_set
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
@@ -49,6 +50,7 @@ KINDS = ("one", "two", "three", "unknown_and_known")
 STRONG = 10.0
 SHOWN_NATS = 8.0
 UNKNOWNS = ("unknown_left_out", "unknown_invented")
+OPEN = (*UNKNOWNS, "unknown_and_known")
 FIGURES = (
     ("one effect, d′ over 10: class exact", ("one",), True, STRONG, True),
     ("one effect, any d′: class exact", ("one",), True, 0.0, True),
@@ -81,26 +83,32 @@ def main() -> None:
     given = parser.parse_args()
     folder = BlindFolder(Path(given.directory))
     found = Parallel(n_jobs=given.workers)(delayed(_measured)(folder, name) for name in folder.names())
-    effects = [row for own, _ in found for row in own]
-    wrong = [row for _, row in found if row is not None]
+    effects = [row for own, _, _ in found for row in own]
+    wrong = [row for _, row, _ in found if row is not None]
+    asked = [row for _, _, row in found]
     with whole_file(HERE / "limits.json") as partial:
-        text = json.dumps({"effects": effects, "wrong": wrong}, indent=1)
+        text = json.dumps({"effects": effects, "wrong": wrong, "asked": asked}, indent=1)
         partial.write_text(text + "\n", encoding="utf-8")
     with whole_file(HERE / "limits.md") as partial:
-        partial.write_text(_page(effects, wrong, len(found)), encoding="utf-8")
+        partial.write_text(_page(effects, wrong, asked), encoding="utf-8")
 
 
-def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
-    """What each known effect of a case adds, and a wrong answer's distance from the truth."""
-    path = folder.answers() / name / "gap.json"
+def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Row]:
+    """What each effect of a case adds, a wrong answer's distance from the truth, and the unknown's share."""
     truth = read_truth(folder.truth / f"{name}.json")
-    if not path.is_file() or not truth.effects:
-        return [], None
-    gap = json.loads(path.read_text())
-    marked = mark(truth, read_answer(folder.answers() / name), relatives_of(folder, truth))
-    named = [item for item in gap["which"] if item["probability"] >= NAMED]
-    held = {member for item in named for member in item["class"]}
-    unknown = gap["unknown"]["probability"]
+    answer = read_answer(folder.answers() / name)
+    # A case that was not answered says nothing of an unknown.
+    asked = {
+        "case": name,
+        "kind": truth.kind,
+        "unknown": answer.gap.unknown.probability if answer.gap else 0.0,
+    }
+    if answer.gap is None or not truth.effects:
+        return [], None, asked
+    marked = mark(truth, answer, relatives_of(folder, truth))
+    named = [item for item in answer.gap.which if item.named]
+    held = {member for item in named for member in item.members}
+    unknown = answer.gap.unknown.probability
     wrong = [item.effect for item in marked.named if not item.right]
     effects = [
         {"case": name, "kind": truth.kind, "effect": e.name, "known": e in truth.known}
@@ -110,9 +118,10 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None]:
     ]
     missed = sorted({e.id for e in truth.known if e.id} - held)
     if not (wrong or missed):
-        return effects, None
+        return effects, None, asked
     row = {"case": name, "kind": truth.kind, "wrong": wrong, "missed": missed, "unknown": unknown}
-    return effects, row | {"nats": _distance(folder, truth, named, unknown >= 0.5)}
+    ids = {item.effect for item in named}
+    return effects, row | {"nats": _distance(folder, truth, ids, unknown >= 0.5)}, asked
 
 
 def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
@@ -138,7 +147,7 @@ def _log_evidence(frame: Frame, forms: FloatArray) -> float:
     return float(-0.5 * inner[0, 0] + 0.5 * fit @ np.linalg.solve(own, fit) - 0.5 * np.linalg.slogdet(own)[1])
 
 
-def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool) -> float:
+def _distance(folder: BlindFolder, truth: Truth, named: set[str], unknown: bool) -> float:
     given = read_contributions(folder.truth / f"{truth.case}.npz")
     runs = case_files(folder.cases / truth.case).fit
     counted = [i for i, e in enumerate(truth.effects) if not (unknown and e in truth.unknown)]
@@ -146,16 +155,21 @@ def _distance(folder: BlindFolder, truth: Truth, named: list[Row], unknown: bool
         counted = list(range(len(truth.effects)))
     total = [sum(given[run.name, i] for i in counted) for run in runs]
     likeness = Likeness(runs, [total], truth.noise_model, truth.nominal)
-    shapes = {i["effect"]: {k: v["value"] for k, v in i["parameters"].items()} for i in named}
+    which = json.loads((folder.answers() / truth.case / "gap.json").read_text())["which"]
+    shapes = {
+        i["effect"]: {k: v["value"] for k, v in i["parameters"].items()}
+        for i in which
+        if i["effect"] in named
+    }
     return 0.5 * likeness.left(shapes)
 
 
-def _page(everything: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
+def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row]) -> str:
     effects = [row for row in everything if row["known"]]
     lines = [
         "# What the data allow",
         "",
-        f"Synthetic cases of the second reality: {cases}, with {len(effects)} known effects.",
+        f"Synthetic cases of the second reality: {len(asked)}, with {len(effects)} known effects.",
         "",
         "## How much of what the data show is named",
         "",
@@ -192,6 +206,17 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], cases: int) -> str:
         "| figure | cases | a wrong name | that the data tell |",
         "|---|---:|---:|---:|",
         *(_wrong_names(everything, wrong, *figure) for figure in WRONG_NAMES),
+        "",
+        "## How far an unknown can be told from none",
+        "",
+        f"An unknown that adds less than {SHOWN_NATS:g} nats is hidden: also for one who knows its form it "
+        "ranks among the cases without one as chance has it. With a share h hidden and all others told, the "
+        "area under the curve is 1 - h / 2, and the threshold that 95 % of the unknowns reach is reached by "
+        "a share 1 - 0.05 / h of the cases without one, too.",
+        "",
+        "| unknowns | cases | hidden | AUROC within reach | AUROC | FPR95 within reach | FPR95 |",
+        "|---|---:|---:|---:|---:|---:|---:|",
+        *(_open_set(everything, asked, above) for above in (0.0, STRONG)),
         "",
         "## How far wrong answers are from the truth",
         "",
@@ -241,6 +266,22 @@ def _wrong_names(
     nats = [row["nats"] for row in wrong if row["wrong"] and row["case"] in counted]
     far = sum(value >= SHOWN_NATS for value in nats)
     return f"| {words} | {len(counted)} | {len(nats) / len(counted):.2f} | {far / len(counted):.2f} |"
+
+
+def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str:
+    """A line of the table: unknowns over a d' against every case without one."""
+    unknown = {r["case"]: r for r in effects if not r["known"] and r["kind"] in OPEN and r["d_prime"] > above}
+    without = [r for r in asked if r["kind"] not in (*OPEN, "wrong_thermal")]
+    if not unknown or not without:
+        return f"| d′ over {above:g} | 0 | – | – | – | – | – |"
+    scores = [r["unknown"] for r in asked if r["case"] in unknown] + [r["unknown"] for r in without]
+    found = open_set(scores, [True] * len(unknown) + [False] * len(without))
+    hidden = float(np.mean([row["gain"] < SHOWN_NATS for row in unknown.values()]))
+    words = f"d′ over {above:g}" if above else "any d′"
+    reach = (
+        f"{1.0 - 0.5 * hidden:.3f} | {found.auroc.value:.3f} | {max(0.0, 1.0 - 0.05 / max(hidden, 0.05)):.2f}"
+    )
+    return f"| {words} | {len(unknown)} | {hidden:.2f} | {reach} | {found.fpr95.value:.2f} |"
 
 
 def _cases(effects: Sequence[Row], kinds: Sequence[str], above: float) -> dict[str, list[Row]]:
