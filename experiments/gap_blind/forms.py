@@ -13,28 +13,19 @@ and what is lost, ``||s - C b||^2 / 2`` nats. The rest counts as evidence for so
 
 from __future__ import annotations
 
-import argparse
-import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
-from fogml.gap.blind.folders import BlindFolder, case_files
+from experiments.gap_blind.per_case import measure_cases, true_frame, write_tables
+from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.truth import read_contributions, read_truth
 from fogml.gap.candidate_columns import candidate_columns
-from fogml.gap.frame import Frame
-from fogml.gap.observation import observe
-from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.screening import Screening
 from fogml.gap.twin_model import TwinModel
-from fogml.outputs import whole_file
-from fogml.runs.reading import read_run
 from fogml.twin.twin_file import load_twin
 
-HERE = Path(__file__).parent
 LEAST_D_PRIME = 6.0
 """Weaker effects are left out: of them no form is told from another."""
 NATS = 3.0
@@ -43,17 +34,9 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure every case, write the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("directory", help="a suite; it need not be answered")
-    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
-    given = parser.parse_args()
-    folder = BlindFolder(Path(given.directory))
-    found = Parallel(n_jobs=given.workers)(delayed(_measured)(folder, name) for name in folder.names())
+    found = measure_cases(_measured, __doc__, "a suite; it need not be answered")
     rows = [row for own in found for row in own]
-    with whole_file(HERE / "forms.json") as partial:
-        partial.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
-    with whole_file(HERE / "forms.md") as partial:
-        partial.write_text(_page(rows, len(found)), encoding="utf-8")
+    write_tables("forms", rows, _page(rows, len(found)))
 
 
 def _measured(folder: BlindFolder, name: str) -> list[Row]:
@@ -69,18 +52,16 @@ def _measured(folder: BlindFolder, name: str) -> list[Row]:
     if not counted:
         return []
     given = read_contributions(folder.truth / f"{name}.npz")
-    runs = [observe(read_run(path), model) for path in case_files(folder.cases / name).fit]
-    whiteners = [RunWhitener(truth.noise_model, o, truth.nominal) for o in runs]
-    frame = Frame(runs, whiteners, model.constants, truth.nominal)
+    frame = true_frame(folder, truth, model)
     screening = Screening(frame, [])
     rows = []
     for i in counted:
         effect = truth.effects[i]
-        stacked = frame.white([o.averaged(given[o.run.name, i])[:, None] for o in runs])
+        stacked = frame.white([o.averaged(given[o.run.name, i])[:, None] for o in frame.observations])
         true = frame.without_constants(stacked[:, 0])
         least = whole = float(true @ true)
         for _, columns in candidate_columns(candidates[effect.id], frame, model.grade, screening):
-            own = np.column_stack([frame.without_constants(column) for column in columns.T])
+            own = frame.without_constants(columns)
             left = true - own @ np.linalg.lstsq(own, true, rcond=None)[0]
             least = min(least, float(left @ left))
         rows.append(
@@ -102,7 +83,7 @@ def _page(rows: Sequence[Row], cases: int) -> str:
         "constants and ordinary sensors' errors, that the best node of the catalogue's form holds; and what "
         f"is lost with the rest. Where more than {NATS:g} nats are lost, another name may be as good.",
         "",
-        "| effect | effects | median share held | least | median nats lost | more than 3 lost |",
+        f"| effect | effects | median share held | least | median nats lost | more than {NATS:g} lost |",
         "|---|---:|---:|---:|---:|---:|",
     ]
     for id in sorted(held, key=lambda id: float(np.median([row["held"] for row in held[id]]))):

@@ -16,16 +16,14 @@ an effect that was left out are no wrong names, as in the score.
 
 from __future__ import annotations
 
-import argparse
 import json
 from collections.abc import Sequence
 from itertools import pairwise
-from pathlib import Path
 from typing import Any
 
 import numpy as np
-from joblib import Parallel, delayed
 
+from experiments.gap_blind.per_case import measure_cases, true_frame, write_tables
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness, relatives_of
 from fogml.gap.blind.scoring.answers import read_answer
@@ -33,15 +31,10 @@ from fogml.gap.blind.scoring.marks import mark
 from fogml.gap.blind.scoring.statistics import open_set
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
-from fogml.gap.observation import observe
-from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.twin_model import TwinModel
-from fogml.outputs import whole_file
-from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
 from fogml.twin.twin_file import load_twin
 
-HERE = Path(__file__).parent
 TELLING_NATS = 3.0
 """Under so many nats two explanations are one."""
 SURE_NATS = 10.0
@@ -77,20 +70,12 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure every case that the diagnosis answered; write the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("directory", help="an answered suite")
-    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
-    given = parser.parse_args()
-    folder = BlindFolder(Path(given.directory))
-    found = Parallel(n_jobs=given.workers)(delayed(_measured)(folder, name) for name in folder.names())
+    found = measure_cases(_measured, __doc__, "an answered suite")
     effects = [row for own, _, _ in found for row in own]
     wrong = [row for _, row, _ in found if row is not None]
     asked = [row for _, _, row in found]
-    with whole_file(HERE / "limits.json") as partial:
-        text = json.dumps({"effects": effects, "wrong": wrong, "asked": asked}, indent=1)
-        partial.write_text(text + "\n", encoding="utf-8")
-    with whole_file(HERE / "limits.md") as partial:
-        partial.write_text(_page(effects, wrong, asked), encoding="utf-8")
+    content = {"effects": effects, "wrong": wrong, "asked": asked}
+    write_tables("limits", content, _page(effects, wrong, asked))
 
 
 def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Row]:
@@ -126,13 +111,11 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Ro
 
 def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
     """Evidence that each effect's true form adds beside the others [nats]."""
-    model = TwinModel(load_twin("nominal"))
     given = read_contributions(folder.truth / f"{truth.case}.npz")
-    runs = [observe(read_run(path), model) for path in case_files(folder.cases / truth.case).fit]
-    whiteners = [RunWhitener(truth.noise_model, o, truth.nominal) for o in runs]
-    frame = Frame(runs, whiteners, model.constants, truth.nominal)
+    frame = true_frame(folder, truth, TwinModel(load_twin("nominal")))
     rows = [
-        np.column_stack([o.averaged(given[o.run.name, i]) for i in range(len(truth.effects))]) for o in runs
+        np.column_stack([o.averaged(given[o.run.name, i]) for i in range(len(truth.effects))])
+        for o in frame.observations
     ]
     forms = frame.white(rows)
     whole = _log_evidence(frame, forms)

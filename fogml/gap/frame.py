@@ -94,7 +94,7 @@ class Frame:
         return np.asarray(columns.T @ columns - cross.T @ inverse @ cross)
 
     def without_constants(self, rows: FloatArray) -> FloatArray:
-        """What the constants and nuisances, with their priors, leave of whitened rows, shape (n,)."""
+        """What the constants and nuisances, with their priors, leave of whitened rows, shape as given."""
         inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
         return np.asarray(rows - self.fixed @ np.linalg.solve(inner, self.fixed.T @ rows))
 

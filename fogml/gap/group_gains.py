@@ -39,8 +39,8 @@ def group_gains(held: Conditioned, names: Sequence[str]) -> FloatArray:
     gram, k, count = held.field.gram, len(held.half), len(LENGTHS)
     sizes = np.diagonal(gram)
     squares = LENGTHS[:, None] ** 2
-    inner = np.empty((len(names), count, k, k))
-    sides = np.empty((len(names), count, k))
+    # The factor of M with v as one row more ends in v' L^-1, whatever its last corner is.
+    whole = np.empty((len(names), count, k + 1, k + 1))
     gains = np.empty((len(names), count))
     for i, name in enumerate(names):
         places = held.field.basis.groups[name]
@@ -49,17 +49,13 @@ def group_gains(held: Conditioned, names: Sequence[str]) -> FloatArray:
         across = held.half[:, places]
         fit = gram[places, 0] - across.T @ held.half[:, 0]
         weighed = (weights[:, None, :] * across).reshape(count * k, len(places))
-        inner[i] = (weighed @ across.T).reshape(count, k, k)
-        sides[i] = (weighed @ fit).reshape(count, k)
+        whole[i, :, :k, :k] = np.eye(k) - (weighed @ across.T).reshape(count, k, k)
+        whole[i, :, k, :k] = (weighed @ fit).reshape(count, k)
         gains[i] = weights @ fit**2 - np.log(wider).sum(axis=1)
-    if k:
-        # The factor of M with v as one row more ends in v' L^-1, whatever its last corner is.
-        whole = np.empty((len(names), count, k + 1, k + 1))
-        whole[..., :k, :k] = np.eye(k) - inner
-        whole[..., k, :k] = sides
-        whole[..., k, k] = _CORNER * (1.0 + np.einsum("glk,glk->gl", sides, sides))
-        factors = np.linalg.cholesky(whole)
-        last = factors[..., k, :k]
-        gains += np.einsum("glk,glk->gl", last, last)
-        gains -= 2.0 * np.log(np.diagonal(factors, axis1=2, axis2=3)[..., :k]).sum(axis=2)
+    sides = whole[..., k, :k]
+    whole[..., k, k] = _CORNER * (1.0 + np.einsum("glk,glk->gl", sides, sides))
+    factors = np.linalg.cholesky(whole)
+    last = factors[..., k, :k]
+    gains += np.einsum("glk,glk->gl", last, last)
+    gains -= 2.0 * np.log(np.diagonal(factors, axis1=2, axis2=3)[..., :k]).sum(axis=2)
     return np.asarray(0.5 * gains)

@@ -94,6 +94,11 @@ def drawn_per_run(candidate: Candidate) -> bool:
     return bool(getattr(candidate, "drawn_per_run", False))
 
 
+def amplitudes_about(candidate: Candidate) -> Sequence[float]:
+    """Amplitudes about which a response not in proportion to them is taken: ``amplitudes``, if it has any."""
+    return tuple(getattr(candidate, "amplitudes", ()))
+
+
 class Responding(Protocol):
     """What gives responses of candidates."""
 

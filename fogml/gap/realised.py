@@ -18,7 +18,7 @@ from fogml.gap.confidence import named_probability
 from fogml.gap.evidence import Term
 from fogml.gap.fitting import Fit
 from fogml.gap.found import fit_named
-from fogml.gap.model import Candidate, drawn_per_run
+from fogml.gap.model import Candidate, amplitudes_about, drawn_per_run
 from fogml.gap.preparing import Prepared
 from fogml.gap.search import Search
 from fogml.gap.shapes import AT_AMPLITUDE
@@ -46,7 +46,7 @@ def realised(
     fit
         The named effects, fitted on the replay.
     """
-    lost = unrealised(p, candidates, search, ranking, fit)
+    lost = unrealised(candidates, search, ranking, fit)
     ranking, lost = _best_heads(p, candidates, search, ranking, lost)
     alone = len(ranking.best.effects) == 1 and ranking.best.unknown is None
     effects, known = [], 1.0 - ranking.unknown
@@ -66,7 +66,7 @@ def realised(
 
 
 def unrealised(
-    p: Prepared, candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
+    candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
 ) -> dict[str, float]:
     """Evidence that each effect's columns have and its fitted shape has not, `FORM_SHARE` apart [nats].
 
@@ -80,9 +80,9 @@ def unrealised(
             # What each run draws anew has no shape that all share.
             continue
         shape = dict(effect.shape)
-        if getattr(candidates[effect.id], "amplitudes", ()):
+        if amplitudes_about(candidates[effect.id]):
             shape[AT_AMPLITUDE] = effect.amplitude
-        response = frame.white([o.response(effect.id, shape, frame.values)[:, None] for o in p.fit])
+        response = frame.responses(effect.id, [shape])
         length = float(np.linalg.norm(frame.without_constants(response[:, 0])))
         beside = search.beside(best, effect.id)
         nothing = field.condition(beside).log_evidence
@@ -114,7 +114,8 @@ def _best_heads(
             behind = max(before.best.log_posterior - swapped.best.log_posterior, 0.0)
             if behind >= least:
                 continue
-            found = unrealised(p, candidates, search, swapped, fit_named(p, candidates, search, swapped))
+            fit = fit_named(p, candidates, search, swapped)
+            found = unrealised(candidates, search, swapped, fit)
             if behind + found.get(member, 0.0) < least:
                 least = behind + found.get(member, 0.0)
                 ranking, lost = swapped, found

@@ -14,7 +14,7 @@ from itertools import product
 
 import numpy as np
 
-from fogml.gap.model import Candidate
+from fogml.gap.model import Candidate, amplitudes_about
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
@@ -79,7 +79,7 @@ def grid(
     spans
         ``"s"``: longest run [s]; ``"degC"``: widest span of temperature [degC]; ``"sample"``: row [s].
     """
-    amplitudes = getattr(candidate, "amplitudes", ())
+    amplitudes = amplitudes_about(candidate)
     if amplitudes:
         about = [{AT_AMPLITUDE: float(a)} for a in amplitudes]
         nodes = _grid(candidate, grade, response, spans)

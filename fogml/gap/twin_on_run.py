@@ -106,10 +106,8 @@ class TwinOnRun:
     @cached_property
     def _quiet_replayer(self) -> Replayer:
         """Replays of temperatures without the noise of their readings."""
-        recorded = self._recorded.temperatures
-        return self._replayer.with_temperatures(
-            {name: smoothed(self._run, t) for name, t in recorded.items()}
-        )
+        smooth = self._full.temperatures
+        return self._replayer.with_temperatures({name: smooth[name] for name in self._recorded.temperatures})
 
     @cached_property
     def _step_degC(self) -> float:

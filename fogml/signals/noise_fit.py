@@ -162,15 +162,16 @@ def fit_noise(
     # Curvature below the prior's, of a likelihood that bends the other way, is no knowledge.
     values, vectors = np.linalg.eigh(curvature)
     mean, inverse = found.x, (vectors / np.maximum(values, 1.0)) @ vectors.T
-    rounds, matter = 0, 0.0
-    while rounds < _ROUNDS and matter < _ENOUGH:
+    evaluations = int(found.nfev)
+    for _ in range(_ROUNDS):
         mean, inverse, matter = _moments(objective, mean, inverse, float(found.fun))
-        rounds += 1
+        evaluations += _POINTS
+        if matter >= _ENOUGH:
+            break
     covariance = np.zeros((3, 3))
     covariance[np.ix_(free, free)] = inverse * np.outer(spread, spread)
     factors = np.ones(3)
     factors[free] = np.exp(mean * spread)
-    evaluations = int(found.nfev) + rounds * _POINTS
     return NoiseFit(_scaled(prior.centre, factors), covariance, prior, -float(found.fun), evaluations)
 
 

@@ -57,7 +57,7 @@ def test_what_readings_noise_makes_of_a_replay_is_no_loss(monkeypatch):
     """A replay of noisy readings falls short of its effect; the effect's own response does not."""
     p, candidates, search, ranking, fit = searched(share=0.7)
     monkeypatch.setattr(type(p.fit[0].model), "output", _blurred)
-    assert unrealised(p, candidates, search, ranking, fit) == {"mixture": 0.0}
+    assert unrealised(candidates, search, ranking, fit) == {"mixture": 0.0}
 
 
 def test_what_no_share_of_the_parts_makes_is_not_named_for_them():
@@ -93,7 +93,7 @@ def test_what_is_brought_is_the_evidence_of_the_fitted_replay():
     brought = 0.5 * square / (1.0 + square) * fits**2 / size - 0.5 * np.log1p(square)
     field = search.field_
     credited = field.condition(search.terms(ranking.best)).log_evidence - field.condition([]).log_evidence
-    lost = unrealised(p, candidates, search, ranking, fit)["mixture"]
+    lost = unrealised(candidates, search, ranking, fit)["mixture"]
     assert lost == pytest.approx((1.0 - FORM_SHARE) * credited - brought, rel=0.03) and lost > 5.0
 
 
@@ -118,7 +118,7 @@ def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
     monkeypatch.setattr(
         module,
         "unrealised",
-        lambda p, c, s, r, fit: {i: lost[i] for i in r.best.ids if lost[i] or i == "cube"},
+        lambda c, s, r, fit: {i: lost[i] for i in r.best.ids if lost[i] or i == "cube"},
     )
     found = realised(p, candidates, search, both, fit)
     assert [r.members for r in found.effects] == [("cube", "mixture")]

@@ -102,8 +102,8 @@ def test_an_effect_that_each_run_draws_anew_is_no_noise():
 def test_a_first_name_has_to_be_more_probable_than_none():
     assert named_probability(FIRST_NAME - 0.01, alone=True) < 0.5 < named_probability(FIRST_NAME, alone=True)
     assert named_probability(FIRST_NAME - 0.01) > 0.5
-    # As many nats of a longer effect, or beside more that is unexplained, say less.
     # What hangs on another form is not the effect's, however much it gains.
     assert named_probability(30.0, MOSTLY_FORM + 0.01) < 0.5 < named_probability(30.0, MOSTLY_FORM)
+    # As many nats of a longer effect, or beside more that is unexplained, say less.
     assert named_probability(5.0, length=40.0) < named_probability(5.0, length=5.0)
     assert named_probability(5.0, rest=1.0) < named_probability(5.0)
