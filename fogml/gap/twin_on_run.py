@@ -112,7 +112,8 @@ class TwinOnRun:
     @cached_property
     def _step_degC(self) -> float:
         """The coarsest steps that a temperature was recorded in."""
-        return max(recorded_step(t) for t in self._recorded.temperatures.values())
+        held = self._recorded
+        return max(recorded_step(t) for name in held.temperatures for t in held.readings(name))
 
     @cached_property
     def _others(self) -> list[Inputs]:

@@ -141,19 +141,26 @@ class Run:
         InputError
             If the run does not hold that temperature.
         """
-        if name in self.columns and is_temperature(name):
-            return self.columns[name]
-        stand_in = "T_in" if name == "T" else name
-        if stand_in in self.columns and is_temperature(stand_in):
-            return self.columns[stand_in]
-        if stand_in in ("T_in", "T_out"):
-            parity = 1 if stand_in == "T_in" else 0
-            numbers = {c: coil_sensor_number(c) for c in self.columns}
-            sensors = [c for c, number in numbers.items() if number is not None and number % 2 == parity]
-            if sensors:
-                return self._sensor_mean(tuple(sensors))
+        sensors = self.sensors(name)
+        if len(sensors) == 1:
+            return self.columns[sensors[0]]
+        if sensors:
+            return self._sensor_mean(sensors)
         held = ", ".join(self.temperature_columns) or "none"
         raise InputError(f"{self.name}: no temperature '{name}'; the run holds {held}")
+
+    def sensors(self, name: str = "T") -> tuple[str, ...]:
+        """The columns that a temperature is the mean of; none where the run does not hold it."""
+        if name in self.columns and is_temperature(name):
+            return (name,)
+        stand_in = "T_in" if name == "T" else name
+        if stand_in in self.columns and is_temperature(stand_in):
+            return (stand_in,)
+        if stand_in not in ("T_in", "T_out"):
+            return ()
+        parity = 1 if stand_in == "T_in" else 0
+        numbers = {c: coil_sensor_number(c) for c in self.columns}
+        return tuple(c for c, number in numbers.items() if number is not None and number % 2 == parity)
 
     def _sensor_mean(self, sensors: tuple[str, ...]) -> FloatArray:
         means: dict[tuple[str, ...], FloatArray] = self.__dict__.setdefault("_sensor_means", {})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -60,6 +60,8 @@ class Inputs:
     temperatures
         Node or sensor name of the run format (``T_in``, ``T_out``, ``T_case``,
         ``T_electronics``, ``T_chamber`` and the twin's ``T_hub``, ``T_plate``) to degC, shape (n,).
+    sensors
+        Readings that a temperature is the mean of, where it is one of several, shape (n,) each [degC].
     table_rate
         Table rate about the input axis [deg/s], shape (n,).
     earth_deg_h
@@ -94,6 +96,7 @@ class Inputs:
     powered_on_s: float = -np.inf
     power_ons_s: tuple[float, ...] = ()
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
+    sensors: Mapping[str, Sequence[FloatArray]] = field(default_factory=dict)
     rate_window_s: float = 64.0
     hindsight: bool = False
     output: FloatArray | None = None
@@ -119,6 +122,10 @@ class Inputs:
             return self.temperatures[place]
         held = ", ".join(self.temperatures) or "none"
         raise InputError(f"no temperature '{name}' is recorded or given by the plant; there is {held}")
+
+    def readings(self, name: str = "T") -> Sequence[FloatArray]:
+        """The readings that `temperature` is the mean of, shape (n,) each [degC]."""
+        return self.sensors.get(self.place(name) or "", ()) or (self.temperature(name),)
 
     def place(self, name: str) -> str | None:
         """The temperature that `name` is read from: itself, or its nearest stand-in, or None."""

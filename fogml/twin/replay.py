@@ -71,12 +71,12 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
     temperatures = {
         name: run.columns[name] for name in run.temperature_columns if coil_sensor_number(name) is None
     }
+    sensors = {}
     for name in ("T_in", "T_out"):
-        if name not in temperatures and any(map(coil_sensor_number, run.temperature_columns)):
-            try:
-                temperatures[name] = run.temperature(name)
-            except InputError:
-                continue
+        held = run.sensors(name)
+        if name not in temperatures and held:
+            temperatures[name] = run.temperature(name)
+            sensors[name] = [run.columns[sensor] for sensor in held]
     drives = {name: run.columns[name] for name in (*REST, "angle") if name in run.columns}
     heading = heading_of(run.facts, drives["angle"]) if "angle" in drives else None
     # The air itself is never quiet.
@@ -93,6 +93,7 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         powered_on_s=windows[0][0] if windows else -math.inf,
         power_ons_s=tuple(on for on, _ in windows[1:]),
         drives=drives,
+        sensors=sensors,
         rate_window_s=RATE_WINDOW_S if noisy else 0.0,
         hindsight=noisy,
     )
@@ -155,7 +156,7 @@ class Replayer:
     def with_temperatures(self, temperatures: Mapping[str, FloatArray]) -> Replayer:
         """Replays of the same run with its recorded temperatures changed [degC], shape (n,) each."""
         other = copy(self)
-        other.recorded = replace(self.recorded.afresh(), temperatures=temperatures, cache={})
+        other.recorded = replace(self.recorded.afresh(), temperatures=temperatures, sensors={}, cache={})
         other._given, other._signatures = {}, OrderedDict()
         return other
 

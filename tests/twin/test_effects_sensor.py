@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.runs.run import FloatArray
+from fogml.runs.run import FloatArray, Run
+from fogml.runs.steps import recorded_step
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
 from fogml.twin.registry import effect
+from fogml.twin.replay import inputs_of_run
 
 TIME = np.arange(0.0, 14_400.0)
 CONSTANTS = NominalConstants(e0=100.0, k1=30.0, k2=0.3, b0=1.0, b1=0.03, b2=4e-4, g=0.4)
@@ -127,6 +129,21 @@ def test_hindsight_tells_more_of_what_steps_hide() -> None:
     found = 0.0625 * declared.in_hindsight(inputs.afresh())
     assert np.corrcoef(found, hidden)[0, 1] > max(0.8, 1.5 * causal)
     assert np.polyfit(found, hidden, 1)[0] == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_mean_of_coarse_sensors_hides_what_each_of_them_hides() -> None:
+    """Two sensors that are a third of a step apart: their mean comes in halves of a step."""
+    declared, step = sensor("sensor_quantisation"), 0.5
+    time = np.arange(0.0, 36_000.0, 10.0)
+    true = 20.0 + 30.0 * np.sin(2.0 * np.pi * time / 14_400.0)
+    columns = {f"T{k + 1}": step * np.rint((true + k * step / 6.0) / step) for k in range(4)}
+    run = Run(name="four.csv", columns={"time": time, "gyro": np.zeros(len(time)), **columns})
+    inputs, _ = inputs_of_run(run)
+    inner = inputs.temperature("T_in")
+    assert recorded_step(inner) == pytest.approx(0.5 * step)
+    found = step * declared.in_hindsight(replace(inputs, slopes={"T_in": np.ones(len(time))}))
+    hidden = true + step / 6.0 - inner
+    assert np.std(found - hidden) < 0.2 * np.std(hidden)
 
 
 def test_unrounded_temperature_is_put_to_the_usual_step() -> None:

@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from fogml.runs.run import FloatArray
 from fogml.runs.steps import FINEST_STEP_DEGC, recorded_step, to_steps
+from fogml.signals.staircase import course_through_steps
 from fogml.twin.effect import SensorEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.memory import Memory
 from fogml.twin.quantities import Quantity
 from fogml.twin.responses import unseen
 
 _USUAL_STEP_DEGC = 0.0625
-_SMOOTHED_S, _SMOOTHED_BOTH_WAYS_S = 24.0, 14.0
-"""Time constants of the smoothing at samples of 1 s; they go with the root of the interval."""
+_SMOOTHED_S = 24.0
+"""Time constant of the smoothing at samples of 1 s; it goes with the root of the interval."""
 
 
 class SensorQuantisation(SensorEffect):
@@ -28,9 +26,9 @@ class SensorQuantisation(SensorEffect):
 
     q is the amplitude: 0.0625 degC (DS18B20), 0.01 or 0.001 degC. The signature is what a step hides, times
     the nominal output's slope. Of a rounded record it is told by double exponential smoothing, which follows
-    a steady ramp without delay; its step is the smallest change so far. In hindsight temperature goes
-    straight from one step's edge to the next, smoothed both ways. A record that is not rounded is put to
-    steps of 0.0625 degC.
+    a steady ramp without delay; its step is the smallest change so far. In hindsight it is told by the
+    smoothest course that runs through the steps. A record that is not rounded is put to steps of 0.0625
+    degC.
 
     Source: rounding (derived); R. G. Brown, Smoothing, Forecasting and Prediction (1963), for the smoothing;
     data sheets of sensors (literature).
@@ -83,17 +81,13 @@ class SensorQuantisation(SensorEffect):
         return np.where(step < FINEST_STEP_DEGC, usual - np.rint(usual), within)
 
     def _hidden_in_hindsight(self, name: str, inputs: Inputs) -> FloatArray:
-        """The same where the whole record is known."""
-        time, temperature = inputs.time, inputs.temperature(name)
-        step = recorded_step(temperature)
-        changed = np.flatnonzero(np.diff(temperature))
-        if step < FINEST_STEP_DEGC or len(changed) < 2:
+        """The same where the whole record is known, the mean of all sensors at a place."""
+        readings = inputs.readings(name)
+        steps = [recorded_step(values) for values in readings]
+        if min(steps) < FINEST_STEP_DEGC:
             return self._hidden(name, inputs)
-        edges = 0.5 * (temperature[changed] + temperature[changed + 1])
-        between = np.interp(time, 0.5 * (time[changed] + time[changed + 1]), edges)
-        within = np.clip(between - temperature, -0.5 * step, 0.5 * step) + temperature
-        smoothed_s = _SMOOTHED_BOTH_WAYS_S * math.sqrt(float(np.median(np.diff(time))))
-        memory = Memory()
-        ahead = memory.lag("ahead", time, within, smoothed_s)
-        back = memory.lag("back", -time[::-1], within[::-1].copy(), smoothed_s)[::-1]
-        return np.clip((0.5 * (ahead + back) - temperature) / step, -0.5, 0.5)
+        hidden = [
+            (course_through_steps(inputs.time, values, step) - values) / step
+            for values, step in zip(readings, steps)
+        ]
+        return np.asarray(np.mean(hidden, axis=0))

@@ -13,11 +13,13 @@ from scipy.linalg import toeplitz
 
 from fogml.gap.blind.case import recorded_run
 from fogml.gap.blind.plan import Plan
+from fogml.gap.blind.reality import nominal
 from fogml.gap.blind.reality.catalogue import INVENTED, KNOWN, WRONG_STRUCTURE, known_names
 from fogml.gap.blind.reality.form import Form
 from fogml.gap.blind.reality.noise import record_length
+from fogml.gap.blind.reality.reckoning import Reckoning
 from fogml.gap.blind.reality.recurrences import bouc_wen, lag, play, recurrence
-from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, recorded
+from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, before, recorded
 from fogml.gap.blind.reality.unit import Unit, compatible, draw_unit
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.nominal import NominalConstants
@@ -82,6 +84,27 @@ def test_d_prime_is_that_of_dense_covariances(name: str) -> None:
     d_prime = np.sqrt(whole - right @ np.linalg.lstsq(gram, right, rcond=1e-12)[0])
     assert effect.d_prime == pytest.approx(8.0, rel=0.01)
     assert d_prime == pytest.approx(effect.d_prime, rel=0.02)
+
+
+def test_contributions_of_effects_on_the_sensors_add_up_to_what_a_replay_lacks() -> None:
+    """Steps of a sensor lie elsewhere where another effect moved what it feels."""
+    forms = {
+        name: next(form for form in KNOWN if form.name == name)
+        for name in ("sensor_quantisation", "sensor_lag")
+    }
+    unit, scales, steps = acting(forms["sensor_quantisation"], 20.0)
+    made = forms["sensor_lag"]()
+    lag_of = scales.with_strength(made, {"second_share": 0.3}, 1.0, 20.0)
+    # In the case's order the reading comes first; in the sensor it comes last.
+    both = (steps, lag_of)
+    assert before(both, steps) == (lag_of,) and before(both, lag_of) == ()
+    run = unit.fit[0]
+    found = Reckoning(scales, both).contributions
+    replayed = [nominal.output(unit.constants, unit.seen(run, recorded(unit, run, e))) for e in ((), both)]
+    added = found[run.name, 0] + found[run.name, 1]
+    assert added == pytest.approx(replayed[0] - replayed[1], abs=1e-9)
+    alone = steps.contribution(unit, run) + lag_of.contribution(unit, run)
+    assert np.std(alone - added) > 0.3 * np.std(added)
 
 
 def test_what_is_recorded_is_nominal_and_contributions_and_noise() -> None:

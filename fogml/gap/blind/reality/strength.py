@@ -30,16 +30,30 @@ class Acting:
     amplitude: float = 0.0
     d_prime: float = 0.0
 
-    def contribution(self, unit: Unit, run: UnitRun) -> FloatArray:
-        """What the gap of a run holds of it [deg/h], shape (n,)."""
+    def contribution(self, unit: Unit, run: UnitRun, before: tuple[Acting, ...] = ()) -> FloatArray:
+        """What the gap of a run holds of it [deg/h], shape (n,).
+
+        Of one on the sensors beside those that act `before` it, so that all add up to what a replay lacks.
+        """
         form, world = self.form, run.world
         if isinstance(form, Additive):
             return self.amplitude * form.response(world, self.shape, np.random.default_rng(run.seed))
         if isinstance(form, Distorting):
             output = unit.output(run)
             return form.distorted(output, world, self.amplitude, self.shape) - output
-        trusted = nominal.output(unit.constants, unit.seen(run, recorded(unit, run, ())))
-        return trusted - nominal.output(unit.constants, unit.seen(run, recorded(unit, run, (self,))))
+        trusted = nominal.output(unit.constants, unit.seen(run, recorded(unit, run, before)))
+        return trusted - nominal.output(unit.constants, unit.seen(run, recorded(unit, run, (*before, self))))
+
+    @property
+    def reads(self) -> bool:
+        """Whether it makes a sensor's value a reading, after whatever falsifies what the sensor feels."""
+        return type(self.form).read is not Sensing.read if isinstance(self.form, Sensing) else False
+
+
+def before(effects: tuple[Acting, ...], effect: Acting) -> tuple[Acting, ...]:
+    """Those of all effects on the sensors that act before one of them."""
+    chain = sorted((e for e in effects if isinstance(e.form, Sensing)), key=lambda e: e.reads)
+    return tuple(chain[: chain.index(effect)]) if effect in chain else ()
 
 
 def recorded(unit: Unit, run: UnitRun, effects: tuple[Acting, ...]) -> dict[str, FloatArray]:
