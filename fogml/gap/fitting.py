@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.gap.frame import constant_rows
-from fogml.gap.model import Candidate, Constant, EffectValue
+from fogml.gap.model import Candidate, Constant, EffectValue, Foreseeable
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
 from fogml.runs.run import FloatArray
@@ -179,6 +179,12 @@ class _Problem:
         self._mean = np.array([c.mean / c.sd for c in constants])
         self._fixed = self._white([constant_rows(o, constants) for o in observations])
         self._middle = self._packed(self.first)[len(constants) :]
+        # What sensors miss goes with the constants; coarse ones make constants small that are large.
+        self._entangled = any(
+            isinstance(o.model, Foreseeable) and o.model.depends_on_constants(effect.id, effect.shape)
+            for o in observations
+            for effect in effects
+        )
 
     def start(self, constants: Mapping[str, float] | None) -> FloatArray:
         x = self._packed(self.first)
@@ -221,7 +227,7 @@ class _Problem:
         out[: self.rows, :fixed] = -self._fixed
         out[self.rows + np.arange(fixed), np.arange(fixed)] = 1.0
         shapes = self._is_shape()
-        for k in range(fixed, size):
+        for k in range(0 if self._entangled else fixed, size):
             step = np.zeros(size)
             step[k] = _SHAPE_STEP
             up, down = self.clipped(x + step), self.clipped(x - step)
@@ -229,7 +235,8 @@ class _Problem:
             if width > 0.0:
                 change = self.residual(up)[: self.rows] - self.residual(down)[: self.rows]
                 out[: self.rows, k] = change / width
-            out[self.rows + k, k] = 1.0 if shapes[k - fixed] else 0.0
+            if k >= fixed:
+                out[self.rows + k, k] = 1.0 if shapes[k - fixed] else 0.0
         return out
 
     def _is_shape(self) -> FloatArray:

@@ -32,6 +32,8 @@ AVERAGING_TIMES_S = (10.0, 100.0, 3000.0)
 NOISE_MATTERS = 0.1
 """Change of an Allan variance's logarithm from which a search is done again."""
 MOST_DRAWS = 4
+MOST_LINEARISED, BETTER = 2, 2.0
+"""How often effects on inputs are linearised again, and by how much that has to be better [nats]."""
 REACH = 100.0
 """How far behind a trial with known noise may be so that its noise is fitted again beside it [nats]."""
 
@@ -157,7 +159,13 @@ def _again(
     on_inputs = not alone and _act_on_inputs(candidates, trial.ranking)
     if not (_differ(p.noise, again.noise) or on_inputs):
         return []
-    return [_trial(again, candidates, values, tell)]
+    found = [_trial(again, candidates, values, tell)]
+    while on_inputs and len(found) < MOST_LINEARISED and found[-1].log_joint > trial.log_joint + BETTER:
+        # The constants may not have come all the way: those that coarse sensors hide do so by and by.
+        trial = found[-1]
+        values = fit_named(again, candidates, trial.search, trial.ranking).constants
+        found.append(_trial(again, candidates, values, tell))
+    return found
 
 
 def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatArray]:

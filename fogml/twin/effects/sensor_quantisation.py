@@ -54,7 +54,14 @@ class SensorQuantisation(SensorEffect):
 
     def in_hindsight(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per degC of the step [deg/h], shape (n,), with what readings tell that came later."""
-        return unseen(inputs, self.id, lambda name: self._hidden_in_hindsight(name, inputs))
+
+        def hidden(name: str) -> FloatArray:
+            key = f"{self.id} in hindsight: {inputs.place(name)}"
+            if key not in inputs.cache:
+                inputs.cache[key] = self._hidden_in_hindsight(name, inputs)
+            return inputs.cache[key]
+
+        return unseen(inputs, self.id, hidden)
 
     def sense(
         self, name: str, temperature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
