@@ -11,12 +11,15 @@ from fogml.gap.frame import Frame
 from fogml.gap.model import Candidate, drawn_per_run
 from fogml.gap.priors import plausible_lengths
 from fogml.gap.screening import Screening
-from fogml.gap.shapes import Node, grid
+from fogml.gap.shapes import Node, finer, grid
 from fogml.runs.run import FloatArray
 
 MOST_NODES = 16
 """Nodes that are kept of a candidate with more: those that fit best."""
 SEARCHED_FROM = 40
+MOST_LINES_REFINED = 2
+"""Lines of a candidate that are told more finely; of other candidates it is one node."""
+_APART_CYCLES = 1.0
 LARGEST_RANK = 4
 _KEPT = 2e-3
 LEAST_SHARE = 0.01
@@ -71,19 +74,21 @@ def candidate_columns(
     nodes = grid(candidate, grade, lambda s: widest.response(candidate.id, s, frame.values), frame.spans)
     count = len(nodes)
     lines, middle = screening.lines(nodes)
-    nodes = tuple(nodes[i] for i in (*lines, *([] if middle is None else [middle])))
-    columns = frame.responses(candidate.id, [shape for node in nodes for shape in node.draws])
-    if not np.any(columns):
-        return []
     apart = frame.runs if drawn_per_run(candidate) and len(frame.runs) > 1 else []
-    widths = [len(node.draws) for node in nodes]
-    starts = np.cumsum([0, *widths])[:-1]
+    tried = _Tried(candidate, frame, screening, apart, [nodes[i] for i in lines])
+    if not np.any(tried.columns):
+        return []
+    tried.refine(nodes)
+    if middle is not None:
+        tried.add(nodes[middle])
+    columns, starts = tried.columns, tried.starts
     usual = abs(candidate.amplitude.typical(grade))  # type: ignore[arg-type]
     signed = candidate.amplitude.signed or candidate.amplitude.range(grade)[0] < 0.0  # type: ignore[arg-type]
     found = []
-    for i, stands_for in _kept(columns, starts.tolist(), apart, screening, count, middle is not None):
-        part = columns[:, starts[i] : starts[i] + widths[i]]
-        mix = nodes[i].mix
+    for i, stands_for in _kept(tried, count, middle is not None):
+        node = tried.nodes[i]
+        part = columns[:, starts[i] : starts[i] + len(node.draws)]
+        mix = node.mix
         if apart:
             part = np.concatenate([_only(part, run) for run in apart], axis=1)
             mix = np.asarray(np.kron(np.eye(len(apart)), mix), dtype=np.float64)
@@ -97,36 +102,84 @@ def candidate_columns(
         one_way = basis.shape[1] == 1 and not signed
         if one_way and basis[:, 0] @ part[:, 0] < 0.0:
             basis = -basis
-        node = NodeColumns(candidate.id, nodes[i], (), 1.0 / length, usual * length, weights, int(one_way))
-        found.append((node, basis))
+        sign = int(one_way)
+        found.append(
+            (NodeColumns(candidate.id, node, (), 1.0 / length, usual * length, weights, sign), basis)
+        )
     return found
 
 
-def _kept(
-    columns: FloatArray,
-    starts: Sequence[int],
-    apart: Sequence[slice],
-    screening: Screening,
-    count: int,
-    has_middle: bool,
-) -> list[tuple[int, int]]:
+class _Tried:
+    """Nodes of a candidate with their columns, and how many of its grid each stands for."""
+
+    def __init__(
+        self,
+        candidate: Candidate,
+        frame: Frame,
+        screening: Screening,
+        apart: Sequence[slice],
+        nodes: list[Node],
+    ) -> None:
+        self._candidate, self._frame, self._screening, self._apart = candidate, frame, screening, apart
+        self.nodes, self.shares = nodes, [1.0] * len(nodes)
+        self.columns = self._responses(nodes)
+
+    @property
+    def starts(self) -> list[int]:
+        """First column of each node."""
+        return [0, *np.cumsum([len(node.draws) for node in self.nodes])[:-1].tolist()]
+
+    def gains(self) -> list[FloatArray]:
+        """Gain of each node in nats, shape (nodes,), beside each of what the screening holds."""
+        parts = [_only(self.columns, run) for run in self._apart] if self._apart else [self.columns]
+        return [
+            np.asarray(np.sum(gain, axis=0))
+            for gain in zip(*(self._screening.gains(part, self.starts) for part in parts))
+        ]
+
+    def refine(self, grid: Sequence[Node]) -> None:
+        """Part the nodes that stand out: a strong effect is told to less than a whole grid can afford."""
+        if len(grid) == 1:
+            return
+        lines = np.array([np.nan if n.frequency_hz is None else n.frequency_hz for n in self.nodes])
+        best: set[int] = set()
+        for gain in self.gains():
+            for _ in range(1 if np.isnan(lines).any() else MOST_LINES_REFINED):
+                best.add(int(np.argmax(gain)))
+                near = np.abs(lines - lines[int(np.argmax(gain))]) * self._frame.spans["s"] < _APART_CYCLES
+                gain = np.where(near, -np.inf, gain)
+        for i in sorted(best, reverse=True):
+            parts = finer(self._candidate, grid, self.nodes[i])
+            self.nodes[i : i + 1], self.shares[i : i + 1] = parts, [1.0 / len(parts)] * len(parts)
+        self.columns = self._responses(self.nodes)
+
+    def add(self, node: Node) -> None:
+        """One node more, at the end."""
+        self.nodes.append(node)
+        self.shares.append(1.0)
+        self.columns = np.concatenate([self.columns, self._responses([node])], axis=1)
+
+    def _responses(self, nodes: Sequence[Node]) -> FloatArray:
+        return self._frame.responses(self._candidate.id, [shape for node in nodes for shape in node.draws])
+
+
+def _kept(tried: _Tried, count: int, has_middle: bool) -> list[tuple[int, float]]:
     """The nodes that fit best, of many, and the middle one of the others, with how many each stands for.
 
     Without the middle one an effect would count for less where the nodes are all alike. It is the last node
     where `has_middle`; `count` is the number of nodes before any was left out.
     """
-    places = list(range(len(starts)))
+    places = list(range(len(tried.nodes)))
     middle = places.pop() if has_middle else None
     if len(places) > SEARCHED_FROM:
-        parts = [_only(columns, run) for run in apart] if apart else [columns]
-        gains = [np.sum(gain, axis=0) for gain in zip(*(screening.gains(part, starts) for part in parts))]
+        gains = tried.gains()
         best = {i for gain in gains for i in np.argsort(gain[: len(places)])[::-1][:MOST_NODES].tolist()}
         if middle is None:
             others = [i for i in np.argsort(np.sum(gains, axis=0)).tolist() if i not in best]
             middle = others[len(others) // 2] if others else None
         places = sorted(best)
-    kept = [(i, 1) for i in places]
-    return kept if middle is None else [*kept, (middle, count - len(places))]
+    kept = [(i, tried.shares[i]) for i in places]
+    return kept if middle is None else [*kept, (middle, count - sum(share for _, share in kept))]
 
 
 def _only(columns: FloatArray, run: slice) -> FloatArray:

@@ -11,7 +11,7 @@ from fogml.gap.frame import Frame
 from fogml.gap.shapes import Node
 from fogml.runs.run import FloatArray
 
-MOST_LINES_TRIED = 40
+MOST_LINES_TRIED = 28
 _FINER = 4
 
 

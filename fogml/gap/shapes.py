@@ -23,6 +23,10 @@ NODES = {1: 9, 2: 5, 3: 4}
 """Nodes for each parameter that needs a grid, by how many there are."""
 CYCLES_BETWEEN_NODES = 0.3
 """A line's frequency is known to this many cycles over the longest run."""
+FINER_LINE, FINER = 5, {1: 3, 2: 3, 3: 2}
+"""What a node that stands out is parted into: a line, others along each parameter that needs a grid."""
+WHOLE = ("harmonic",)
+"""Parameters that are whole numbers."""
 MOST_LINES = 6000
 AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
@@ -91,6 +95,59 @@ def grid(
     return _grid(candidate, grade, response, spans)
 
 
+def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:
+    """A node parted into several nearby ones, which share what it stands for.
+
+    Parameters
+    ----------
+    candidate
+        The candidate.
+    nodes
+        Its grid.
+    node
+        One of it.
+    """
+    declared = {q.name: q for q in candidate.shape}
+    axes = {name: sorted({n.shape[name] for n in nodes}) for name in node.shape}
+    bent = [name for name, values in axes.items() if len(values) > 1 and name not in WHOLE]
+    parts = FINER_LINE if node.frequency_hz is not None else FINER.get(len(bent), 1)
+    places = (np.arange(parts) + 0.5) / parts - 0.5
+    near = [_about(declared.get(name), axes[name], node.shape[name], places) for name in bent]
+    found = []
+    for values in product(*near):
+        at = dict(zip(bent, values))
+        shape = {**node.shape, **at}
+        draws = tuple({**draw, **at} for draw in node.draws)
+        frequency = _frequency(
+            [declared[n] for n in bent if n in declared], [at[n] for n in bent if n in declared]
+        )
+        found.append(replace(node, shape=shape, draws=draws, frequency_hz=frequency))
+    return tuple(found)
+
+
+def _about(
+    quantity: Quantity | None, values: Sequence[float], value: float, places: FloatArray
+) -> list[float]:
+    """Values about one of an axis, at shares of the way to its neighbours; none beyond the axis' ends."""
+    inverse = quantity is not None and is_line(quantity) and "period" in quantity.name
+    geometric = not inverse and values[0] > 0.0 and _is_geometric(values)
+    to, back = (
+        (np.log, np.exp) if geometric else (np.reciprocal, np.reciprocal) if inverse else (np.copy, np.copy)
+    )
+    axis = np.sort(to(np.array(values, dtype=np.float64)))
+    middle = float(to(np.float64(value)))
+    i = int(np.argmin(np.abs(axis - middle)))
+    below, above = axis[max(i - 1, 0)], axis[min(i + 1, len(axis) - 1)]
+    moved = middle + np.where(places < 0.0, (middle - below) * places, (above - middle) * places)
+    return sorted({float(x) for x in back(moved)})
+
+
+def _is_geometric(values: Sequence[float]) -> bool:
+    """Whether an axis is evenly spaced in the logarithm."""
+    steps = np.diff(np.log(values))
+    return bool(np.ptp(steps) < 1e-6 * steps.max())
+
+
 def _grid(
     candidate: Candidate, grade: str, response: Response, spans: Mapping[str, float]
 ) -> tuple[Node, ...]:
@@ -140,7 +197,7 @@ def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]
     low, high = quantity.range(grade)  # type: ignore[arg-type]
     if is_line(quantity):
         return _lines(quantity, low, high, spans)
-    if quantity.name == "harmonic":
+    if quantity.name in WHOLE:
         return [float(x) for x in np.arange(math.ceil(low), math.floor(high) + 1)]
     if quantity.unit == "degC" and "temperature" in quantity.name:
         # A place on the temperature scale is told to a fraction of what happens there.
