@@ -148,16 +148,23 @@ class _Tried:
                 best.add(int(np.argmax(gain)))
                 near = np.abs(lines - lines[int(np.argmax(gain))]) * self._frame.spans["s"] < _APART_CYCLES
                 gain = np.where(near, -np.inf, gain)
-        for i in sorted(best, reverse=True):
+        for i in best:
+            # The first part takes the node's place, the others go to the end.
             parts = finer(self._candidate, grid, self.nodes[i])
-            self.nodes[i : i + 1], self.shares[i : i + 1] = parts, [1.0 / len(parts)] * len(parts)
-        self.columns = self._responses(self.nodes)
+            self.nodes[i], self.shares[i] = parts[0], 1.0 / len(parts)
+            columns = self._responses(parts)
+            own = slice(self.starts[i], self.starts[i] + len(parts[0].draws))
+            self.columns[:, own] = columns[:, : own.stop - own.start]
+            self._append(parts[1:], columns[:, own.stop - own.start :], 1.0 / len(parts))
 
     def add(self, node: Node) -> None:
         """One node more, at the end."""
-        self.nodes.append(node)
-        self.shares.append(1.0)
-        self.columns = np.concatenate([self.columns, self._responses([node])], axis=1)
+        self._append([node], self._responses([node]), 1.0)
+
+    def _append(self, nodes: Sequence[Node], columns: FloatArray, share: float) -> None:
+        self.nodes.extend(nodes)
+        self.shares.extend([share] * len(nodes))
+        self.columns = np.concatenate([self.columns, columns], axis=1)
 
     def _responses(self, nodes: Sequence[Node]) -> FloatArray:
         return self._frame.responses(self._candidate.id, [shape for node in nodes for shape in node.draws])

@@ -40,7 +40,7 @@ class RowResponses:
         self._observation = observation
         self._settled: dict[str, OnMeans | None] = {}
         self._finer: dict[int, OnMeans] = {}
-        self._kept: dict[str, tuple[list[Mapping[str, float]], FloatArray]] = {}
+        self._kept: dict[str, list[tuple[list[Mapping[str, float]], FloatArray]]] = {}
 
     @property
     def on_means(self) -> frozenset[str]:
@@ -64,18 +64,18 @@ class RowResponses:
 
         Those that stay as they are at other constants are kept.
         """
-        held = self._kept.get(id)
-        if held is not None and held[0] == shapes:
-            return held[1]
+        for before, kept in self._kept.get(id, ()):
+            if before == shapes:
+                return kept
         rows = np.column_stack([self.of(id, shape, constants) for shape in shapes])
         model = self._observation.model
-        room = MOST_KEPT_BYTES - sum(other.nbytes for _, other in self._kept.values())
+        room = MOST_KEPT_BYTES - sum(kept.nbytes for sets in self._kept.values() for _, kept in sets)
         if (
             isinstance(model, Foreseeable)
             and rows.nbytes <= room
             and not any(model.depends_on_constants(id, shape) for shape in shapes)
         ):
-            self._kept[id] = list(shapes), rows
+            self._kept.setdefault(id, []).append((list(shapes), rows))
         return rows
 
     def _settle(self, id: str, constants: Mapping[str, float]) -> OnMeans | None:
