@@ -10,7 +10,7 @@ from fogml.gap.candidate_columns import candidate_columns
 from fogml.gap.model import EffectValue
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, plausible_lengths
 from fogml.gap.screening import Screening
-from fogml.gap.shapes import grid
+from fogml.gap.shapes import finer, grid
 from tests.gap.small_model import KINDS, MEANS, SmallModel, framed, noise_of, ramps, recorded
 
 MODEL = SmallModel()
@@ -98,6 +98,51 @@ def test_the_true_line_is_kept_of_many(period):
         gains.append(-float(np.sum(left**2)))
     best = found[int(np.argmax(gains))][0]
     assert abs(best.node.frequency_hz - 1.0 / period) < 0.5 / RUN.span_s
+
+
+def test_a_node_parts_within_what_it_stands_for():
+    nodes = grid_of("line")
+    frequencies = np.array([n.frequency_hz for n in nodes])
+    spacing = np.diff(frequencies).min()
+    parts = finer(KINDS["line"], nodes, nodes[7])
+    found = np.array(sorted(n.frequency_hz for n in parts))
+    np.testing.assert_allclose(
+        found - frequencies[7], spacing * np.array([-0.4, -0.2, 0.0, 0.2, 0.4]), atol=1e-9
+    )
+    np.testing.assert_allclose([1.0 / n.draws[0]["period"] for n in parts], [n.frequency_hz for n in parts])
+    # Along two axes, and none beyond the ends of either.
+    nodes = grid_of("bend")
+    ranges = {q.name: q.tactical for q in KINDS["bend"].shape}
+    inner = next(n for n in nodes if all(n.shape[name] not in ranges[name] for name in ranges))
+    assert len(finer(KINDS["bend"], nodes, inner)) == 9
+    for node in nodes:
+        for part in finer(KINDS["bend"], nodes, node):
+            assert all(low - 1e-9 <= part.shape[name] <= high + 1e-9 for name, (low, high) in ranges.items())
+
+
+def test_a_long_line_between_two_nodes_loses_nothing_to_the_grid():
+    nodes = grid_of("line")
+    middle = np.mean([nodes[30].frequency_hz, nodes[31].frequency_hz])
+    frame = with_line(1.0 / middle)
+
+    def held(columns):
+        columns = frame.without_constants(columns)
+        left = true - columns @ np.linalg.lstsq(columns, true, rcond=None)[0]
+        return 1.0 - float(left @ left) / float(true @ true)
+
+    shape = {"period": 1.0 / middle, "phase": 70.0}
+    true = frame.without_constants(frame.responses("line", [shape]))[:, 0]
+    plain = max(held(frame.responses("line", node.draws)) for node in nodes)
+    found = candidate_columns(KINDS["line"], frame, "tactical", Screening(frame, []))
+    assert max(held(columns) for _, columns in found) > 1.0 - 0.2 * (1.0 - plain) and plain < 0.99
+
+
+@pytest.mark.parametrize("id", ["line", "bend", "rippled", "cube"])
+def test_whatever_is_parted_or_left_out_all_nodes_together_weigh_one(id):
+    frame = with_line(771.0)
+    found = candidate_columns(KINDS[id], frame, "tactical", Screening(frame, []))
+    shares = [np.exp(n.log_weights - plausible_lengths(KINDS[id], n.size)) for n, _ in found]
+    np.testing.assert_allclose(np.sum(shares, axis=0), 1.0, rtol=1e-9)
 
 
 def test_nodes_that_are_left_out_count_through_the_middle_one(monkeypatch):

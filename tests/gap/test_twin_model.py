@@ -6,10 +6,14 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.gap.fitting import fit_model
 from fogml.gap.model import Candidate, EffectValue, NoisePrior
+from fogml.gap.observation import observe
+from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
 from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import STAND_INS
 from fogml.twin.nominal import NAMES
@@ -53,6 +57,28 @@ def test_output_is_the_twins_replay(on, run):
     values = (EffectValue("thermal_hysteresis", 0.2, {"half_width": 6.0}),)
     twin = TWIN.with_nominal(**VALUES).with_effect("thermal_hysteresis", 0.2, half_width=6.0)
     np.testing.assert_array_equal(on.output(VALUES, values), replay(twin, run))
+
+
+def test_constants_that_coarse_sensors_hide_are_found_with_what_the_sensors_miss(run):
+    """Steps of half a degree are as large as DeltaT itself: beside them its constant comes out small."""
+    true, rng = {**VALUES, "m": 2.0}, np.random.default_rng(5)
+    noise = NoiseModel(0.001, 1e-6, 1e-6)
+    clean = replay(TWIN.with_nominal(**true), run) + 0.02 * rng.standard_normal(len(run))
+    coarse = {name: 0.5 * np.rint(run.columns[name] / 0.5) for name in run.temperature_columns}
+    record = Run(name="coarse.csv", columns={**run.columns, **coarse, "gyro": clean}, facts=run.facts)
+    model = TwinModel(TWIN)
+    o = observe(record, model)
+    whiteners = (RunWhitener(noise, o, true, np.zeros(len(record))),)
+    alone = fit_model([o], whiteners, model.constants)
+    steps = (EffectValue("sensor_quantisation", 0.3, {}),)
+    fit = fit_model([o], whiteners, model.constants, steps, model.candidates(), start=alone.constants)
+    assert fit.square < 0.2 * alone.square
+    assert fit.effects[0].amplitude == pytest.approx(0.5, abs=0.03)
+    assert abs(fit.constants["m"] - 2.0) < 0.5 * abs(alone.constants["m"] - 2.0)
+    # It is the best there is, from wherever it starts.
+    again = fit_model([o], whiteners, model.constants, steps, model.candidates(), start=true)
+    assert fit.square == pytest.approx(again.square, rel=1e-4)
+    assert fit.constants["m"] == pytest.approx(again.constants["m"], abs=0.01)
 
 
 def left_share(on, base, id) -> float | None:
