@@ -15,7 +15,7 @@ from fogml.gap.left_out import doubted, with_look_alikes
 from fogml.gap.model import Candidate, GyroModel
 from fogml.gap.next_run import next_run
 from fogml.gap.preparing import Prepared, Progress, prepare
-from fogml.gap.realised import realised
+from fogml.gap.realised import lost_names, no_more_certain, realised
 from fogml.gap.reports import (
     candidate_evidence,
     constant_fits,
@@ -108,6 +108,9 @@ def _result(
     tell("fitting what was found")
     fit = fit_named(p, candidates, search, trial.ranking)
     ranking = realised(p, candidates, search, trial.ranking, fit)
+    lost = lost_names(trial.ranking, ranking)
+    if lost and ranking.named:
+        ranking = no_more_certain(ranking, trial.without(lost))
     if ranking.named != trial.ranking.named:
         fit = fit_named(p, candidates, search, ranking)
     found, fits = found_effects(candidates, search, ranking, fit)

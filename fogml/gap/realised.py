@@ -65,6 +65,29 @@ def realised(
     return replace(ranking, effects=tuple(effects), unknown=1.0 - known)
 
 
+def no_more_certain(ranking: Ranking, other: Ranking) -> Ranking:
+    """The ranking with no name more probable than in another one, and no unknown less so.
+
+    What was found beside an effect that turned out to be none was found beside the wrong thing.
+    """
+    known = {m: r.probability for r in reversed(other.effects) for m in r.members}
+
+    def less(r: Ranked) -> Ranked:
+        if r.chosen.candidate not in ranking.named:
+            return r
+        again = max((known[m] for m in r.members if m in known), default=0.0)
+        return replace(r, probability=min(r.probability, again))
+
+    effects = sorted((less(r) for r in ranking.effects), key=lambda r: -r.probability)
+    return replace(ranking, effects=tuple(effects), unknown=max(ranking.unknown, other.unknown))
+
+
+def lost_names(before: Ranking, after: Ranking) -> frozenset[str]:
+    """Ids that had a name before and are in no class that has one after."""
+    held = {m for r in after.effects if r.chosen.candidate in after.named for m in r.members}
+    return frozenset(before.named) - held
+
+
 def unrealised(
     candidates: Mapping[str, Candidate], search: Search, ranking: Ranking, fit: Fit
 ) -> dict[str, float]:

@@ -97,15 +97,19 @@ class Search:
     ----------
     field_
         Inner products of everything.
+    without
+        Ids of candidates that are in no set.
     """
 
     field_: Field
+    without: frozenset[str] = frozenset()
     _held: dict[tuple[frozenset[str], Rest], Explanation] = field(default_factory=dict)
 
     @cached_property
     def places(self) -> dict[str, np.ndarray]:
         """Nodes of each candidate."""
-        return by_candidate(self.field_.basis.nodes)
+        held = by_candidate(self.field_.basis.nodes)
+        return {id: nodes for id, nodes in held.items() if id not in self.without}
 
     @cached_property
     def _empty(self) -> float:

@@ -65,6 +65,11 @@ class Trial:
         rivals = _moved(others, -self._log_runs)
         return replace(self, ranking=_ranked(self.prepared, self.search, self.explanations, rivals))
 
+    def without(self, ids: frozenset[str]) -> Ranking:
+        """What the same evidence says where some candidates are none."""
+        search = Search(self.search.field_, ids)
+        return _ranked(self.prepared, search, search.run())
+
     @property
     def _log_runs(self) -> float:
         return self.log_joint - self.ranking.best.log_posterior

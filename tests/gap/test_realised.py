@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -12,7 +14,7 @@ from fogml.gap.found import fit_named
 from fogml.gap.frame import Frame
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
-from fogml.gap.realised import FORM_SHARE, realised, unrealised
+from fogml.gap.realised import FORM_SHARE, lost_names, no_more_certain, realised, unrealised
 from fogml.gap.search import Search
 from tests.gap.small_model import SmallModel, dense, noise_of, ramps, recorded
 
@@ -99,20 +101,18 @@ def test_what_is_brought_is_the_evidence_of_the_fitted_replay():
 
 def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
     """One that takes the place at 2 nats and brings its gain, before one that falls short of its own by 9."""
-    from dataclasses import replace as changed
-
     from fogml.gap import realised as module
 
     p, candidates, search, ranking, fit = searched(share=0.7)
     (mixture,) = ranking.effects
     whole = next(e for e in search.tried if e.ids == {"mixture"} and e.rest == "nothing")
-    cube = changed(
+    cube = replace(
         whole,
-        effects=(changed(whole.effects[0], candidate="cube"),),
+        effects=(replace(whole.effects[0], candidate="cube"),),
         log_posterior=whole.log_posterior - 2.0,
     )
     search._held[(frozenset({"cube"}), "nothing")] = cube
-    both = changed(ranking, effects=(changed(mixture, members=("mixture", "cube"), margin=12.0),))
+    both = replace(ranking, effects=(replace(mixture, members=("mixture", "cube"), margin=12.0),))
     lost = {"mixture": 9.0, "cube": 0.0}
     monkeypatch.setattr(module, "fit_named", lambda p, candidates, search, ranking: ranking)
     monkeypatch.setattr(
@@ -129,3 +129,32 @@ def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
     kept = realised(p, candidates, search, both, fit)
     assert [r.members for r in kept.effects] == [("mixture", "cube")]
     assert kept.effects[0].margin == pytest.approx(10.5)
+
+
+def test_what_was_found_beside_a_lost_name_is_no_more_certain_than_without_it():
+    ranking = searched(share=0.7)[3]
+    (mixture,) = ranking.effects
+    chosen = replace(mixture.chosen, candidate="cube")
+    cube = replace(mixture, chosen=chosen, members=("cube", "bend"), probability=0.9)
+    best = replace(ranking.best, effects=(mixture.chosen, chosen))
+    before = replace(ranking, best=best, effects=(replace(mixture, probability=0.8), cube), unknown=0.1)
+    after = replace(before, effects=(cube, replace(mixture, probability=0.3)), unknown=0.6)
+    assert lost_names(before, after) == {"mixture"}
+    # A class whose first member changed has lost nothing.
+    swapped = replace(cube, chosen=replace(chosen, candidate="bend"), members=("bend", "cube"))
+    best = replace(best, effects=(mixture.chosen, swapped.chosen))
+    changed = replace(before, best=best, effects=(before.effects[0], swapped))
+    assert lost_names(before, changed) == frozenset()
+    alone = replace(ranking, effects=(replace(cube, members=("bend",), probability=0.6),), unknown=0.7)
+    found = no_more_certain(after, alone)
+    assert [(r.chosen.candidate, r.probability) for r in found.effects] == [("cube", 0.6), ("mixture", 0.3)]
+    assert found.unknown == 0.7
+    assert no_more_certain(after, replace(alone, effects=(), unknown=0.2)).unknown == 0.6
+
+
+def test_a_search_without_a_candidate_never_names_it():
+    _, _, search, ranking, _ = searched(share=0.7)
+    assert ranking.named == {"mixture"}
+    without = Search(search.field_, frozenset({"mixture"}))
+    assert not any("mixture" in e.ids for e in without.run())
+    assert any("mixture" in e.ids for e in search.tried)
