@@ -16,9 +16,9 @@ from fogml.runs.run import FloatArray
 
 MOST_NODES = 16
 """Nodes that are kept of a candidate with more: those that fit best."""
-SEARCHED_FROM = 40
+SEARCHED_FROM = 48
 MOST_LINES_REFINED = 2
-"""Lines of a candidate that are told more finely; of other candidates it is one node."""
+"""Lines of a candidate that are parted, by each way to screen; of other candidates it is one node."""
 _APART_CYCLES = 1.0
 LARGEST_RANK = 4
 _KEPT = 2e-3
@@ -145,8 +145,10 @@ class _Tried:
         best: set[int] = set()
         for gain in self.gains():
             for _ in range(1 if np.isnan(lines).any() else MOST_LINES_REFINED):
-                best.add(int(np.argmax(gain)))
-                near = np.abs(lines - lines[int(np.argmax(gain))]) * self._frame.spans["s"] < _APART_CYCLES
+                first = int(np.argmax(gain))
+                if np.isfinite(gain[first]):
+                    best.add(first)
+                near = np.abs(lines - lines[first]) * self._frame.spans["s"] < _APART_CYCLES
                 gain = np.where(near, -np.inf, gain)
         for i in best:
             # The first part takes the node's place, the others go to the end.
@@ -174,7 +176,7 @@ def _kept(tried: _Tried, count: int, has_middle: bool) -> list[tuple[int, float]
     """The nodes that fit best, of many, and the middle one of the others, with how many each stands for.
 
     Without the middle one an effect would count for less where the nodes are all alike. It is the last node
-    where `has_middle`; `count` is the number of nodes before any was left out.
+    where `has_middle`; `count` is the number of nodes of the grid.
     """
     places = list(range(len(tried.nodes)))
     middle = places.pop() if has_middle else None

@@ -83,9 +83,14 @@ def no_more_certain(ranking: Ranking, other: Ranking) -> Ranking:
 
 
 def lost_names(before: Ranking, after: Ranking) -> frozenset[str]:
-    """Ids that had a name before and are in no class that has one after."""
-    held = {m for r in after.effects if r.chosen.candidate in after.named for m in r.members}
-    return frozenset(before.named) - held
+    """Ids of the classes that had a name before and have none after, whichever member is first."""
+    kept = _named_classes(after)
+    lost = _named_classes(before) - kept
+    return frozenset().union(*lost) - frozenset().union(*kept)
+
+
+def _named_classes(ranking: Ranking) -> set[frozenset[str]]:
+    return {frozenset(r.members) for r in ranking.effects if r.chosen.candidate in ranking.named}
 
 
 def unrealised(

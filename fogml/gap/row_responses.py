@@ -20,6 +20,8 @@ LARGEST_SHARE = 1e-3
 """A response taken on means differs by no more than this share of its rms from the mean response."""
 MOST_KEPT_BYTES = 160e6
 """Responses of a run that are kept for the next search."""
+MOST_OTHER_SETS = 2
+"""Sets of shapes of a candidate that are kept beside its grid: the latest."""
 PARTS = (1, 3, 9, 27)
 """Parts of a row that inputs are averaged over; the fewest that do are taken."""
 
@@ -75,7 +77,10 @@ class RowResponses:
             and rows.nbytes <= room
             and not any(model.depends_on_constants(id, shape) for shape in shapes)
         ):
-            self._kept.setdefault(id, []).append((list(shapes), rows))
+            sets = self._kept.setdefault(id, [])
+            sets.append((list(shapes), rows))
+            # The first set is the grid itself, which every search asks for.
+            del sets[1:-MOST_OTHER_SETS]
         return rows
 
     def _settle(self, id: str, constants: Mapping[str, float]) -> OnMeans | None:

@@ -2,7 +2,8 @@
 
 A shape parameter that the response depends on in proportion, and an angle, need no grid: what they
 can do is a few columns beside each other, with the second moments of their priors. The others get
-nodes close enough that a response between two of them is like one of both.
+nodes close enough that a response between two of them is like one of both; of a strong effect that is
+not near enough, and the nodes that stand out are parted.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Response = Callable[[Mapping[str, float]], FloatArray]
 NODES = {1: 9, 2: 5, 3: 4}
 """Nodes for each parameter that needs a grid, by how many there are."""
 CYCLES_BETWEEN_NODES = 0.3
-"""A line's frequency is known to this many cycles over the longest run."""
+"""Spacing of lines on a grid, in cycles over the longest run."""
 FINER_LINE, FINER = 5, {1: 3, 2: 3, 3: 2}
 """What a node that stands out is parted into: a line, others along each parameter that needs a grid."""
 WHOLE = ("harmonic",)
@@ -96,7 +97,7 @@ def grid(
 
 
 def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:
-    """A node parted into several nearby ones, which share what it stands for.
+    """A node parted into several nearby ones, which share what it stands for: a line's in frequency alone.
 
     Parameters
     ----------
@@ -110,7 +111,11 @@ def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node
     declared = {q.name: q for q in candidate.shape}
     axes = {name: sorted({n.shape[name] for n in nodes}) for name in node.shape}
     bent = [name for name, values in axes.items() if len(values) > 1 and name not in WHOLE]
-    parts = FINER_LINE if node.frequency_hz is not None else FINER.get(len(bent), 1)
+    lines = [name for name in bent if node.frequency_hz is not None and _is_in_time(declared.get(name))]
+    bent = lines or bent
+    if not bent:
+        return (node,)
+    parts = FINER_LINE if lines else FINER.get(len(bent), 1)
     places = (np.arange(parts) + 0.5) / parts - 0.5
     near = [_about(declared.get(name), axes[name], node.shape[name], places) for name in bent]
     found = []
@@ -118,9 +123,7 @@ def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node
         at = dict(zip(bent, values))
         shape = {**node.shape, **at}
         draws = tuple({**draw, **at} for draw in node.draws)
-        frequency = _frequency(
-            [declared[n] for n in bent if n in declared], [at[n] for n in bent if n in declared]
-        )
+        frequency = _frequency([declared[name] for name in lines], values)
         found.append(replace(node, shape=shape, draws=draws, frequency_hz=frequency))
     return tuple(found)
 
@@ -139,13 +142,15 @@ def _about(
     i = int(np.argmin(np.abs(axis - middle)))
     below, above = axis[max(i - 1, 0)], axis[min(i + 1, len(axis) - 1)]
     moved = middle + np.where(places < 0.0, (middle - below) * places, (above - middle) * places)
-    return sorted({float(x) for x in back(moved)})
+    # The node itself stays what it is to the last digit.
+    found = np.where(moved == middle, value, back(moved))
+    return sorted({float(x) for x in found})
 
 
 def _is_geometric(values: Sequence[float]) -> bool:
     """Whether an axis is evenly spaced in the logarithm."""
     steps = np.diff(np.log(values))
-    return bool(np.ptp(steps) < 1e-6 * steps.max())
+    return len(steps) > 1 and bool(np.ptp(steps) < 1e-6 * steps.max())
 
 
 def _grid(
@@ -170,9 +175,13 @@ def _grid(
 
 def _frequency(bent: Sequence[Quantity], values: Sequence[float]) -> float | None:
     for quantity, value in zip(bent, values):
-        if is_line(quantity) and quantity.unit in ("s", "Hz"):
+        if _is_in_time(quantity):
             return 1.0 / value if quantity.unit == "s" else value
     return None
+
+
+def _is_in_time(quantity: Quantity | None) -> bool:
+    return quantity is not None and is_line(quantity) and quantity.unit in ("s", "Hz")
 
 
 def is_angle(quantity: Quantity) -> bool:

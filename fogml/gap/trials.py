@@ -148,14 +148,14 @@ def _ranked(
 
 def _again(
     trial: Trial, candidates: Mapping[str, Candidate], tell: Progress, *, alone: bool = False
-) -> list[Trial]:
+) -> Iterator[Trial]:
     """The search with the noise fitted beside what a trial found; none where that changes nothing.
 
     What was taken for noise may have been the effect, and the constants may have made up for it.
     """
     p, best = trial.prepared, trial.ranking.best
     if not best.effects and best.unknown is None:
-        return []
+        return
     tell("fitting the noise beside what was found")
     values = p.recalibrated.constants
     if best.effects:
@@ -163,14 +163,14 @@ def _again(
     again = with_noise_beside(p, _explained(trial, candidates), alone=alone)
     on_inputs = not alone and _act_on_inputs(candidates, trial.ranking)
     if not (_differ(p.noise, again.noise) or on_inputs):
-        return []
-    found = [_trial(again, candidates, values, tell)]
-    while on_inputs and len(found) < MOST_LINEARISED and found[-1].log_joint > trial.log_joint + BETTER:
+        return
+    for _ in range(MOST_LINEARISED):
+        before, trial = trial.log_joint, _trial(again, candidates, values, tell)
+        yield trial
+        if not (on_inputs and trial.ranking.named and trial.log_joint > before + BETTER):
+            return
         # The constants may not have come all the way: those that coarse sensors hide do so by and by.
-        trial = found[-1]
         values = fit_named(again, candidates, trial.search, trial.ranking).constants
-        found.append(_trial(again, candidates, values, tell))
-    return found
 
 
 def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatArray]:

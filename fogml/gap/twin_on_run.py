@@ -101,7 +101,7 @@ class TwinOnRun:
     def _smooth(self, nodes: Mapping[str, FloatArray]) -> Inputs:
         held = {**nodes, **self._recorded.temperatures}
         smooth = {name: smoothed(self._run, t) for name, t in held.items()}
-        return replace(self._recorded, temperatures=smooth, cache={})
+        return replace(self._recorded, temperatures=smooth, sensors={}, cache={})
 
     @cached_property
     def _quiet_replayer(self) -> Replayer:

@@ -16,7 +16,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.signals.clock import GAP_INTERVALS, Clock
+from fogml.signals.clock import Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
 
@@ -38,8 +38,8 @@ def course_through_steps(time: FloatArray, values: FloatArray, step: float) -> F
     Parameters
     ----------
     time
-        Sample times [s], shape (n,), increasing; what lies apart by more than `GAP_INTERVALS` intervals
-        is a record of its own.
+        Sample times [s], shape (n,), increasing; what lies between gaps is a record of its own, and one of
+        a minute or less its own course.
     values
         The record, shape (n,).
     step
@@ -51,7 +51,7 @@ def course_through_steps(time: FloatArray, values: FloatArray, step: float) -> F
         In the unit of the record, shape (n,).
     """
     sample_s = Clock(time).sample_s
-    gaps = np.flatnonzero(np.diff(time) > GAP_INTERVALS * sample_s) + 1
+    gaps = gap_starts(time, sample_s)
     parts = zip(np.split(time, gaps), np.split(values, gaps))
     width = max(round(CELL_S / sample_s), 1) if sample_s > 0.0 else 1
     return np.concatenate([_course(t, v, step, width) for t, v in parts])
@@ -67,7 +67,8 @@ def _course(time: FloatArray, values: FloatArray, step: float, width: int) -> Fl
     counts = np.diff(np.append(starts, len(values)))
     middles = np.add.reduceat(time, starts) / counts
     base = values[0]
-    readings = np.add.reduceat(values - base, starts) / counts / step
+    # Readings of one stair are equal, whatever rounding makes of their means.
+    readings = np.round(np.add.reduceat(values - base, starts) / counts / step, 9)
     smooth = _within_bounds(readings, (SMOOTHED_S * (cells - 1) / (middles[-1] - middles[0])) ** (2 * _ORDER))
     if width > 1:
         from scipy.interpolate import CubicSpline

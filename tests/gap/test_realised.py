@@ -140,6 +140,9 @@ def test_what_was_found_beside_a_lost_name_is_no_more_certain_than_without_it():
     before = replace(ranking, best=best, effects=(replace(mixture, probability=0.8), cube), unknown=0.1)
     after = replace(before, effects=(cube, replace(mixture, probability=0.3)), unknown=0.6)
     assert lost_names(before, after) == {"mixture"}
+    # None of a class that is lost takes its place.
+    two = replace(before, effects=(replace(before.effects[0], members=("mixture", "other", "bend")), cube))
+    assert lost_names(two, after) == {"mixture", "other"}
     # A class whose first member changed has lost nothing.
     swapped = replace(cube, chosen=replace(chosen, candidate="bend"), members=("bend", "cube"))
     best = replace(best, effects=(mixture.chosen, swapped.chosen))

@@ -164,6 +164,20 @@ def test_responses_that_stay_as_they_are_are_kept_for_other_constants(run, monke
     assert not np.allclose(o.responses.at("hidden_thermal_node", [changed], VALUES), other)
 
 
+def test_of_other_shapes_than_the_first_the_latest_are_kept(run, monkeypatch):
+    o = observe(run, MODEL, largest_rows=1000)
+    sets = [[{"time_constant": 100.0 * k}] for k in range(1, 6)]
+    for shapes in sets:
+        o.responses.at("hidden_thermal_node", shapes, VALUES)
+    asked = []
+    monkeypatch.setattr(type(o.responses), "of", lambda on, id, shape, values: asked.append(shape) or o.time)
+    for shapes in (sets[0], sets[3], sets[4]):
+        o.responses.at("hidden_thermal_node", shapes, VALUES)
+    assert not asked
+    o.responses.at("hidden_thermal_node", sets[1], VALUES)
+    assert asked == sets[1]
+
+
 def test_no_more_responses_are_kept_than_there_is_room_for(run, monkeypatch):
     from fogml.gap import row_responses
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.special import logsumexp
@@ -10,7 +12,8 @@ from fogml.gap.candidate_columns import candidate_columns
 from fogml.gap.model import EffectValue
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, plausible_lengths
 from fogml.gap.screening import Screening
-from fogml.gap.shapes import finer, grid
+from fogml.gap.shapes import AT_AMPLITUDE, Node, finer, grid
+from fogml.twin.quantities import Quantity
 from tests.gap.small_model import KINDS, MEANS, SmallModel, framed, noise_of, ramps, recorded
 
 MODEL = SmallModel()
@@ -118,6 +121,15 @@ def test_a_node_parts_within_what_it_stands_for():
     for node in nodes:
         for part in finer(KINDS["bend"], nodes, node):
             assert all(low - 1e-9 <= part.shape[name] <= high + 1e-9 for name, (low, high) in ranges.items())
+
+
+def test_what_is_whole_is_not_parted_and_what_has_a_sign_keeps_it():
+    harmonic = Quantity("harmonic", "1", (1.0, 8.0), (1.0, 8.0), "of the table")
+    nodes = [Node({"harmonic": float(k)}, ({"harmonic": float(k)},)) for k in range(1, 9)]
+    assert finer(SimpleNamespace(shape=(harmonic,)), nodes, nodes[3]) == (nodes[3],)
+    about = [Node({AT_AMPLITUDE: a}, ({AT_AMPLITUDE: a},)) for a in (-60.0, -10.0, 0.1, 10.0, 60.0)]
+    parts = finer(SimpleNamespace(shape=()), about, about[1])
+    np.testing.assert_allclose([n.draws[0][AT_AMPLITUDE] for n in parts], [-10 - 50 / 3, -10, -10 + 10.1 / 3])
 
 
 def test_a_long_line_between_two_nodes_loses_nothing_to_the_grid():

@@ -146,6 +146,17 @@ def test_a_mean_of_coarse_sensors_hides_what_each_of_them_hides() -> None:
     assert np.std(found - hidden) < 0.2 * np.std(hidden)
 
 
+def test_a_fine_sensor_beside_a_coarse_one_hides_next_to_nothing() -> None:
+    declared = sensor("sensor_quantisation")
+    time = np.arange(0.0, 36_000.0, 10.0)
+    true = 20.0 + 30.0 * np.sin(2.0 * np.pi * time / 14_400.0)
+    columns = {"T1": 0.5 * np.rint(true / 0.5), "T2": true, "T3": true, "T4": true}
+    inputs, _ = inputs_of_run(Run(name="mixed.csv", columns={"time": time, "gyro": 0.0 * time, **columns}))
+    found = 0.5 * declared.in_hindsight(replace(inputs, slopes={"T_in": np.ones(len(time))}))
+    hidden = true - inputs.temperature("T_in")
+    assert np.std(found - hidden) < 0.25 * np.std(hidden)
+
+
 def test_unrounded_temperature_is_put_to_the_usual_step() -> None:
     given = replace(truth(), slopes={"T": np.ones(len(TIME))})
     declared = sensor("sensor_quantisation")

@@ -83,7 +83,7 @@ class TrueEffect(_Part):
     shape
         Parameters of the reality's form.
     d_prime
-        ``||W (I - P) s||`` over all fit runs, of this effect's contribution alone.
+        ``||W (I - P) s||`` over all fit runs, of this effect's contribution where nothing else acts.
     """
 
     id: str | None

@@ -27,8 +27,8 @@ class SensorQuantisation(SensorEffect):
     q is the amplitude: 0.0625 degC (DS18B20), 0.01 or 0.001 degC. The signature is what a step hides, times
     the nominal output's slope. Of a rounded record it is told by double exponential smoothing, which follows
     a steady ramp without delay; its step is the smallest change so far. In hindsight it is told by the
-    smoothest course that runs through the steps. A record that is not rounded is put to steps of 0.0625
-    degC.
+    smoothest course that runs through each sensor's steps. A record that is not rounded is put to steps of
+    0.0625 degC.
 
     Source: rounding (derived); R. G. Brown, Smoothing, Forecasting and Prediction (1963), for the smoothing;
     data sheets of sensors (literature).
@@ -88,13 +88,14 @@ class SensorQuantisation(SensorEffect):
         return np.where(step < FINEST_STEP_DEGC, usual - np.rint(usual), within)
 
     def _hidden_in_hindsight(self, name: str, inputs: Inputs) -> FloatArray:
-        """The same where the whole record is known, the mean of all sensors at a place."""
+        """The same where the whole record is known: of all sensors at a place, in steps of the coarsest."""
         readings = inputs.readings(name)
         steps = [recorded_step(values) for values in readings]
-        if min(steps) < FINEST_STEP_DEGC:
+        if max(steps) < FINEST_STEP_DEGC:
             return self._hidden(name, inputs)
         hidden = [
-            (course_through_steps(inputs.time, values, step) - values) / step
+            course_through_steps(inputs.time, values, step) - values
             for values, step in zip(readings, steps)
+            if step >= FINEST_STEP_DEGC
         ]
-        return np.asarray(np.mean(hidden, axis=0))
+        return np.asarray(np.sum(hidden, axis=0) / len(readings) / max(steps))

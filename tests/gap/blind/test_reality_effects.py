@@ -19,7 +19,7 @@ from fogml.gap.blind.reality.form import Form
 from fogml.gap.blind.reality.noise import record_length
 from fogml.gap.blind.reality.reckoning import Reckoning
 from fogml.gap.blind.reality.recurrences import bouc_wen, lag, play, recurrence
-from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, before, recorded
+from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, acting_before, recorded
 from fogml.gap.blind.reality.unit import Unit, compatible, draw_unit
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.nominal import NominalConstants
@@ -97,7 +97,7 @@ def test_contributions_of_effects_on_the_sensors_add_up_to_what_a_replay_lacks()
     lag_of = scales.with_strength(made, {"second_share": 0.3}, 1.0, 20.0)
     # In the case's order the reading comes first; in the sensor it comes last.
     both = (steps, lag_of)
-    assert before(both, steps) == (lag_of,) and before(both, lag_of) == ()
+    assert acting_before(both, steps) == (lag_of,) and acting_before(both, lag_of) == ()
     run = unit.fit[0]
     found = Reckoning(scales, both).contributions
     replayed = [nominal.output(unit.constants, unit.seen(run, recorded(unit, run, e))) for e in ((), both)]

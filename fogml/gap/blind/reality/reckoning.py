@@ -9,7 +9,7 @@ import numpy as np
 from fogml.gap.blind.reality import nominal
 from fogml.gap.blind.reality.form import Additive, Distorting
 from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.strength import Acting, Scales, before, recorded
+from fogml.gap.blind.reality.strength import Acting, Scales, acting_before, recorded
 from fogml.gap.blind.reality.unit import Unit, UnitRun
 from fogml.gap.blind.reality.whitening import Projected
 
@@ -45,7 +45,7 @@ class Reckoning:
         self._width = max(round(AVERAGING_S / unit.sample_s), 1)
         self._projected = scales.projected(effects)
         self.contributions = {
-            (run.name, place): effect.contribution(unit, run, before(effects, effect))
+            (run.name, place): effect.contribution(unit, run, acting_before(effects, effect))
             for run in unit.runs
             for place, effect in enumerate(effects)
         }

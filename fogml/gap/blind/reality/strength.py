@@ -47,11 +47,14 @@ class Acting:
     @property
     def reads(self) -> bool:
         """Whether it makes a sensor's value a reading, after whatever falsifies what the sensor feels."""
-        return type(self.form).read is not Sensing.read if isinstance(self.form, Sensing) else False
+        return isinstance(self.form, Sensing) and type(self.form).read is not Sensing.read
 
 
-def before(effects: tuple[Acting, ...], effect: Acting) -> tuple[Acting, ...]:
-    """Those of all effects on the sensors that act before one of them."""
+def acting_before(effects: tuple[Acting, ...], effect: Acting) -> tuple[Acting, ...]:
+    """Those of all effects on the sensors that act before one of them.
+
+    Each changes what a sensor feels or what it gives, and none both.
+    """
     chain = sorted((e for e in effects if isinstance(e.form, Sensing)), key=lambda e: e.reads)
     return tuple(chain[: chain.index(effect)]) if effect in chain else ()
 
