@@ -83,9 +83,9 @@ def _page(rows: Sequence[Row], cases: int) -> str:
         "constants and ordinary sensors' errors, that the best node of the catalogue's form holds; and what "
         f"is lost with the rest. Where more than {NATS:g} nats are lost, another name may be as good.",
         "",
-        "What coarse sensors (`sensor_quantisation`) truly add is taken from the second reality's own replay, "
-        "whose windows of the temperature difference are not the twin's: of the gap that a diagnosis sees, the "
-        "form holds more.",
+        "What coarse sensors (`sensor_quantisation`) truly add is taken from the second reality's own "
+        "replay, whose windows of the temperature difference are not the twin's: of the gap that a "
+        "diagnosis sees, the form holds more.",
         "",
         f"| effect | effects | median share held | least | median nats lost | more than {NATS:g} lost |",
         "|---|---:|---:|---:|---:|---:|",
