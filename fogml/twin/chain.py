@@ -158,7 +158,10 @@ def _unseen(twin: Twin, inputs: Inputs, nominal_inputs: Inputs, signature: Signa
             if slopes is None:
                 slopes = temperature_slopes(nominal_inputs, twin.nominal)
             given = replace(inputs, slopes=slopes)
-            total += setting.amplitude * signature(declared, setting, given)
+            amplitude = setting.amplitude
+            if isinstance(declared, SensorEffect):
+                amplitude = declared.replayed_amplitude(amplitude)
+            total += amplitude * signature(declared, setting, given)
     return total
 
 

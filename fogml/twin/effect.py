@@ -181,6 +181,10 @@ class SensorEffect(Effect):
     ) -> FloatArray:
         """What the sensor `name` gives [degC] where its place has `temperature` [degC]; shape (n,)."""
 
+    def replayed_amplitude(self, amplitude: float) -> float:
+        """What the signature is multiplied by where the inputs are what falsified sensors gave."""
+        return amplitude
+
 
 class LoggerEffect(Effect):
     """Falsifies the recording: clocks and columns."""

@@ -14,7 +14,8 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
 from fogml.twin.registry import effect
-from fogml.twin.replay import inputs_of_run
+from fogml.twin.replay import inputs_of_run, replay
+from fogml.twin.twin_file import load_twin
 
 TIME = np.arange(0.0, 14_400.0)
 CONSTANTS = NominalConstants(e0=100.0, k1=30.0, k2=0.3, b0=1.0, b1=0.03, b2=4e-4, g=0.4)
@@ -165,6 +166,24 @@ def test_unrounded_temperature_is_put_to_the_usual_step() -> None:
     # It is known to be unrounded once it has changed by less than any sensor's step.
     later = TIME > 2500.0
     assert found[later] == pytest.approx((given.temperatures["T"] - rounded)[later], abs=1e-9)
+
+
+@pytest.mark.parametrize("share", [0.1, 0.4, 0.7])
+def test_a_replay_from_sensors_that_feel_the_case_finds_the_place_again(share: float) -> None:
+    """T = T_s + A / (1 - A) (T_s - T_case) by the mix itself; through a bias that is a straight line."""
+    given = replace(truth(), table_rate=np.zeros(len(TIME)))
+    recorded = shown(sensor("sensor_placement"), given, share)
+    run = Run(
+        name="mixed.csv",
+        columns={"time": TIME, "gyro": np.zeros(len(TIME)), **recorded.temperatures},
+    )
+    twin = load_twin("nominal").with_nominal(b1=0.03, g=0.4, e0=0.0, b0=0.0)
+    found = replay(twin.with_effect("sensor_placement", share), run)
+    straight = NominalConstants(b1=0.03, g=0.4)
+    wanted, trusting = bias_deg_h(given, straight), bias_deg_h(recorded, straight)
+    late = TIME > 200.0
+    assert np.abs(wanted - trusting)[late].max() > 0.01
+    assert found[late] == pytest.approx(wanted[late], abs=1e-6)
 
 
 def test_placement_needs_a_case_of_its_own() -> None:

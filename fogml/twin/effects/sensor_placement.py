@@ -8,6 +8,9 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 from fogml.twin.responses import unseen
 
+_LARGEST_SHARE = 0.95
+"""Of sensors that show hardly more than the case, nothing tells what they sit on."""
+
 
 class SensorPlacement(SensorEffect):
     """Sensors on the coil that feel the case as well.
@@ -47,3 +50,7 @@ class SensorPlacement(SensorEffect):
         if name in ("T_case", "T_chamber"):
             return temperature
         return temperature + amplitude * (inputs.temperature("T_case") - temperature)
+
+    def replayed_amplitude(self, amplitude: float) -> float:
+        """A / (1 - A): what is left of T - T_case in what the sensors show is 1 - A of it."""
+        return amplitude / (1.0 - min(amplitude, _LARGEST_SHARE))

@@ -193,3 +193,14 @@ def test_worst_first_and_right_ones_not_at_all() -> None:
     listed = worst([right, wrong, failed], "diagnosis")
     assert [one["verdict"] for one in listed] == ["failed", "explained"]
     assert listed[1]["wrong"] == "names a"
+
+
+@pytest.mark.parametrize(("parameter", "covered"), [("phase", True), ("wander", True), ("slope", False)])
+def test_a_line_of_any_phase_has_no_sign(parameter: str, covered: bool) -> None:
+    """The true amplitude is -1.05 with some phase, the fitted one 1.1 with another."""
+    true = truth("one", "a")
+    effect = true.effects[0].model_copy(
+        update={"amplitude": Amount(value=-1.05, unit="deg/h"), "shape": {parameter: 0.1}}
+    )
+    found = mark(true.model_copy(update={"effects": (effect,)}), answer(("a", 0.9)))
+    assert found.amplitude_covered == (covered,)

@@ -198,8 +198,8 @@ def _closed_covered(truth: Truth, gap: Gap) -> tuple[bool, ...]:
 def _amplitude_covered(truth: Truth, which: tuple[Listed, ...]) -> tuple[bool, ...]:
     """For named effects that are true themselves, where units and forms compare."""
     true = {effect.id: effect.amplitude for effect in truth.known}
-    # (A, phase) and (-A, phase + 180 deg) are the same effect.
-    turning = {effect.id for effect in truth.known if {"phase", "direction"} & set(effect.shape)}
+    # (A, phase) and (-A, phase + 180 deg) are the same effect, whether or not the truth states the phase.
+    turning = {e.id for e in truth.known if {"phase", "direction", "wander"} & set(e.shape)}
     covered = []
     for item in which:
         fitted, value = item.amplitude, true.get(item.effect)

@@ -92,9 +92,9 @@ class DeadZone(Distorting):
 
 
 class Skew(Distorting):
-    """Samples that carry the time of later ones; the skew grows."""
+    """Samples that carry the time of later ones; the skew grows, so that no one number of it compares."""
 
-    name, stage, form, unit = "logger_skew", "logger", "growing skew", "s"
+    name, stage, form = "logger_skew", "logger", "growing skew"
     greatest: ClassVar[float] = 300.0
 
     def draw(self, rng: np.random.Generator) -> Shape:
