@@ -225,8 +225,8 @@ class _Problem:
         fixed, size = len(self.constants), len(x)
         out = np.zeros((self.rows + size, size))
         out[: self.rows, :fixed] = -self._fixed
-        out[self.rows + np.arange(fixed), np.arange(fixed)] = 1.0
-        shapes = self._is_shape()
+        # Constants and shapes have priors, amplitudes have none.
+        out[self.rows + np.arange(size), np.arange(size)] = [*np.ones(fixed), *self._is_shape()]
         for k in range(0 if self._entangled else fixed, size):
             step = np.zeros(size)
             step[k] = _SHAPE_STEP
@@ -235,8 +235,6 @@ class _Problem:
             if width > 0.0:
                 change = self.residual(up)[: self.rows] - self.residual(down)[: self.rows]
                 out[: self.rows, k] = change / width
-            if k >= fixed:
-                out[self.rows + k, k] = 1.0 if shapes[k - fixed] else 0.0
         return out
 
     def _is_shape(self) -> FloatArray:

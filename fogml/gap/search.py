@@ -117,7 +117,7 @@ class Search:
 
     @cached_property
     def _unlike(self) -> Unlike:
-        return Unlike(self.field_, np.concatenate([[], *self.places.values()]).astype(np.intp))
+        return Unlike(self.field_, self.without)
 
     @cached_property
     def _forms(self) -> Forms:

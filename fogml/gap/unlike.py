@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.gap.evidence import Conditioned, Field
 from fogml.runs.run import FloatArray
@@ -36,19 +35,19 @@ class Unlike:
     ----------
     field
         Inner products beside the constants.
-    nodes
-        Indices of the nodes of candidates that count, shape (nodes,); all if None.
+    without
+        Ids of candidates that don't count.
     """
 
-    def __init__(self, field: Field, nodes: NDArray[np.intp] | None = None) -> None:
+    def __init__(self, field: Field, without: frozenset[str] = frozenset()) -> None:
         self._field = field
         widest = max(map(len, field.basis.groups.values()), default=0)
         self._normal = np.random.default_rng(0).standard_normal((DRAWS, max(widest, USUAL_COLUMNS)))
         gram = field.gram
         main = [
             [c for c in node.columns if gram[c, c] >= LEAST_AXIS * gram[node.columns[0], node.columns[0]]]
-            for i, node in enumerate(field.basis.nodes)
-            if nodes is None or i in nodes
+            for node in field.basis.nodes
+            if node.candidate not in without
         ]
         width = max(map(len, main), default=1)
         self._index = np.array([p + [p[0]] * (width - len(p)) for p in main], np.intp).reshape(-1, width)

@@ -46,8 +46,8 @@ def test_a_signal_that_is_a_candidates_is_no_unknown():
 def test_a_candidate_that_does_not_count_takes_nothing_from_the_unknown():
     field = field_of(2.0, 0.0)
     held = field.condition([Term(tuple(int(c) for c in field.basis.groups["both"]), 20.0)])
-    assert Unlike(field, np.arange(len(field.basis.nodes))).log_share(held, "both", 20.0) < -1.0
-    assert Unlike(field, np.array([], dtype=np.intp)).log_share(held, "both", 20.0) == 0.0
+    assert Unlike(field, frozenset({"other"})).log_share(held, "both", 20.0) < -1.0
+    assert Unlike(field, frozenset({"cube"})).log_share(held, "both", 20.0) == 0.0
 
 
 def test_a_signal_that_is_no_candidates_loses_nothing():
