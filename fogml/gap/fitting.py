@@ -16,11 +16,14 @@ from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate, Constant, EffectValue, Foreseeable
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.shapes import is_line
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
 MOST_STEPS = 12
 _SHAPE_STEP = 0.01
+_LINE_STEP_CYCLES = 0.02
+"""Step along a line's period or frequency, in cycles over the runs: of more the response is no line."""
 _Z90 = 1.6448536269514722
 
 
@@ -176,6 +179,7 @@ class _Problem:
                 scale.append(max(0.5 * (high - low) / _Z90, 1e-12))
                 self.limits.append(_usable(quantity, low, high))
         self.names, self.scale = tuple(names), np.array(scale)
+        self._steps = self._steps_of(self.first)
         self._mean = np.array([c.mean / c.sd for c in constants])
         self._fixed = self._white([constant_rows(o, constants) for o in observations])
         self._middle = self._packed(self.first)[len(constants) :]
@@ -185,6 +189,19 @@ class _Problem:
             for o in observations
             for effect in effects
         )
+
+    def _steps_of(self, effects: Sequence[EffectValue]) -> FloatArray:
+        """Steps of finite differences, in the parameters' scales."""
+        steps = np.full(len(self.names), _SHAPE_STEP)
+        spans = _spans(self.observations)
+        for i, quantity in self.shapes:
+            if is_line(quantity) and quantity.unit in spans:
+                k = self.names.index(f"{effects[i].id}.{quantity.name}")
+                cycle = 1.0 / max(spans[quantity.unit], 1e-9)
+                if "period" in quantity.name:
+                    cycle *= effects[i].shape[quantity.name] ** 2
+                steps[k] = min(steps[k], _LINE_STEP_CYCLES * cycle / self.scale[k])
+        return steps
 
     def start(self, constants: Mapping[str, float] | None) -> FloatArray:
         x = self._packed(self.first)
@@ -229,7 +246,7 @@ class _Problem:
         out[self.rows + np.arange(size), np.arange(size)] = [*np.ones(fixed), *self._is_shape()]
         for k in range(0 if self._entangled else fixed, size):
             step = np.zeros(size)
-            step[k] = _SHAPE_STEP
+            step[k] = self._steps[k]
             up, down = self.clipped(x + step), self.clipped(x - step)
             width = float(up[k] - down[k])
             if width > 0.0:
@@ -251,6 +268,15 @@ class _Problem:
 
     def _white(self, columns: Sequence[FloatArray]) -> FloatArray:
         return np.concatenate([w.whiten(c) for w, c in zip(self.whiteners, columns)])
+
+
+def _spans(observations: Sequence[Observation]) -> dict[str, float]:
+    """What lines run over, by the unit of their period or frequency: time, temperature, the table's rate."""
+    seconds = max(o.run.span_s for o in observations)
+    low = min(float(o.temperature.min()) for o in observations)
+    high = max(float(o.temperature.max()) for o in observations)
+    fastest = max(float(np.abs(o.run.rate).max()) for o in observations)
+    return {"s": seconds, "Hz": seconds, "degC": high - low, "deg/s": fastest}
 
 
 def _usable(quantity: Quantity, low: float, high: float) -> tuple[float, float]:

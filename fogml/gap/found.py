@@ -36,7 +36,7 @@ def fit_named(p: Prepared, candidates: Mapping[str, Candidate], search: Search, 
         p.whiteners,
         p.model.constants,
         basis.frame.values,
-        [(r.chosen.candidate, basis.nodes[r.chosen.node].node.shape) for r in named],
+        [(r.chosen.candidate, basis.nodes[r.chosen.node].node) for r in named],
         candidates,
     )
     if not starts:

@@ -50,9 +50,7 @@ def next_run(
             continue
         gains = search.field_.condition([]).node_gains()[nodes]
         node = search.field_.basis.nodes[nodes[int(gains.max(axis=1).argmax())]]
-        members += starting_values(
-            p.fit, p.whiteners, model.constants, values, [(id, node.node.shape)], candidates
-        )
+        members += starting_values(p.fit, p.whiteners, model.constants, values, [(id, node.node)], candidates)
     if len(members) < 2:
         return None
     return separating_run(

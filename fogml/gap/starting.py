@@ -12,7 +12,7 @@ from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate, Constant, EffectValue
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.shapes import AT_AMPLITUDE, Node, is_angle
 from fogml.runs.run import FloatArray
 
 MOST_TRIED = 48
@@ -23,7 +23,7 @@ def starting_values(
     whiteners: Sequence[RunWhitener],
     constants: Sequence[Constant],
     values: Mapping[str, float],
-    chosen: Sequence[tuple[str, Mapping[str, float]]],
+    chosen: Sequence[tuple[str, Node]],
     candidates: Mapping[str, Candidate],
 ) -> list[EffectValue]:
     """Amplitudes and shapes near which the fit begins.
@@ -35,7 +35,7 @@ def starting_values(
     constants, values
         The model's constants, and where they are.
     chosen
-        Ids of the effects, the most certain first, with the shape of their best node.
+        Ids of the effects, the most certain first, with their best node.
     candidates
         Their declarations.
     """
@@ -49,9 +49,9 @@ def starting_values(
     left = _beside(basis, data)[:, 0]
     taken: list[FloatArray] = []
     found = []
-    for id, shape in chosen:
+    for id, node in chosen:
         best: tuple[float, dict[str, float], float, FloatArray] | None = None
-        for tried in _shapes(candidates[id], shape):
+        for tried in _shapes(candidates[id], node):
             response = _stacked(whiteners, [o.response(id, tried, values)[:, None] for o in observations])
             column = _beside(basis, response)[:, 0]
             for other in taken:
@@ -75,19 +75,19 @@ def starting_values(
     return found
 
 
-def _shapes(candidate: Candidate, shape: Mapping[str, float]) -> list[dict[str, float]]:
-    """The node's shape with angles all round, and ratios low, middle and high."""
+def _shapes(candidate: Candidate, node: Node) -> list[dict[str, float]]:
+    """The node's shape with angles all round, and what it is linear in low, middle and high."""
     axes = []
     for quantity in candidate.shape:
         low, high = quantity.tactical
-        if quantity.unit == "deg" and high - low >= 180.0:
+        if is_angle(quantity):
             axes.append([(quantity.name, low + turn) for turn in np.arange(0.0, 360.0, 30.0)])
-        elif quantity.unit in ("1", "1/degC", "1/degC2", "degC/V") and low <= 0.0:
-            values = sorted({low, 0.5 * (low + high), high, shape[quantity.name]})
+        elif len({draw.get(quantity.name) for draw in node.draws}) > 1:
+            values = sorted({low, 0.5 * (low + high), high, node.shape[quantity.name]})
             axes.append([(quantity.name, value) for value in values])
-    tried = [dict(shape) | dict(point) for point in product(*axes)]
+    tried = [dict(node.shape) | dict(point) for point in product(*axes)]
     step = -(-len(tried) // MOST_TRIED)
-    return [dict(shape), *tried[::step]]
+    return [dict(node.shape), *tried[::step]]
 
 
 def _least(candidate: Candidate) -> float:

@@ -8,6 +8,7 @@ from scipy.optimize import least_squares
 
 from fogml.gap.fitting import fit_model
 from fogml.gap.model import EffectValue
+from fogml.gap.shapes import Node
 from fogml.gap.starting import starting_values
 from tests.gap.small_model import MEANS, SmallModel, dense, framed, noise_of, ramps, recorded
 
@@ -27,6 +28,10 @@ def fitted(frame, effects):
     return fit_model(
         frame.observations, frame.whiteners, MODEL.constants, effects, MODEL.candidates(), MODEL.grade
     )
+
+
+def node(shape, *more):
+    return Node(dict(shape), (dict(shape), *({**shape, **other} for other in more)))
 
 
 def test_a_fit_is_that_of_a_general_solver():
@@ -138,7 +143,7 @@ def test_a_fit_starts_near_the_truth_whatever_the_angle():
             frame.whiteners,
             MODEL.constants,
             MEANS,
-            [("bend", dict(BEND.shape)), ("line", {"period": 900.0, "phase": 0.0})],
+            [("bend", node(BEND.shape)), ("line", node({"period": 900.0, "phase": 0.0}))],
             MODEL.candidates(),
         )
         assert [e.id for e in start] == ["bend", "line"]
@@ -157,9 +162,38 @@ def test_starting_values_are_the_joint_fit_where_everything_is_linear():
     cube, mixture = EffectValue("cube", 0.9), EffectValue("mixture", 0.6, {"share": 0.5})
     frame = ready(6, effects=(cube, mixture))
     (one,) = starting_values(
-        frame.observations, frame.whiteners, MODEL.constants, MEANS, [("cube", {})], MODEL.candidates()
+        frame.observations, frame.whiteners, MODEL.constants, MEANS, [("cube", node({}))], MODEL.candidates()
     )
     columns = np.concatenate([frame.fixed, frame.responses("cube", [{}])], axis=1)
     held = np.concatenate([columns, np.eye(2, 3)])
     target = np.concatenate([frame.residual[:, 0], np.zeros(2)])
     assert one.amplitude == pytest.approx(np.linalg.lstsq(held, target, rcond=None)[0][2], rel=1e-6)
+
+
+def test_a_line_is_followed_to_its_frequency_over_many_cycles():
+    # The range of periods is so wide that a hundredth of it is half a cycle over the run.
+    line = EffectValue("line", 0.4, {"period": 403.0, "phase": 70.0})
+    frame = ready(7, effects=(line,), count=400)
+    fit = fitted(frame, [EffectValue("line", 0.3, {"period": 400.0, "phase": 45.0})])
+    (found,) = fit.effects
+    (o,) = frame.observations
+    angle = 2.0 * np.pi * (o.time - o.time[0]) / 403.0
+    columns = [np.sin(angle + np.radians(70.0)), 0.4 * np.cos(angle + np.radians(70.0))]
+    columns.append(-columns[1] * angle / 403.0)
+    white = frame.whiteners[0].whiten(np.column_stack([*columns, *o.model.columns().values()]))
+    errors = np.sqrt(np.diag(np.linalg.inv(white.T @ white)))
+    assert fit.standard_errors["line.amplitude"] == pytest.approx(errors[0], rel=0.1)
+    assert fit.standard_errors["line.period"] == pytest.approx(errors[2], rel=0.1)
+    assert abs(found.shape["period"] - 403.0) < 4.0 * errors[2]
+    assert abs(found.amplitude - 0.4) < 4.0 * errors[0]
+
+
+def test_what_a_response_is_linear_in_starts_near_its_best_value_whatever_its_unit():
+    mixture = EffectValue("mixture", 5.0, {"share": 1.0})
+    frame = ready(8, effects=(mixture,))
+    given = (frame.observations, frame.whiteners, MODEL.constants, MEANS)
+    (open_,) = starting_values(
+        *given, [("mixture", node({"share": 0.2}, {"share": 0.5}))], MODEL.candidates()
+    )
+    (fixed,) = starting_values(*given, [("mixture", node({"share": 0.2}))], MODEL.candidates())
+    assert open_.shape["share"] == 1.0 and fixed.shape["share"] == 0.2
