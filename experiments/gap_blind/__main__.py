@@ -1,63 +1,108 @@
 """The check on withheld effects in full: make the cases, answer them by every method, score.
 
-``python -m experiments.gap_blind DIR`` writes ``score.json`` and ``score.html`` beside itself, and the
-suite into DIR, which may be on another disk. An interrupted call goes on where it was. With
-``--final`` it uses the seed that is kept for final figures, and records that.
+``python -m experiments.gap_blind DIR`` makes, answers and scores each part of the suite in DIR/NAME, where
+DIR may be on another disk, and writes ``score.json`` and ``score.html`` of all parts into DIR. An
+interrupted call goes on where it was. With ``--final`` it uses the seed that is kept for final figures,
+records that, and writes beside itself instead: the score, and each part's marks as
+``marks-NAME.json.gz``.
 
-On a cluster with a shared disk: once ``--stage make``, then on each of n machines
-``--stage run --shard i/n``, then once ``--stage score``.
+Parts may be done on different days or on machines that share nothing, each with ``--part NAME``: wherever
+one is scored, the score is made of all marks of the seed that are there. On a cluster with a shared disk:
+once ``--stage make``, then on each of n machines ``--stage run --shard i/n``, then once ``--stage score``.
 """
 
 from __future__ import annotations
 
 import argparse
+import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import yaml
 
 from fogml.cli.blind_job import (
     MakeSettings,
+    MergeSettings,
     RunSettings,
     ScoreSettings,
     make_and_tell,
+    merge_and_write,
     run_and_tell,
     score_and_write,
 )
 from fogml.cli.terminal import Terminal
+from fogml.gap.blind.scoring.marks_file import MARKS, read_marks
+from fogml.outputs import whole_file
 
 HERE = Path(__file__).parent
 STAGES = ("make", "run", "score")
+LEDGER = str(HERE / "final_uses.json")
+PART_MARKS = "marks-{}.json.gz"
 
 
 def main() -> None:
-    """All stages, or one."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("directory", help="where the suite lies or is made")
-    parser.add_argument("--final", action="store_true", help="the seed kept for final figures")
-    parser.add_argument("--stage", choices=STAGES, help="one stage alone")
-    parser.add_argument("--shard", default="1/1", help="every n-th case from the i-th on, i/n")
-    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
-    parser.add_argument("--count", type=int, help="another number of cases, to try it")
-    given = parser.parse_args()
+    """All stages of all parts, or some."""
     config = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    given = _parser(part["name"] for part in config["final"]["parts"]).parse_args()
     suite = config["final" if given.final else "development"]
     stages = (given.stage,) if given.stage else STAGES
     terminal = Terminal()
+    # What a final seed gave is kept beside the experiment.
+    home = HERE if given.final else Path(given.directory)
+    for part in suite["parts"]:
+        if given.part and part["name"] not in given.part:
+            continue
+        terminal.say(f"part {part['name']}")
+        _do(given, config, suite["seed"], part, stages, terminal)
+        if "score" in stages:
+            with whole_file(home / PART_MARKS.format(part["name"])) as partial:
+                shutil.copyfile(Path(given.directory) / part["name"] / MARKS, partial)
+    if "score" in stages:
+        _merge(home, suite["seed"], given.final, terminal)
+
+
+def _parser(names: Any) -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("directory", help="where the suite lies or is made")
+    parser.add_argument("--final", action="store_true", help="the seed kept for final figures")
+    parser.add_argument(
+        "--part", action="append", choices=list(names), help="this part alone; may be repeated"
+    )
+    parser.add_argument("--stage", choices=STAGES, help="one stage alone")
+    parser.add_argument("--shard", default="1/1", help="every n-th case from the i-th on, i/n")
+    parser.add_argument("--workers", type=int, default=2, help="processes (2)")
+    parser.add_argument("--count", type=int, help="at most so many cases of each part, to try it")
+    return parser
+
+
+def _do(
+    given: argparse.Namespace,
+    config: Mapping[str, Any],
+    seed: int,
+    part: Mapping[str, Any],
+    stages: Sequence[str],
+    terminal: Terminal,
+) -> None:
+    """The stages of one part."""
+    directory = str(Path(given.directory) / part["name"])
     if "make" in stages:
+        drawn = {key: part[key] for key in ("first", "kinds", "least_d_prime") if key in part}
         make_and_tell(
             MakeSettings(
-                directory=given.directory,
-                count=given.count or suite["count"],
-                seed=suite["seed"],
+                directory=directory,
+                count=min(part["count"], given.count or part["count"]),
+                seed=seed,
                 sample=config["sample"],
                 workers=given.workers,
+                **drawn,
             ),
             terminal,
         )
     if "run" in stages:
         run_and_tell(
             RunSettings(
-                directory=given.directory,
+                directory=directory,
                 methods=config["methods"],
                 workers=given.workers,
                 limit=config["limit"],
@@ -66,15 +111,22 @@ def main() -> None:
             terminal,
         )
     if "score" in stages:
-        ledger = str(HERE / "final_uses.json")
-        settings = ScoreSettings(
-            directory=given.directory,
-            final=given.final,
-            ledger=ledger,
-            workers=given.workers,
-            out=str(HERE),
-        )
+        settings = ScoreSettings(directory=directory, final=given.final, ledger=LEDGER, workers=given.workers)
         score_and_write(settings, terminal)
+
+
+def _merge(home: Path, seed: int, final: bool, terminal: Terminal) -> None:
+    """One score of all marks of the seed."""
+    found = []
+    for path in sorted(home.glob(PART_MARKS.format("*"))):
+        held = read_marks(path).seed
+        if held == seed:
+            found.append(str(path))
+        else:
+            terminal.say(f"{path.name} is left out: it is of seed {held}, not {seed}")
+    merge_and_write(MergeSettings(marks=found, final=final, ledger=LEDGER, out=str(home)), terminal)
+    # The parts' own marks lie there already.
+    (home / MARKS).unlink()
 
 
 if __name__ == "__main__":

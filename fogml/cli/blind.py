@@ -1,4 +1,4 @@
-"""``fogml blind``: make blind cases, let a method answer them, score the answers."""
+"""``fogml blind``: make blind cases, let a method answer them, score the answers, merge scored parts."""
 
 from __future__ import annotations
 
@@ -17,6 +17,13 @@ app = typer.Typer(
 )
 
 Folder = Annotated[str | None, typer.Argument(metavar="DIR", help="The suite's folder.")]
+Final = Annotated[
+    bool | None,
+    typer.Option("--final", help="Use a final seed; the use is recorded in the ledger and the page."),
+]
+Ledger = Annotated[
+    str | None, typer.Option("--ledger", metavar="FILE", help="(experiments/gap_blind/final_uses.json)")
+]
 Workers = Annotated[int | None, typer.Option("--workers", help="Processes (2).")]
 
 
@@ -24,11 +31,18 @@ Workers = Annotated[int | None, typer.Option("--workers", help="Processes (2).")
 def make(
     directory: Folder = None,
     count: Annotated[int | None, typer.Option("--count", "-n", help="Cases (1000).")] = None,
+    first: Annotated[
+        int | None, typer.Option("--first", metavar="N", help="Number of the first one (1).")
+    ] = None,
     sample: Annotated[
         float | None, typer.Option("--sample", metavar="SECONDS", help="Interval (10).")
     ] = None,
     kinds: Annotated[
         list[str] | None, typer.Option("--kind", help="Only cases of this kind; may be repeated.")
+    ] = None,
+    least_d_prime: Annotated[
+        float | None,
+        typer.Option("--least-d-prime", metavar="D", help="Only strata of d' that begin there or above."),
     ] = None,
     leave_one_out: Annotated[
         bool | None,
@@ -56,8 +70,10 @@ def make(
     flags = {
         "directory": directory,
         "count": count,
+        "first": first,
         "sample": sample,
         "kinds": kinds,
+        "least_d_prime": least_d_prime,
         "leave_one_out": leave_one_out,
         "relatives_stay": relatives_stay,
         "workers": workers,
@@ -124,18 +140,10 @@ def score(
             "--gate", metavar="FIGURE=VALUE", help="Limit on a figure of the diagnosis; 'wanted' for all."
         ),
     ] = None,
-    final: Annotated[
-        bool | None,
-        typer.Option("--final", help="Use a final seed; the use is recorded in the ledger and the page."),
-    ] = None,
-    ledger: Annotated[
-        str | None,
-        typer.Option("--ledger", metavar="FILE", help="(experiments/gap_blind/final_uses.json)"),
-    ] = None,
+    final: Final = None,
+    ledger: Ledger = None,
     workers: Workers = None,
-    out: Annotated[
-        Path | None, typer.Option("--out", "-o", help="Folder for score.json and score.html (DIR).")
-    ] = None,
+    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for what is written (DIR).")] = None,
     seed: options.Seed = None,
     config: options.Config = None,
     as_json: options.Json = False,
@@ -143,7 +151,7 @@ def score(
 ) -> None:
     """Score every method's answers against the truth; exit status 1 where a gate is not met.
 
-    Writes score.json and score.html.
+    Writes score.json, score.html and marks.json.gz; fogml blind merge makes one page of several of those.
     """
     from fogml.cli.blind_job import ScoreSettings, score_and_write
 
@@ -159,3 +167,33 @@ def score(
     }
     if not score_and_write(ScoreSettings.gather(config, flags), Terminal(as_json, quiet)):
         raise typer.Exit(1)
+
+
+@app.command()
+def merge(
+    marks: Annotated[
+        list[str] | None, typer.Argument(metavar="MARKS...", help="Files marks.json.gz of a suite's parts.")
+    ] = None,
+    final: Final = None,
+    ledger: Ledger = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Make one score of a suite's parts, which may have been made, answered and scored anywhere.
+
+    Writes score.json, score.html and marks.json.gz. Cases that were made by kind or strength count in the
+    figures of their kind alone.
+    """
+    from fogml.cli.blind_job import MergeSettings, merge_and_write
+
+    flags = {
+        "marks": marks,
+        "final": final,
+        "ledger": ledger,
+        "out": str(out) if out else None,
+        "seed": seed,
+    }
+    merge_and_write(MergeSettings.gather(config, flags), Terminal(as_json, quiet))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import field_validator
 
@@ -14,6 +15,9 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.outputs import whole_folder
+
+if TYPE_CHECKING:
+    from fogml.gap.blind.scoring.marks_file import Marks
 
 LEDGER = "experiments/gap_blind/final_uses.json"
 _WANTED = "wanted"
@@ -44,8 +48,10 @@ class MakeSettings(SuiteSettings):
     """Settings of ``fogml blind make``."""
 
     count: int = 1000
+    first: int = 1
     sample: float = 10.0
     kinds: list[str] = []
+    least_d_prime: float = 0.0
     leave_one_out: bool = False
     relatives_stay: bool = False
     workers: int = 2
@@ -104,6 +110,17 @@ class ScoreSettings(SuiteSettings):
         return gates
 
 
+class MergeSettings(Settings):
+    """Settings of ``fogml blind merge``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("marks",)
+    written_keys: ClassVar[tuple[str, ...]] = ("out", "ledger")
+    marks: list[str] = []
+    final: bool = False
+    ledger: str = LEDGER
+    out: str | None = None
+
+
 def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
     """Make cases, and say how many there are."""
     from fogml.gap.blind.make import make_cases
@@ -122,6 +139,8 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             workers=settings.workers,
             kinds=kinds,
             progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
+            first=settings.first,
+            least_d_prime=settings.least_d_prime,
         )
     if not settings.relatives_stay:
         from fogml.gap.blind.without import leave_out_relatives
@@ -177,33 +196,64 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
 
 
 def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
-    """Score a suite, write ``score.json`` and ``score.html``; whether every gate is met."""
-    from fogml.gap.blind.score import gate, score
-    from fogml.report.blind_page import blind_page
+    """Score a suite, write ``score.json``, its page and its marks; whether every gate is met."""
+    from fogml.gap.blind.score import gate, gather
+    from fogml.gap.blind.scoring.values import score_values
 
     folder = settings.folder()
     methods = settings.methods or list(folder.methods())
     cases = len(folder.names())
     ledger = Path(settings.ledger) if settings.final else None
     with terminal.work("scoring", total=cases) as work:
-        values = score(
+        marks = gather(
             folder, methods, ledger, lambda case: work.advance(doing=f"scored {case}"), settings.workers
         )
+    values = score_values(marks, ledger)
     judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
     values["gates"] = gate(values, settings.gates, judged)
     if judged == DIAGNOSIS:
         _draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
     out = Path(settings.out) if settings.out else folder.path
     beside = out.resolve() == folder.path.resolve()
+    _write(out, values, marks, settings.in_full().yaml("blind score"), beside)
+    _tell(out, values, judged, terminal)
+    return all(one["met"] for one in values["gates"])
+
+
+def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
+    """Score the parts of a suite as one, write ``score.json``, its page and its marks."""
+    from fogml.gap.blind.scoring.merging import merged
+    from fogml.gap.blind.scoring.values import score_values
+
+    if not settings.out:
+        raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
+    marks = merged([Path(path) for path in settings.marks])
+    values = score_values(marks, Path(settings.ledger) if settings.final else None)
+    for found in values["methods"].values():
+        for case in found["worst"]:
+            # The cases' folders may be on another machine.
+            case["report"] = None
+    out = Path(settings.out)
+    _write(out, values, marks, settings.in_full().yaml("blind merge"), linked=False)
+    _tell(out, values, next(iter(marks.methods)), terminal)
+
+
+def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str, linked: bool) -> None:
+    from fogml.gap.blind.scoring.marks_file import MARKS, write_marks
+    from fogml.report.blind_page import blind_page
+
     with whole_folder(out) as staging:
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
         (staging / "score.json").write_text(text + "\n", encoding="utf-8")
-        (staging / "score.yaml").write_text(settings.in_full().yaml("blind score"), encoding="utf-8")
-        (staging / "score.html").write_text(blind_page(values, linked=beside), encoding="utf-8")
+        (staging / "score.yaml").write_text(config, encoding="utf-8")
+        (staging / "score.html").write_text(blind_page(values, linked=linked), encoding="utf-8")
+        write_marks(staging / MARKS, marks)
+
+
+def _tell(out: Path, values: dict[str, Any], judged: str, terminal: Terminal) -> None:
     _print(values, judged, terminal)
     terminal.result(values)
     terminal.say(f"Written to {out}: open {out / 'score.html'}")
-    return all(one["met"] for one in values["gates"])
 
 
 def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], seed: int, terminal: Terminal) -> None:

@@ -38,7 +38,7 @@ def blind_page(values: Mapping[str, Any], linked: bool = True) -> str:
         values=values,
         verdict=_verdict(name, rows, values),
         warnings=_warnings(rows, values, judged),
-        figures=_figures(rows),
+        figures=_figures(rows, values),
         others=_others(methods, name) if len(methods) > 1 else None,
         by_kind=_by_kind(values),
         strata=_strata(rows),
@@ -50,6 +50,7 @@ def blind_page(values: Mapping[str, Any], linked: bool = True) -> str:
         worst=_worst(judged["worst"], linked),
         gates=_gates(values["gates"]) if values["gates"] else None,
         uses=_uses(values["final_uses"]) if values["final_uses"] else None,
+        suite_parts=_parts(values["parts"]) if len(values["parts"]) > 1 else None,
         about=_about(values),
     )
 
@@ -74,6 +75,11 @@ def _warnings(
         found.append(f"These rest on fewer than 400 cases: {listed(thin, 5)}.")
     if not values["final"]:
         found.append("The seed is one to develop on: these are no final figures.")
+    if not values["mix"]:
+        found.append("No case is drawn from the whole mix: every figure is one of the kinds that there are.")
+    several = [f"{m} ({len(v['code'])})" for m, v in values["methods"].items() if len(v["code"]) > 1]
+    if several:
+        found.append(f"Answers were given by several states of the code: {listed(several, 9)}.")
     if judged["failed"]:
         count = plural(len(judged["failed"]), "case")
         found.append(f"{count} failed, and count as wrong: {judged['failed'][0]['reason']}")
@@ -84,7 +90,13 @@ def _outcome(row: Mapping[str, Any]) -> str:
     return {True: "✓ met", False: "✗ not met", None: ""}[row["met"]]
 
 
-def _figures(rows: Sequence[Mapping[str, Any]]) -> Table:
+def _figures(rows: Sequence[Mapping[str, Any]], values: Mapping[str, Any]) -> Table:
+    caption = "n is what a figure rests on: cases, named effects, listed effects or intervals."
+    if 0 < values["mix"] < values["cases"]:
+        caption += (
+            f" The {plural(values['cases'] - values['mix'], 'case')} outside the mix count in the figures of "
+            "their kind alone."
+        )
     return Table(
         columns=(
             ("Figure", "", "text"),
@@ -109,7 +121,7 @@ def _figures(rows: Sequence[Mapping[str, Any]]) -> Table:
             )
             for row in rows
         ),
-        caption="n is what a figure rests on: cases, named effects, listed effects or intervals.",
+        caption=caption,
     )
 
 
@@ -255,12 +267,37 @@ def _uses(uses: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
+def _parts(parts: Sequence[Mapping[str, Any]]) -> Table:
+    return Table(
+        columns=(
+            ("Marks", "", "text"),
+            ("Cases", "", "figure"),
+            ("Numbers", "", "figure"),
+            ("Kinds", "", "text"),
+            ("Hash of the truth", "first digits", "text"),
+        ),
+        rows=tuple(
+            Row(
+                (
+                    part["file"],
+                    str(part["cases"]),
+                    f"{part['first']} … {part['last']}",
+                    ", ".join(f"{kind_words(kind)} {n}" for kind, n in part["kinds"].items()),
+                    part["truth"][:12],
+                )
+            )
+            for part in parts
+        ),
+    )
+
+
 def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     runs = ", ".join(f"{n} with {count}" for count, n in values["fit_runs"].items())
+    whole = values["mix"] == values["cases"]
     return [
         ("data", values["data"]),
         ("second reality", REALITY),
-        ("cases", str(values["cases"])),
+        ("cases", f"{values['cases']}, {'all' if whole else values['mix']} of them from the whole mix"),
         ("seed", f"{values['seed']} ({'final' if values['final'] else 'to develop on'})"),
         ("sample interval", ", ".join(f"{number(s)} s" for s in values["sample_s"])),
         ("fit runs", runs),

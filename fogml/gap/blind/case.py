@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.gap.blind.plan import STRATA, Plan
+from fogml.gap.blind.plan import Plan, Strata
 from fogml.gap.blind.reality.catalogue import INVENTED, KNOWN, WRONG_STRUCTURE
 from fogml.gap.blind.reality.form import Form
 from fogml.gap.blind.reality.noise import UNITS as NOISE_UNITS
@@ -68,7 +68,7 @@ def draw_case(plan: Plan, seed: int, sample_s: float) -> tuple[Unit, tuple[Actin
         unit = draw_unit(rng, forms, runs, plan.static, sample_s)
         scales = Scales(unit)
         try:
-            return unit, tuple(_set_strength(rng, scales, form) for form in forms)
+            return unit, tuple(_set_strength(rng, scales, form, plan.strata) for form in forms)
         except TooWeak as error:
             attempt += 1
             if attempt >= _MOST_UNITS:
@@ -88,8 +88,8 @@ def _draw_forms(rng: np.random.Generator, plan: Plan) -> list[type[Form]]:
     return forms
 
 
-def _set_strength(rng: np.random.Generator, scales: Scales, form: type[Form]) -> Acting:
-    low, high = STRATA[int(rng.integers(len(STRATA)))]
+def _set_strength(rng: np.random.Generator, scales: Scales, form: type[Form], strata: Strata) -> Acting:
+    low, high = strata[int(rng.integers(len(strata)))]
     wanted = float(np.exp(rng.uniform(np.log(low), np.log(high))))
     made = form()
     shape = {name: float(value) for name, value in made.draw(rng).items()}
@@ -150,6 +150,7 @@ def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:
         noise=noise,
         nominal=unit.constants.as_dict(),
         thermal="; ".join(f"{r.name}: {r.world.programme.text}" for r in unit.runs),
+        mix=plan.mix,
     )
 
 

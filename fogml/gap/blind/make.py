@@ -19,19 +19,22 @@ def make_cases(
     workers: int = 2,
     kinds: Sequence[str] | None = None,
     progress: Callable[[int, int], None] | None = None,
+    first: int = 1,
+    least_d_prime: float = 0.0,
 ) -> int:
     """Make `count` cases under `directory`, in ``cases``, and their truth in ``truth``.
 
     The same arguments give the same files, byte for byte, whatever `workers`. Cases whose truth is
     there already are left as they are, so that an interrupted call goes on where it stopped; a
-    greater `count` adds cases to those of a smaller one.
+    greater `count` adds cases to those of a smaller one. Where a suite is made in parts, each case is the
+    same as where it is made in one go.
 
     Parameters
     ----------
     directory
         Made if it is not there.
     count
-        How many, from number 0001.
+        How many, from number `first` on.
     seed
         What everything is drawn from.
     sample_s
@@ -42,6 +45,10 @@ def make_cases(
         Kinds of `fogml.gap.blind.truth.KINDS`, in the mix's proportions among them; all if None.
     progress
         Called with the number of cases that are there, and `count`.
+    first
+        Number of the first one.
+    least_d_prime
+        Effects are drawn from the strata of d' that begin there or above; from all if 0.
 
     Returns
     -------
@@ -53,14 +60,16 @@ def make_cases(
     InputError
         If an argument is not possible, or `directory` holds cases of another seed or interval.
     """
-    if count < 1 or workers < 1:
-        raise InputError(f"count and workers must be at least 1, found {count} and {workers}")
+    if count < 1 or workers < 1 or first < 1:
+        raise InputError(
+            f"count, workers and the first number must be at least 1, found {count}, {workers} and {first}"
+        )
     if not 0.1 <= sample_s <= 30.0:
         raise InputError(f"sample interval {sample_s:g} s: 0.1 to 30 s are possible")
+    wanted = plans(first - 1 + count, seed, kinds, least_d_prime)[first - 1 :]
     folder = BlindFolder(Path(directory))
     folder.cases.mkdir(parents=True, exist_ok=True)
     folder.truth.mkdir(parents=True, exist_ok=True)
-    wanted = plans(count, seed, kinds)
     missing = [plan for plan in wanted if not _is_there(folder, plan, seed, sample_s)]
     done = count - len(missing)
     if progress:
@@ -97,4 +106,7 @@ def _is_there(folder: BlindFolder, plan: Plan, seed: int, sample_s: float) -> bo
             f"{path}: is of seed {held.seed}, {held.sample_s:g} s and kind {held.kind}, not of seed {seed}, "
             f"{sample_s:g} s and kind {plan.kind}; choose another folder"
         )
+    if held.mix != plan.mix:
+        which = "the whole mix" if held.mix else "chosen kinds or strata of d'"
+        raise InputError(f"{path}: was drawn from {which}, unlike what is wanted; choose another folder")
     return True

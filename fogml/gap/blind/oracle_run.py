@@ -9,6 +9,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import OUTCOME, BlindFolder
 from fogml.gap.blind.methods import ORACLE
 from fogml.gap.blind.run import Progress, RunPlan, count_samples, outcome_of
@@ -21,9 +22,9 @@ def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, in
     plan.answers.mkdir(parents=True, exist_ok=True)
     if not left:
         return 0, 0
-    failed = 0
+    failed, code = 0, code_state(ORACLE)
     with ProcessPoolExecutor(plan.workers, mp_context=get_context("spawn")) as pool:
-        waiting = [pool.submit(_one, plan.folder.path, plan.answers, name) for name in left]
+        waiting = [pool.submit(_one, plan.folder.path, plan.answers, name, code) for name in left]
         for future in as_completed(waiting):
             name, done = future.result()
             failed += not done
@@ -32,7 +33,7 @@ def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, in
     return len(left), failed
 
 
-def _one(path: Path, answers: Path, name: str) -> tuple[str, bool]:
+def _one(path: Path, answers: Path, name: str, code: str) -> tuple[str, bool]:
     from fogml.gap.blind.baselines.oracle import oracle
     from fogml.gap.blind.truth import read_truth
 
@@ -48,6 +49,6 @@ def _one(path: Path, answers: Path, name: str) -> tuple[str, bool]:
             answer = {"done": False, "reason": "error", "message": f"{type(error).__name__}: {error}"}
         answer["seconds"] = time.perf_counter() - began
         samples = count_samples(folder.cases / name)
-        values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples)
+        values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples, code)
         (out / OUTCOME).write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return name, bool(answer["done"])

@@ -24,6 +24,7 @@ PER_BLOCK: dict[Kind, int] = {
 """Cases of each kind in twenty."""
 STRATA = ((4.0, 6.0), (6.0, 10.0), (10.0, 20.0), (20.0, 40.0))
 """Bounds of d'; within them it is drawn evenly in its logarithm."""
+Strata = tuple[tuple[float, float], ...]
 _RUNS = (1, 2, 5)
 _RUN_SHARES = (0.35, 0.45, 0.2)
 
@@ -48,6 +49,10 @@ class Plan:
         To fit on.
     static
         Whether there is a static run.
+    strata
+        Bounds of d' that its effects are drawn within.
+    mix
+        Whether it is drawn from the whole mix.
     """
 
     number: int
@@ -57,6 +62,8 @@ class Plan:
     left_out: tuple[str, ...]
     runs: int
     static: bool
+    strata: Strata = STRATA
+    mix: bool = True
 
     @property
     def name(self) -> str:
@@ -64,19 +71,39 @@ class Plan:
         return f"{self.number:04d}"
 
 
-def plans(count: int, seed: int, kinds: Sequence[str] | None = None) -> list[Plan]:
+def strata_from(least_d_prime: float) -> Strata:
+    """The strata whose lower bound reaches a d'.
+
+    Raises
+    ------
+    InputError
+        If none does.
+    """
+    found = tuple(bounds for bounds in STRATA if bounds[0] >= least_d_prime)
+    if not found:
+        raise InputError(f"least d' {least_d_prime:g}: no stratum begins there or above {STRATA[-1][0]:g}")
+    return found
+
+
+def plans(
+    count: int, seed: int, kinds: Sequence[str] | None = None, least_d_prime: float = 0.0
+) -> list[Plan]:
     """The first `count` cases of a seed; a longer list begins with a shorter one.
 
     Parameters
     ----------
     kinds
         Only cases of these kinds, in the mix's proportions among them; all if None.
+    least_d_prime
+        Only strata of d' that begin there or above.
 
     Raises
     ------
     InputError
-        If a kind is not known.
+        If a kind is not known, or no stratum is left.
     """
+    strata = strata_from(least_d_prime)
+    mix = kinds is None and strata == STRATA
     for kind in kinds or ():
         if kind not in KINDS:
             raise InputError(f"there is no kind of case '{kind}'; kinds are {', '.join(KINDS)}")
@@ -107,7 +134,8 @@ def plans(count: int, seed: int, kinds: Sequence[str] | None = None) -> list[Pla
                 withheld = [first]
             runs = int(rng.choice(_RUNS, p=_RUN_SHARES))
             static = bool(rng.random() < 0.6)
-            found.append(Plan(len(found) + 1, kind, first, more, tuple(withheld), runs, static))
+            number = len(found) + 1
+            found.append(Plan(number, kind, first, more, tuple(withheld), runs, static, strata, mix))
     return found[:count]
 
 

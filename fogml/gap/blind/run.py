@@ -13,6 +13,7 @@ from typing import Any
 
 import fogml
 from fogml.errors import InputError
+from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files
 from fogml.gap.blind.pool import Worker, WorkerLost
 from fogml.gap.blind.sealing import own_roots, within
@@ -97,6 +98,7 @@ class _Shared:
     """What the keepers of the workers share."""
 
     plan: RunPlan
+    code: str
     waiting: queue.SimpleQueue[str]
     progress: Progress | None
     failed: int = 0
@@ -123,7 +125,7 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
     waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in left:
         waiting.put(name)
-    shared = _Shared(plan, waiting, progress)
+    shared = _Shared(plan, code_state(plan.method, plan.code), waiting, progress)
     keepers = [
         threading.Thread(target=_keep, args=(shared,), daemon=True)
         for _ in range(min(plan.workers, len(left)))
@@ -157,7 +159,9 @@ def check_out_of_reach(plan: RunPlan) -> None:
         )
 
 
-def outcome_of(case: str, method: str, answer: dict[str, Any], locks: str, samples: int) -> dict[str, Any]:
+def outcome_of(
+    case: str, method: str, answer: dict[str, Any], locks: str, samples: int, code: str
+) -> dict[str, Any]:
     """The values of ``outcome.json``, schema ``fogml.blind_outcome/1``."""
     return {
         "schema": OUTCOME_SCHEMA,
@@ -170,6 +174,7 @@ def outcome_of(case: str, method: str, answer: dict[str, Any], locks: str, sampl
         "samples": samples,
         "sealed_by": locks,
         "version": fogml.__version__,
+        "code": code,
     }
 
 
@@ -221,7 +226,8 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         usable = False
         seconds = plan.limit_s if lost.reason == "timed out" else None
         answer = {"done": False, "reason": lost.reason, "message": str(lost), "seconds": seconds}
-    values = outcome_of(name, plan.name or plan.method, answer, worker.locks, count_samples(case))
+    method, samples = plan.name or plan.method, count_samples(case)
+    values = outcome_of(name, method, answer, worker.locks, samples, shared.code)
     with whole_folder(plan.answers) as staging:
         shutil.copytree(out, staging / name)
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)

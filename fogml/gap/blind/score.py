@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 import hashlib
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import fogml
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.relatives import relatives_of
 from fogml.gap.blind.run import Progress
 from fogml.gap.blind.scoring.answers import read_answer
-from fogml.gap.blind.scoring.breakdowns import confusion, left_out, thinned, worst
 from fogml.gap.blind.scoring.marks import Mark, mark
-from fogml.gap.blind.scoring.statistics import Bin
-from fogml.gap.blind.scoring.table import BY_KEY, calibration, curve, rows
-from fogml.gap.blind.seeds import check_use, record_use, uses
-from fogml.gap.blind.truth import KINDS, STRATUM_NAMES, SUMS, Truth, check_sums, read_truth
-
-SCHEMA = "fogml.blind_score/1"
+from fogml.gap.blind.scoring.marks_file import Marks, part_of
+from fogml.gap.blind.scoring.table import BY_KEY
+from fogml.gap.blind.scoring.values import score_values
+from fogml.gap.blind.seeds import check_use
+from fogml.gap.blind.truth import SUMS, Truth, check_sums, read_truth
 
 
 def score(
@@ -33,6 +29,20 @@ def score(
 ) -> dict[str, Any]:
     """Score the answers of a suite, as JSON-ready values of schema ``fogml.blind_score/1``.
 
+    Takes and refuses what `gather` does; the use of a final seed is added to its ledger.
+    """
+    return score_values(gather(folder, methods, final, progress, workers), final)
+
+
+def gather(
+    folder: BlindFolder,
+    methods: Sequence[str] | None = None,
+    final: Path | None = None,
+    progress: Progress | None = None,
+    workers: int = 1,
+) -> Marks:
+    """The marks of every method's answers in a suite.
+
     Parameters
     ----------
     folder
@@ -41,7 +51,7 @@ def score(
         Which methods' answers; all that there are by default. A case without an answer is a failed
         one, for each of them.
     final
-        The ledger of uses of final seeds, to be given where the suite's seed is one; the use is added.
+        The ledger of uses of final seeds, to be given where the suite's seed is one.
     progress
         Told each case's number.
     workers
@@ -65,31 +75,13 @@ def score(
     methods = folder.methods() if methods is None else methods
     if not methods:
         raise InputError(f"{folder.path}: holds no answers; run a method first (fogml blind run)")
-    marks = marks_of(folder, methods, truths, progress, workers)
-    found: dict[str, Any] = {name: _method(name, marks[name]) for name in methods}
-    digest = hashlib.sha256((folder.truth / SUMS).read_bytes()).hexdigest()
-    if final is not None:
-        figures = {
-            name: {row["key"]: row["value"] for row in values["rows"]} for name, values in found.items()
-        }
-        record_use(final, seeds[0], len(names), digest, figures)
-    return {
-        "schema": SCHEMA,
-        "version": fogml.__version__,
-        "data": "synthetic: a reality written apart from the twin",
-        "seed": seeds[0],
-        "final": final is not None,
-        "final_uses": uses(final) if final is not None else [],
-        "truth": digest,
-        "cases": len(names),
-        "kinds": _counted([truth.kind for truth in truths], KINDS),
-        "strata": _counted([truth.stratum for truth in truths if truth.effects], STRATUM_NAMES),
-        "fit_runs": _counted([len(truth.runs.fit) for truth in truths]),
-        "turning": sum(truth.turning for truth in truths),
-        "sample_s": sorted({truth.sample_s for truth in truths}),
-        "methods": found,
-        "gates": [],
-    }
+    return Marks(
+        seed=seeds[0],
+        sample_s=tuple(sorted({truth.sample_s for truth in truths})),
+        parts=(part_of(truths, hashlib.sha256((folder.truth / SUMS).read_bytes()).hexdigest()),),
+        truths=tuple(truths),
+        methods=marks_of(folder, methods, truths, progress, workers),
+    )
 
 
 def marks_of(
@@ -152,32 +144,3 @@ def _more_is_better(key: str) -> bool:
     if figure.low is None and figure.high is None:
         return key.endswith(("exact", "strict", "right"))
     return figure.low is not None
-
-
-def _method(name: str, marks: Sequence[Mark]) -> dict[str, Any]:
-    return {
-        "rows": rows(marks),
-        "reliability": [_bin(part) for part in calibration(marks)],
-        "open_set": thinned(curve(marks)),
-        "confusion": confusion(marks),
-        "left_out": left_out(marks),
-        "worst": worst(marks, name),
-        "failed": [{"case": m.truth.case, "reason": m.failure} for m in marks if m.failure],
-    }
-
-
-def _bin(part: Bin) -> dict[str, Any]:
-    return {
-        "from": part.low,
-        "to": part.high,
-        "stated": part.stated,
-        "found": part.found.value,
-        "low": part.found.low,
-        "high": part.found.high,
-        "n": part.found.n,
-    }
-
-
-def _counted(values: Sequence[Any], order: Sequence[Any] | None = None) -> dict[str, int]:
-    counts = Counter(values)
-    return {str(name): counts[name] for name in (order or sorted(counts)) if counts[name]}

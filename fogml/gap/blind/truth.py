@@ -163,6 +163,8 @@ class Truth(_Part):
         True nominal constants by name, in the units of `fogml.gap`.
     thermal
         A few words on the reality's thermal structure.
+    mix
+        Whether it was drawn from the whole mix: all kinds, every stratum.
     """
 
     schema_: Literal["fogml.blind_truth/1"] = Field(default="fogml.blind_truth/1", alias="schema")
@@ -180,6 +182,7 @@ class Truth(_Part):
     noise: dict[str, Amount] = Field(default_factory=dict)
     nominal: dict[str, float] = Field(default_factory=dict)
     thermal: str = ""
+    mix: bool = True
 
     @property
     def noise_model(self) -> NoiseModel:

@@ -1,4 +1,4 @@
-"""``fogml blind run`` and ``make`` as commands: what they print, refuse and record."""
+"""``fogml blind run``, ``make`` and ``merge`` as commands: what they print, refuse and record."""
 
 from __future__ import annotations
 
@@ -9,9 +9,13 @@ import yaml
 from typer.testing import CliRunner
 
 from fogml.cli.main import app
+from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import BlindFolder
+from fogml.gap.blind.scoring.marks_file import MARKS
+from fogml.gap.blind.seeds import FINAL_FROM, uses
 from fogml.gap.blind.truth import check_sums, read_truth
 from tests.gap.blind.suites import HandMade, make_suite
+from tests.gap.blind.test_parts import WHOLE, marks_of, written
 
 RUNNER = CliRunner()
 
@@ -72,3 +76,57 @@ def test_leave_one_out_takes_each_effect_in_turn(tmp_path: Path) -> None:
     assert len(set(left)) == 3
     for truth in truths:
         assert truth.left_out and truth.unknown[0].id in truth.left_out
+
+
+def test_make_takes_a_part_of_strong_cases(tmp_path: Path) -> None:
+    options = ["-n", "1", "--first", "7", "--kind", "one", "--least-d-prime", "20", "--sample", "30"]
+    made = RUNNER.invoke(app, ["blind", "make", str(tmp_path / "s"), *options, "--workers", "1", "-q"])
+    assert made.exit_code == 0, made.output
+    truth = read_truth(tmp_path / "s" / "truth" / "0007.json")
+    assert truth.kind == "one" and truth.d_prime > 19.8 and not truth.mix
+    assert yaml.safe_load((tmp_path / "s" / "make.yaml").read_text())["first"] == 7
+    weak = RUNNER.invoke(app, ["blind", "make", str(tmp_path / "t"), "-n", "1", "--least-d-prime", "50"])
+    assert weak.exit_code == 2 and "no stratum" in weak.output
+
+
+def test_scored_parts_are_merged(tmp_path: Path) -> None:
+    suite = make_suite(tmp_path / "suite", [HandMade("nothing")] * 2)
+    for arguments in (["run", "--method", "abstain"], ["score"]):
+        command = ["blind", arguments[0], str(suite.path), *arguments[1:], "--workers", "1", "-q"]
+        done = RUNNER.invoke(app, command)
+        assert done.exit_code == 0, done.output
+    outcome = json.loads((suite.answers("abstain") / "0001" / "outcome.json").read_text())
+    assert outcome["code"] == code_state("abstain")
+    out, file = tmp_path / "page", suite.path / MARKS
+    for wrong in ([str(file)], ["--out", str(out)], [str(file), str(file), "--out", str(out)]):
+        result = RUNNER.invoke(app, ["blind", "merge", *wrong])
+        assert result.exit_code == 2 and not out.exists(), result.output
+    other = written(tmp_path, "other", marks_of(range(11, 15), ("abstain",), sample_s=20.0))
+    merged = RUNNER.invoke(app, ["blind", "merge", str(other), str(file), "--out", str(out), "--json"])
+    assert merged.exit_code == 0, merged.output
+    told = json.loads(merged.stdout)
+    assert told == json.loads((out / "score.json").read_text())
+    assert told["cases"] == 6 and [part["file"] for part in told["parts"]] == [MARKS, "other.json.gz"]
+    assert told["methods"]["abstain"]["code"] == sorted(["c0de", outcome["code"]])
+    assert {path.name for path in out.iterdir()} == {"score.json", "score.html", "score.yaml", MARKS}
+    # One part alone is what it was.
+    again = RUNNER.invoke(app, ["blind", "merge", str(file), "--out", str(out), "--json"])
+    direct = json.loads((suite.path / "score.json").read_text())
+    assert {key: json.loads(again.stdout)[key] for key in (*WHOLE, "parts")} == {
+        key: direct[key] for key in (*WHOLE, "parts")
+    }
+    assert (out / MARKS).read_bytes() == file.read_bytes()
+
+
+def test_merging_a_final_seed_is_a_use_of_it(tmp_path: Path) -> None:
+    path = written(tmp_path, "a", marks_of(range(1, 6), seed=FINAL_FROM))
+    base = ["blind", "merge", str(path), "--out", str(tmp_path / "page"), "-q"]
+    assert RUNNER.invoke(app, base).exit_code == 2
+    ledger = tmp_path / "uses.json"
+    final = RUNNER.invoke(app, [*base, "--final", "--ledger", str(ledger)])
+    assert final.exit_code == 0, final.output
+    assert [use["cases"] for use in uses(ledger)] == [5]
+    values = json.loads((tmp_path / "page" / "score.json").read_text())
+    assert values["final"] and len(values["final_uses"]) == 1
+    assert {case["report"] for case in values["methods"]["diagnosis"]["worst"]} == {None}
+    assert "gap.json" not in (tmp_path / "page" / "score.html").read_text()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import json
 from collections import Counter
 from pathlib import Path
 
@@ -135,3 +136,44 @@ def test_impossible_arguments_are_refused(tmp_path: Path) -> None:
         make_cases(tmp_path, 0, 1)
     with pytest.raises(InputError, match="sample interval"):
         make_cases(tmp_path, 1, 1, sample_s=100.0)
+
+
+def test_a_case_is_the_same_whatever_the_part(made: BlindFolder, tmp_path: Path) -> None:
+    assert make_cases(tmp_path, 1, SEED, SAMPLE_S, workers=1, first=3) == 1
+    assert BlindFolder(tmp_path).names() == ("0003",)
+    part = {name: digest for name, digest in digests(tmp_path).items() if "SHA256SUMS" not in name}
+    assert part == {name: digest for name, digest in digests(made.path).items() if "0003" in name}
+    assert len(part) > 4
+    with pytest.raises(InputError, match="at least 1"):
+        make_cases(tmp_path, 1, SEED, SAMPLE_S, first=0)
+
+
+def test_only_strong_effects_are_drawn_where_that_is_asked(tmp_path: Path) -> None:
+    folder = BlindFolder(tmp_path / "suite")
+    make_cases(folder.path, 2, SEED, SAMPLE_S, workers=1, kinds=["two"], first=5, least_d_prime=10.0)
+    truths = [read_truth(folder.truth / f"{name}.json") for name in folder.names()]
+    assert [truth.case for truth in truths] == ["0005", "0006"]
+    assert all(9.9 < effect.d_prime < 41.0 for truth in truths for effect in truth.effects)
+    assert not any(truth.mix for truth in truths)
+    drawn = plans(6, SEED, ["two"], 10.0)
+    assert {plan.strata for plan in drawn} == {((10.0, 20.0), (20.0, 40.0))}
+    # Nothing else about the cases changes.
+    assert [plan.first for plan in drawn] == [plan.first for plan in plans(6, SEED, ["two"])]
+    with pytest.raises(InputError, match="no stratum begins there"):
+        make_cases(tmp_path / "none", 1, SEED, SAMPLE_S, least_d_prime=20.5)
+    assert not (tmp_path / "none").exists()
+
+
+def test_only_what_is_drawn_whole_is_of_the_mix(made: BlindFolder, tmp_path: Path) -> None:
+    assert all(plan.mix for plan in plans(3, SEED))
+    assert not any(plan.mix for plan in (*plans(3, SEED, ["one"]), *plans(3, SEED, None, 10.0)))
+    path = made.truth / "0001.json"
+    truth = read_truth(path)
+    assert truth.mix
+    with pytest.raises(InputError, match="drawn from the whole mix"):
+        make_cases(made.path, 1, SEED, SAMPLE_S, kinds=[truth.kind])
+    # Truths from before this was stated are of the mix.
+    old = json.loads(path.read_text())
+    del old["mix"]
+    (tmp_path / "0001.json").write_text(json.dumps(old))
+    assert read_truth(tmp_path / "0001.json") == truth

@@ -90,27 +90,34 @@ class Answer:
         Why it failed; empty where it did not.
     seconds, samples
         Time taken [s] and samples read, where they were recorded.
+    code
+        State of the code that answered, where it was recorded.
     """
 
     gap: Gap | None
     failure: str = ""
     seconds: float | None = None
     samples: int | None = None
+    code: str | None = None
 
 
 def read_answer(folder: Path) -> Answer:
     """The answer in a folder; one that is missing or breaks the schema is a failure."""
     outcome: dict[str, Any] = {}
+
+    def failed(reason: str) -> Answer:
+        return Answer(None, reason, outcome.get("seconds"), code=outcome.get("code"))
+
     try:
         if (folder / OUTCOME).is_file():
             outcome = read_json(folder / OUTCOME)
         if outcome and not outcome.get("done"):
-            return Answer(None, f"{outcome.get('reason')}: {outcome.get('message')}", outcome.get("seconds"))
+            return failed(f"{outcome.get('reason')}: {outcome.get('message')}")
         gap = Gap.model_validate(read_json(folder / "gap.json"))
     except InputError as error:
         return Answer(None, f"no answer: {error}")
     except ValidationError as error:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
-        return Answer(None, f"gap.json, key '{key}': {first['msg']}", outcome.get("seconds"))
-    return Answer(gap, "", outcome.get("seconds"), outcome.get("samples"))
+        return failed(f"gap.json, key '{key}': {first['msg']}")
+    return Answer(gap, "", outcome.get("seconds"), outcome.get("samples"), outcome.get("code"))

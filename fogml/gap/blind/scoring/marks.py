@@ -8,7 +8,7 @@ structure is what is wrong. A case that failed is a wrong answer in every figure
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,6 +65,10 @@ class Mark:
         Whether each 90 % interval holds the true value.
     seconds, samples
         Time taken [s], and samples read.
+    relatives
+        Relatives of what was left out that it lists.
+    code
+        State of the code that answered.
     """
 
     truth: Truth
@@ -82,7 +86,8 @@ class Mark:
     amplitude_covered: tuple[bool, ...] = ()
     seconds: float | None = None
     samples: int | None = None
-    relatives: tuple[str, ...] = field(default=())
+    relatives: tuple[str, ...] = ()
+    code: str | None = None
 
     @property
     def named(self) -> tuple[Judged, ...]:
@@ -126,6 +131,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
             overlap=0.0 if truth.segments else None,
             closed_ratios=_closed_ratios(truth, None),
             seconds=answer.seconds,
+            code=answer.code,
         )  # fmt: skip
     asked = relative if any(effect.id is not None for effect in truth.unknown) else None
     items, relatives = [], []
@@ -157,6 +163,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         seconds=answer.seconds,
         samples=answer.samples,
         relatives=tuple(relatives),
+        code=answer.code,
     )
 
 
