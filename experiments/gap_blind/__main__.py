@@ -125,8 +125,9 @@ def _merge(home: Path, seed: int, final: bool, terminal: Terminal) -> None:
         else:
             terminal.say(f"{path.name} is left out: it is of seed {held}, not {seed}")
     merge_and_write(MergeSettings(marks=found, final=final, ledger=LEDGER, out=str(home)), terminal)
-    # The parts' own marks lie there already.
+    # The parts' own marks lie there already, and the configuration that made this one is `config.yaml`.
     (home / MARKS).unlink()
+    (home / "score.yaml").unlink()
 
 
 if __name__ == "__main__":

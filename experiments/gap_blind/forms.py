@@ -8,7 +8,8 @@ that the best node of the catalogue's candidate makes with the best coefficients
 
 and what is lost, ``||s - C b||^2 / 2`` nats. The rest counts as evidence for something else.
 
-``python -m experiments.gap_blind.forms DIR`` writes ``forms.json`` and ``forms.md`` beside itself.
+``python -m experiments.gap_blind.forms DIR/PART`` writes ``forms-PART.json``
+beside itself, and ``forms.md`` of every part of the seed that was measured.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.gap_blind.per_case import measure_cases, true_frame, write_tables
+from experiments.gap_blind.per_case import measure_cases, true_frame, write_page
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.truth import read_contributions, read_truth
 from fogml.gap.candidate_columns import candidate_columns
@@ -34,9 +35,9 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure every case, write the table."""
-    found = measure_cases(_measured, __doc__, "a suite; it need not be answered")
+    found = measure_cases("forms", _measured, __doc__, "a suite, or a part of one; it need not be answered")
     rows = [row for own in found for row in own]
-    write_tables("forms", rows, _page(rows, len(found)))
+    write_page("forms", _page(rows, len(found)))
 
 
 def _measured(folder: BlindFolder, name: str) -> list[Row]:

@@ -11,7 +11,8 @@ amplitudes, leave of the true contributions, both whitened by the true noise, be
 Where the answer says that something unknown acts, what truly is unknown counts as answered. Relatives of
 an effect that was left out are no wrong names, as in the score.
 
-``python -m experiments.gap_blind.limits DIR`` writes ``limits.json`` and ``limits.md`` beside itself.
+``python -m experiments.gap_blind.limits DIR/PART`` writes ``limits-PART.json``
+beside itself, and ``limits.md`` of every part of the seed that was measured.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from experiments.gap_blind.per_case import measure_cases, true_frame, write_tables
+from experiments.gap_blind.per_case import measure_cases, true_frame, write_page
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness, relatives_of
 from fogml.gap.blind.scoring.answers import read_answer
@@ -70,15 +71,13 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure every case that the diagnosis answered; write the tables."""
-    found = measure_cases(_measured, __doc__, "an answered suite")
-    effects = [row for own, _, _ in found for row in own]
-    wrong = [row for _, row, _ in found if row is not None]
-    asked = [row for _, _, row in found]
-    content = {"effects": effects, "wrong": wrong, "asked": asked}
-    write_tables("limits", content, _page(effects, wrong, asked))
+    found = measure_cases("limits", _measured, __doc__, "an answered suite, or a part of one")
+    effects = [row for case in found for row in case["effects"]]
+    wrong = [case["wrong"] for case in found if case["wrong"] is not None]
+    write_page("limits", _page(effects, wrong, [case["asked"] for case in found]))
 
 
-def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Row]:
+def _measured(folder: BlindFolder, name: str) -> Row:
     """What each effect of a case adds, a wrong answer's distance from the truth, and the unknown's share."""
     truth = read_truth(folder.truth / f"{name}.json")
     answer = read_answer(folder.answers() / name)
@@ -86,10 +85,11 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Ro
     asked = {
         "case": name,
         "kind": truth.kind,
+        "mix": truth.mix,
         "unknown": answer.gap.unknown.probability if answer.gap else 0.0,
     }
     if answer.gap is None or not truth.effects:
-        return [], None, asked
+        return {"effects": [], "wrong": None, "asked": asked}
     marked = mark(truth, answer, relatives_of(folder, truth))
     named = [item for item in answer.gap.which if item.named]
     held = {member for item in named for member in item.members}
@@ -103,10 +103,11 @@ def _measured(folder: BlindFolder, name: str) -> tuple[list[Row], Row | None, Ro
     ]
     missed = sorted({e.id for e in truth.known if e.id} - held)
     if not (wrong or missed):
-        return effects, None, asked
+        return {"effects": effects, "wrong": None, "asked": asked}
     row = {"case": name, "kind": truth.kind, "wrong": wrong, "missed": missed, "unknown": unknown}
     ids = {item.effect for item in named}
-    return effects, row | {"nats": _distance(folder, truth, ids, unknown >= 0.5)}, asked
+    row["nats"] = _distance(folder, truth, ids, unknown >= 0.5)
+    return {"effects": effects, "wrong": row, "asked": asked}
 
 
 def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
@@ -197,6 +198,8 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
         "area under the curve is 1 - h / 2, and the threshold that 95 % of the unknowns reach is reached by "
         "a share 1 - 0.05 / h of the cases without one, too.",
         "",
+        "Cases of the whole mix alone.",
+        "",
         "| unknowns | cases | hidden | AUROC within reach | AUROC | FPR95 within reach | FPR95 |",
         "|---|---:|---:|---:|---:|---:|---:|",
         *(_open_set(everything, asked, above) for above in (0.0, STRONG)),
@@ -253,7 +256,9 @@ def _wrong_names(
 
 def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str:
     """A line of the table: unknowns over a d' against every case without one."""
-    unknown = {r["case"]: r for r in effects if not r["known"] and r["kind"] in OPEN and r["d_prime"] > above}
+    asked = [r for r in asked if r["mix"]]
+    mix = {r["case"] for r in asked if r["kind"] in OPEN}
+    unknown = {r["case"]: r for r in effects if not r["known"] and r["case"] in mix and r["d_prime"] > above}
     without = [r for r in asked if r["kind"] not in (*OPEN, "wrong_thermal")]
     if not unknown or not without:
         return f"| d′ over {above:g} | 0 | – | – | – | – | – |"

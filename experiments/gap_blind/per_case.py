@@ -6,12 +6,12 @@ import argparse
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.truth import Truth
+from fogml.gap.blind.truth import Truth, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
 from fogml.gap.run_whitener import RunWhitener
@@ -20,35 +20,50 @@ from fogml.outputs import whole_file
 from fogml.runs.reading import read_run
 
 HERE = Path(__file__).parent
-Found = TypeVar("Found")
 
 
 def measure_cases(
-    measured: Callable[[BlindFolder, str], Found], words: str | None, suite: str
-) -> list[Found]:
-    """What `measured` finds of each case of the suite that the command line names.
+    name: str, measured: Callable[[BlindFolder, str], Any], words: str | None, suite: str
+) -> list[Any]:
+    """What `measured` finds of each case of a suite, and what was found of other parts of its seed before.
+
+    A part's findings are kept beside the experiments as ``name-FOLDER.json``.
 
     Parameters
     ----------
+    name
+        Of the experiment.
     measured
-        Takes the suite's folder and a case's name.
+        Takes the suite's folder and a case's name; what it gives is JSON-ready.
     words
         What the command does.
     suite
-        What the suite has to be.
+        What the suite that the command line names has to be.
     """
     parser = argparse.ArgumentParser(description=words, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("directory", help=suite)
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     given = parser.parse_args()
     folder = BlindFolder(Path(given.directory))
-    return list(Parallel(n_jobs=given.workers)(delayed(measured)(folder, name) for name in folder.names()))
+    names = folder.names()
+    found = list(Parallel(n_jobs=given.workers)(delayed(measured)(folder, case) for case in names))
+    seed = read_truth(folder.truth / f"{names[0]}.json").seed
+    _keep(name, folder.path.resolve().name, {"seed": seed, "cases": found})
+    return _of_seed(name, seed)
 
 
-def write_tables(name: str, content: Any, page: str) -> None:
-    """Write ``name.json`` and ``name.md`` beside the experiments."""
-    with whole_file(HERE / f"{name}.json") as partial:
-        partial.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
+def _keep(name: str, part: str, content: Any) -> None:
+    with whole_file(HERE / f"{name}-{part}.json") as partial:
+        partial.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
+
+
+def _of_seed(name: str, seed: int) -> list[Any]:
+    parts = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(HERE.glob(f"{name}-*.json"))]
+    return [case for part in parts if part["seed"] == seed for case in part["cases"]]
+
+
+def write_page(name: str, page: str) -> None:
+    """Write ``name.md`` beside the experiments."""
     with whole_file(HERE / f"{name}.md") as partial:
         partial.write_text(page, encoding="utf-8")
 

@@ -10,7 +10,9 @@ import pytest
 import yaml
 
 from experiments.gap_blind import __main__ as full
+from experiments.gap_blind import per_case
 from fogml.cli.blind_job import MakeSettings
+from fogml.gap.blind.make import make_cases
 from fogml.gap.blind.plan import plans
 from fogml.gap.blind.scoring.marks_file import write_marks
 from fogml.gap.blind.scoring.table import ENOUGH, FIGURES
@@ -78,3 +80,18 @@ def test_a_part_is_scored_with_the_marks_that_are_there(
         "marks-old.json.gz",
         "marks-one.json.gz",
     ]
+
+
+def test_what_is_measured_of_a_part_joins_the_other_parts_of_its_seed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setattr(per_case, "HERE", home)
+    for part, seed, first in (("mix", 3, 1), ("one", 3, 2001), ("old", 4, 1)):
+        make_cases(tmp_path / part, 1, seed, sample_s=30.0, workers=1, kinds=["nothing"], first=first)
+        monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / part), "--workers", "1"])
+        found = per_case.measure_cases("limits", lambda folder, case: [case], "", "")
+    assert found == [["0001"]]
+    monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / "one"), "--workers", "1"])
+    assert per_case.measure_cases("limits", lambda folder, case: [case], "", "") == [["0001"], ["2001"]]
