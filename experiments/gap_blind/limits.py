@@ -45,6 +45,8 @@ STRONG = 10.0
 SHOWN_NATS = 8.0
 UNKNOWNS = ("unknown_left_out", "unknown_invented")
 OPEN = (*UNKNOWNS, "unknown_and_known")
+STRONG_OUTSIDE = ("one", *UNKNOWNS)
+"""Kinds whose cases outside the mix are strong ones alone; see `config.yaml`."""
 FIGURES = (
     ("one effect, d′ over 10: class exact", ("one",), True, STRONG, True),
     ("one effect, any d′: class exact", ("one",), True, 0.0, True),
@@ -72,7 +74,7 @@ Row = dict[str, Any]
 def main() -> None:
     """Measure every case that the diagnosis answered; write the tables."""
     found = measure_cases("limits", _measured, __doc__, "an answered suite, or a part of one")
-    effects = [row for case in found for row in case["effects"]]
+    effects = [row | {"mix": case["asked"]["mix"]} for case in found for row in case["effects"]]
     wrong = [case["wrong"] for case in found if case["wrong"] is not None]
     write_page("limits", _page(effects, wrong, [case["asked"] for case in found]))
 
@@ -257,8 +259,8 @@ def _wrong_names(
 def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str:
     """A line of the table: unknowns over a d' against every case without one."""
     asked = [r for r in asked if r["mix"]]
-    mix = {r["case"] for r in asked if r["kind"] in OPEN}
-    unknown = {r["case"]: r for r in effects if not r["known"] and r["case"] in mix and r["d_prime"] > above}
+    open_ = [r for r in effects if r["mix"] and not r["known"] and r["kind"] in OPEN]
+    unknown = {r["case"]: r for r in open_ if r["d_prime"] > above}
     without = [r for r in asked if r["kind"] not in (*OPEN, "wrong_thermal")]
     if not unknown or not without:
         return f"| d′ over {above:g} | 0 | – | – | – | – | – |"
@@ -273,10 +275,13 @@ def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str
 
 
 def _cases(effects: Sequence[Row], kinds: Sequence[str], above: float) -> dict[str, list[Row]]:
-    """Effects by case, of cases of these kinds whose weakest effect has a d' above a limit."""
+    """Effects by case, of cases of these kinds whose weakest effect has a d' above a limit.
+
+    Of any d' are cases of the mix, where those outside it are strong ones.
+    """
     held: dict[str, list[Row]] = {}
     for row in effects:
-        if row["kind"] in kinds:
+        if row["kind"] in kinds and (above or row["mix"] or row["kind"] not in STRONG_OUTSIDE):
             held.setdefault(row["case"], []).append(row)
     return {case: rows for case, rows in held.items() if min(row["d_prime"] for row in rows) > above}
 

@@ -231,10 +231,15 @@ def rows(marks: Sequence[Mark]) -> list[dict[str, Any]]:
                 "met": figure.met(estimate.value),
                 "enough": len(chosen) >= ENOUGH,
                 "by_stratum": _split(figure, marks, STRATUM_NAMES, lambda m: m.truth.stratum),
-                "by_kind": _split(figure, marks, figure.kinds, lambda m: m.truth.kind),
+                "by_kind": _split(figure, _evenly(figure, marks), figure.kinds, lambda m: m.truth.kind),
             }
         )
     return found
+
+
+def _evenly(figure: Figure, marks: Sequence[Mark]) -> Sequence[Mark]:
+    """Cases of any d' alike: where strong ones count alone, those outside the mix may be nothing else."""
+    return [m for m in marks if m.truth.mix] if figure.above else marks
 
 
 def _split(
