@@ -4,7 +4,7 @@
 DIR may be on another disk, and writes ``score.json`` and ``score.html`` of all parts into DIR. An
 interrupted call goes on where it was. With ``--final`` it uses the seed that is kept for final figures,
 records that, and writes beside itself instead: the score, and each part's marks as
-``marks-NAME.json.gz``.
+``marks-NAME.json.gz``. Reports of the worst cases lie in DIR; the page is there, too, with links to them.
 
 Parts may be done on different days or on machines that share nothing, each with ``--part NAME``: wherever
 one is scored, the score is made of all marks of the seed that are there. On a cluster with a shared disk:
@@ -14,6 +14,7 @@ once ``--stage make``, then on each of n machines ``--stage run --shard i/n``, t
 from __future__ import annotations
 
 import argparse
+import json
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -31,9 +32,11 @@ from fogml.cli.blind_job import (
     run_and_tell,
     score_and_write,
 )
+from fogml.cli.blind_reports import link_reports
 from fogml.cli.terminal import Terminal
 from fogml.gap.blind.scoring.marks_file import MARKS, read_marks
 from fogml.outputs import whole_file
+from fogml.report import blind_page
 
 HERE = Path(__file__).parent
 STAGES = ("make", "run", "score")
@@ -60,6 +63,8 @@ def main() -> None:
                 shutil.copyfile(Path(given.directory) / part["name"] / MARKS, partial)
     if "score" in stages:
         _merge(home, suite["seed"], given.final, terminal)
+        if given.final:
+            _page_with_reports(home, Path(given.directory), terminal)
 
 
 def _parser(names: Any) -> argparse.ArgumentParser:
@@ -103,7 +108,7 @@ def _do(
         run_and_tell(
             RunSettings(
                 directory=directory,
-                methods=config["methods"],
+                methods=part.get("methods", config["methods"]),
                 workers=given.workers,
                 limit=config["limit"],
                 shard=given.shard,
@@ -128,6 +133,15 @@ def _merge(home: Path, seed: int, final: bool, terminal: Terminal) -> None:
     # The parts' own marks lie there already, and the configuration that made this one is `config.yaml`.
     (home / MARKS).unlink()
     (home / "score.yaml").unlink()
+
+
+def _page_with_reports(home: Path, directory: Path, terminal: Terminal) -> None:
+    """The score's page once more where the cases lie, linked to their reports."""
+    values = json.loads((home / "score.json").read_text(encoding="utf-8"))
+    link_reports(values, sorted(path.parent for path in directory.glob(f"*/{MARKS}")), directory)
+    with whole_file(directory / "score.html") as partial:
+        partial.write_text(blind_page(values), encoding="utf-8")
+    terminal.say(f"Linked to the reports of the worst cases that lie there: {directory / 'score.html'}")
 
 
 if __name__ == "__main__":

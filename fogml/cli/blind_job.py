@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import field_validator
 
+from fogml.cli.blind_reports import draw_reports, link_reports
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 LEDGER = "experiments/gap_blind/final_uses.json"
 _WANTED = "wanted"
 _BASELINES = "baselines"
-_REPORTS = "reports"
 
 
 class SuiteSettings(Settings):
@@ -212,10 +211,10 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
     values["gates"] = gate(values, settings.gates, judged)
     if judged == DIAGNOSIS:
-        _draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
+        draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
     out = Path(settings.out) if settings.out else folder.path
-    beside = out.resolve() == folder.path.resolve()
-    _write(out, values, marks, settings.in_full().yaml("blind score"), beside)
+    link_reports(values, [folder.path], out)
+    _write(out, values, marks, settings.in_full().yaml("blind score"))
     _tell(out, values, judged, terminal)
     return all(one["met"] for one in values["gates"])
 
@@ -229,16 +228,13 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
         raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
     marks = merged([Path(path) for path in settings.marks])
     values = score_values(marks, Path(settings.ledger) if settings.final else None)
-    for found in values["methods"].values():
-        for case in found["worst"]:
-            # The cases' folders may be on another machine.
-            case["report"] = None
     out = Path(settings.out)
-    _write(out, values, marks, settings.in_full().yaml("blind merge"), linked=False)
+    link_reports(values, [Path(path).parent for path in settings.marks], out)
+    _write(out, values, marks, settings.in_full().yaml("blind merge"))
     _tell(out, values, next(iter(marks.methods)), terminal)
 
 
-def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str, linked: bool) -> None:
+def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str) -> None:
     from fogml.gap.blind.scoring.marks_file import MARKS, write_marks
     from fogml.report.blind_page import blind_page
 
@@ -246,7 +242,7 @@ def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str, link
         text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
         (staging / "score.json").write_text(text + "\n", encoding="utf-8")
         (staging / "score.yaml").write_text(config, encoding="utf-8")
-        (staging / "score.html").write_text(blind_page(values, linked=linked), encoding="utf-8")
+        (staging / "score.html").write_text(blind_page(values), encoding="utf-8")
         write_marks(staging / MARKS, marks)
 
 
@@ -254,26 +250,6 @@ def _tell(out: Path, values: dict[str, Any], judged: str, terminal: Terminal) ->
     _print(values, judged, terminal)
     terminal.result(values)
     terminal.say(f"Written to {out}: open {out / 'score.html'}")
-
-
-def _draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], seed: int, terminal: Terminal) -> None:
-    """Diagnose the worst cases once more, to draw their pages, and link to those."""
-    from fogml.gap.blind.run import RunPlan, run_cases
-
-    names = tuple(case["case"] for case in worst if case["verdict"] != "failed")
-    method = "fogml.report.blind_answer:diagnosis_with_page"
-    reports = folder.path / _REPORTS
-    for name in names:
-        held, answer = (place / name / "gap.json" for place in (reports, folder.answers()))
-        # A page of an answer that was given anew since is another one's.
-        if held.is_file() and held.read_bytes() != answer.read_bytes():
-            shutil.rmtree(held.parent)
-    plan = RunPlan(folder, method, name=DIAGNOSIS, only=names, into=reports, retry=True, seed=seed)
-    with terminal.work("drawing the worst cases", total=len(plan.left())) as work:
-        run_cases(plan, lambda case: work.advance(doing=f"drawing {case}"))
-    for case in worst:
-        if (reports / case["case"] / "gap.html").is_file():
-            case["report"] = f"{_REPORTS}/{case['case']}/gap.html"
 
 
 def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:

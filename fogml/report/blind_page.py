@@ -16,15 +16,13 @@ _ORACLE = "oracle"
 _STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_kept", "mixed_false_name")
 
 
-def blind_page(values: Mapping[str, Any], linked: bool = True) -> str:
+def blind_page(values: Mapping[str, Any]) -> str:
     """The self-contained HTML page of a ``score.json``.
 
     Parameters
     ----------
     values
         Schema ``fogml.blind_score/1``.
-    linked
-        Whether the page will lie in the suite's folder, so that it can link to reports.
     """
     methods = values["methods"]
     name = _DIAGNOSIS if _DIAGNOSIS in methods else next(iter(methods))
@@ -47,7 +45,7 @@ def blind_page(values: Mapping[str, Any], linked: bool = True) -> str:
         open_set=open_set_plot({m: v["open_set"] for m, v in methods.items()}, areas),
         confusion=confusion_plot(judged["confusion"]) if judged["confusion"]["true"] else None,
         left_out=_left_out(judged["left_out"]) if judged["left_out"] else None,
-        worst=_worst(judged["worst"], linked),
+        worst=_worst(judged["worst"]),
         gates=_gates(values["gates"]) if values["gates"] else None,
         uses=_uses(values["final_uses"]) if values["final_uses"] else None,
         suite_parts=_parts(values["parts"]) if len(values["parts"]) > 1 else None,
@@ -208,14 +206,14 @@ def _left_out(parts: Sequence[Mapping[str, Any]]) -> Table:
     )
 
 
-def _worst(cases: Sequence[Mapping[str, Any]], linked: bool) -> list[dict[str, str]]:
+def _worst(cases: Sequence[Mapping[str, Any]]) -> list[dict[str, str]]:
     told = []
     for case in cases:
         named = [f"{listed(item['class'], 4)} ({number(item['probability'], 2)})" for item in case["named"]]
         told.append(
             {
                 "case": case["case"],
-                "href": case["report"] if linked else "",
+                "href": case.get("report") or "",
                 "kind": kind_words(case["kind"]),
                 "d_prime": number(case["d_prime"]) if case["true"] else MISSING,
                 "true": listed(case["true"], 4) or "nothing",

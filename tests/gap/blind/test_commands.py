@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import yaml
 from typer.testing import CliRunner
 
+from fogml.cli.blind_reports import link_reports
 from fogml.cli.main import app
 from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import BlindFolder
@@ -116,6 +118,17 @@ def test_scored_parts_are_merged(tmp_path: Path) -> None:
         key: direct[key] for key in (*WHOLE, "parts")
     }
     assert (out / MARKS).read_bytes() == file.read_bytes()
+
+
+def test_worst_cases_link_to_what_lies_there(tmp_path: Path) -> None:
+    parts = [tmp_path / "a", tmp_path / "b", tmp_path / "elsewhere"]
+    for file in ("a/answers/0001/gap.json", "b/reports/0002/gap.html", "b/answers/0002/gap.json"):
+        (tmp_path / file).parent.mkdir(parents=True)
+        (tmp_path / file).touch()
+    worst: list[dict[str, Any]] = [{"case": case} for case in ("0001", "0002", "0003")]
+    link_reports({"methods": {"diagnosis": {"worst": worst}}}, parts, tmp_path / "a" / "page")
+    told = [case["report"] for case in worst]
+    assert told == ["../answers/0001/gap.json", "../../b/reports/0002/gap.html", None]
 
 
 def test_merging_a_final_seed_is_a_use_of_it(tmp_path: Path) -> None:

@@ -127,7 +127,7 @@ def test_two_halves_are_the_whole(tmp_path: Path) -> None:
         ("a.json.gz", 1, 25, 25),
         ("b.json.gz", 26, 50, 25),
     ]
-    assert "b.json.gz" in blind_page(values, linked=False)
+    assert "b.json.gz" in blind_page(values)
     # What was merged can be merged again, in any order.
     write_marks(tmp_path / "both.json.gz", both)
     third = written(tmp_path, "c", marks_of(range(51, 61)))
@@ -182,14 +182,14 @@ def test_cases_outside_the_mix_move_their_own_rows_alone(tmp_path: Path) -> None
     assert found["reliability"] == held["reliability"] and found["open_set"] == held["open_set"]
     assert sum(map(sum, found["confusion"]["counts"])) > sum(map(sum, held["confusion"]["counts"]))
     assert (more["cases"], more["mix"]) == (71, 40)
-    assert "31 cases outside the mix" in blind_page(more, linked=False)
+    assert "31 cases outside the mix" in blind_page(more)
 
 
 def test_a_suite_of_chosen_kinds_alone_is_its_own_mix() -> None:
     chosen, whole = (score_values(marks_of(range(1, 41), mix=mix)) for mix in (False, True))
     assert figures(chosen) == figures(whole) and chosen["mix"] == 0
-    assert "No case is drawn from the whole mix" in blind_page(chosen, linked=False)
-    assert "No case is drawn" not in blind_page(whole, linked=False)
+    assert "No case is drawn from the whole mix" in blind_page(chosen)
+    assert "No case is drawn" not in blind_page(whole)
 
 
 def test_several_states_of_the_code_are_told() -> None:

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from fogml.gap.blind.folders import DIAGNOSIS
 from fogml.gap.blind.scoring.answers import NAMED
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.scoring.statistics import proportion
@@ -75,10 +74,9 @@ def left_out(marks: Sequence[Mark]) -> list[dict[str, Any]]:
     return rows
 
 
-def worst(marks: Sequence[Mark], method: str, count: int = WORST) -> list[dict[str, Any]]:
+def worst(marks: Sequence[Mark], count: int = WORST) -> list[dict[str, Any]]:
     """The cases with the most certain wrong answers, worst first, each with what is wrong."""
     scored = sorted(((_badness(m), m) for m in marks), key=lambda pair: (-pair[0], pair[1].truth.case))
-    folder = "answers" if method == DIAGNOSIS else f"answers-{method}"
     return [
         {
             "case": m.truth.case,
@@ -91,7 +89,6 @@ def worst(marks: Sequence[Mark], method: str, count: int = WORST) -> list[dict[s
             "unknown": None if m.failure else m.unknown,
             "verdict": m.verdict,
             "wrong": _wrong(m),
-            "report": f"{folder}/{m.truth.case}/{'outcome' if m.failure else 'gap'}.json",
         }
         for badness, m in scored[:count]
         if badness > 0.0

@@ -38,7 +38,7 @@ def score_values(marks: Marks, final: Path | None = None) -> dict[str, Any]:
     check_use(marks.seed, final)
     truths = marks.truths
     mix = sum(truth.mix for truth in truths)
-    found = {name: _method(name, own if mix else _as_mix(own)) for name, own in marks.methods.items()}
+    found = {name: _method(own if mix else _as_mix(own)) for name, own in marks.methods.items()}
     if final is not None:
         figures = {
             name: {row["key"]: row["value"] for row in values["rows"]} for name, values in found.items()
@@ -70,7 +70,7 @@ def _as_mix(marks: Sequence[Mark]) -> list[Mark]:
     return [replace(m, truth=m.truth.model_copy(update={"mix": True})) for m in marks]
 
 
-def _method(name: str, marks: Sequence[Mark]) -> dict[str, Any]:
+def _method(marks: Sequence[Mark]) -> dict[str, Any]:
     return {
         "code": _code_states(marks),
         "rows": rows(marks),
@@ -78,7 +78,7 @@ def _method(name: str, marks: Sequence[Mark]) -> dict[str, Any]:
         "open_set": thinned(curve(BY_KEY["auroc"].chosen(marks))),
         "confusion": confusion(marks),
         "left_out": left_out(marks),
-        "worst": worst(marks, name),
+        "worst": worst(marks),
         "failed": [{"case": m.truth.case, "reason": m.failure} for m in marks if m.failure],
     }
 
