@@ -5,6 +5,7 @@ DIR may be on another disk, and writes ``score.json`` and ``score.html`` of all 
 interrupted call goes on where it was. With ``--final`` it uses the seed that is kept for final figures,
 records that, and writes beside itself instead: the score, and each part's marks as
 ``marks-NAME.json.gz``. Reports of the worst cases lie in DIR; the page is there, too, with links to them.
+How often the diagnosis was right goes to ``fogml/report/error_rates.json``, which its pages tell.
 
 Parts may be done on different days or on machines that share nothing, each with ``--part NAME``: wherever
 one is scored, the score is made of all marks of the seed that are there. On a cluster with a shared disk:
@@ -34,9 +35,11 @@ from fogml.cli.blind_job import (
 )
 from fogml.cli.blind_reports import link_reports
 from fogml.cli.terminal import Terminal
+from fogml.gap.blind.folders import DIAGNOSIS
 from fogml.gap.blind.scoring.marks_file import MARKS, read_marks
 from fogml.outputs import whole_file
 from fogml.report import blind_page
+from fogml.report.error_rates import ERROR_RATES, error_rates
 
 HERE = Path(__file__).parent
 STAGES = ("make", "run", "score")
@@ -64,7 +67,7 @@ def main() -> None:
     if "score" in stages:
         _merge(home, suite["seed"], given.final, terminal)
         if given.final:
-            _page_with_reports(home, Path(given.directory), terminal)
+            _tell_elsewhere(home, Path(given.directory), terminal)
 
 
 def _parser(names: Any) -> argparse.ArgumentParser:
@@ -135,9 +138,12 @@ def _merge(home: Path, seed: int, final: bool, terminal: Terminal) -> None:
     (home / "score.yaml").unlink()
 
 
-def _page_with_reports(home: Path, directory: Path, terminal: Terminal) -> None:
-    """The score's page once more where the cases lie, linked to their reports."""
+def _tell_elsewhere(home: Path, directory: Path, terminal: Terminal) -> None:
+    """The page where the cases lie, linked to their reports; error rates for pages of diagnoses."""
     values = json.loads((home / "score.json").read_text(encoding="utf-8"))
+    if DIAGNOSIS in values["methods"]:
+        with whole_file(ERROR_RATES) as partial:
+            partial.write_text(json.dumps(error_rates(values), indent=1) + "\n", encoding="utf-8")
     link_reports(values, sorted(path.parent for path in directory.glob(f"*/{MARKS}")), directory)
     with whole_file(directory / "score.html") as partial:
         partial.write_text(blind_page(values), encoding="utf-8")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from fogml.gap.result import Diagnosis, RunSeries
 from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables
+from fogml.report.error_rates import error_sentences
 from fogml.report.gap_tiles import headline_tiles, warnings
 from fogml.report.gap_words import (
     headline,
@@ -57,6 +58,7 @@ def gap_page(found: Diagnosis) -> str:
         tiles=headline_tiles(found, names),
         strip=figures_gap.how_far_strip(found.how_far, bool(found.named)) if found.how_far else None,
         warnings=warnings(found, names),
+        error_rates=error_sentences(found),
         causes=gap_tables.causes_table(found.found, names) if found.found else None,
         classes=gap_tables.classes_table(found.found, names),
         how_far=gap_tables.how_far_table(found) if found.how_far else None,

@@ -1,0 +1,97 @@
+"""How often a diagnosis is right: what the check on withheld effects found, told beside each diagnosis.
+
+``error_rates.json`` holds the rates; ``python -m experiments.gap_blind DIR --final`` writes them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from fogml.gap.result import NAMED, Diagnosis
+from fogml.report.words import percent, plural
+
+ERROR_RATES = Path(__file__).with_name("error_rates.json")
+_STRONG = "with d′ over 10 (its length over the noise)"
+_SHARE = ("value", "low", "high", "n")
+_FIGURES = ("nothing_named", "one_top", "unknown_wrong_name")
+
+
+def error_rates(score: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a blind score tells how often the diagnosis is right.
+
+    Parameters
+    ----------
+    score
+        Schema ``fogml.blind_score/1``, with the method ``diagnosis``.
+
+    Returns
+    -------
+    dict
+        ``cases``, ``seed``; ``named``, bands of the stated probability, each with the share found right;
+        ``figures``, by the score's keys. Shares have 95 % intervals and the number that they rest on.
+    """
+    judged = score["methods"]["diagnosis"]
+    bands, rows = judged["reliability"], {row["key"]: row for row in judged["rows"]}
+    return {
+        "cases": score["cases"],
+        "seed": score["seed"],
+        "named": [
+            {"from": band["from"], "to": band["to"], "value": band["found"]}
+            | {part: band[part] for part in _SHARE[1:]}
+            for band in bands
+            if band["from"] >= NAMED
+        ],
+        "figures": {
+            key: {part: rows[key][part] for part in ("value", "low", "high", "n")} for key in _FIGURES
+        },
+    }
+
+
+def error_sentences(found: Diagnosis) -> list[str]:
+    """How often such findings were right on cases whose truth is known; first what was checked."""
+    rates = _held()
+    figures = rates["figures"]
+    told = [
+        f"Checked on {plural(rates['cases'], 'synthetic case')} with their truth withheld, from a reality "
+        "that is not the twin, with the nominal twin and the catalogue's candidates. A real gyro may hold "
+        "what these did not."
+    ]
+    if not found.named:
+        return [
+            *told,
+            f"With nothing missing, an effect was named in {_of(figures['nothing_named'])}.",
+            f"Where one effect of the catalogue acted, {_STRONG}, the right one or its class came first in "
+            f"{_of(figures['one_top'])}.",
+        ]
+    for band in reversed(rates["named"]):
+        if any(_inside(band, finding.probability) for finding in found.named):
+            told.append(
+                f"Of {plural(band['n'], 'name')} given with {100 * band['from']:.0f} to "
+                f"{100 * band['to']:.0f} %, {percent(band['value'])} were right {_interval(band)}."
+            )
+    told.append(
+        f"Where nothing but something outside the candidates acted, {_STRONG}, a candidate was named all the "
+        f"same in {_of(figures['unknown_wrong_name'])}."
+    )
+    return told
+
+
+def _inside(band: Mapping[str, Any], probability: float) -> bool:
+    return bool(band["from"] <= probability < band["to"] or probability == band["to"] == 1.0)
+
+
+@cache
+def _held() -> dict[str, Any]:
+    return dict(json.loads(ERROR_RATES.read_text(encoding="utf-8")))
+
+
+def _of(share: Mapping[str, Any]) -> str:
+    return f"{percent(share['value'])} of {plural(share['n'], 'case')} {_interval(share)}"
+
+
+def _interval(share: Mapping[str, Any]) -> str:
+    return f"(95 % interval: {percent(share['low'])} to {percent(share['high'])})"
