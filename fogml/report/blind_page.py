@@ -131,7 +131,14 @@ def _others(methods: Mapping[str, Any], name: str) -> Table:
     for row in methods[name]["rows"]:
         cells = (value_text(tables[m][row["key"]]["value"], row["format"]) for m in order)
         rows.append(Row((row["words"], wanted_text(row), *cells)))
-    return Table(tuple(columns), tuple(rows), "The same cases and the same scorer for every method.")
+    answered: dict[int, list[str]] = {}
+    for m in order:
+        answered.setdefault(tables[m]["failed"]["cases"], []).append(m)
+    told = "The same cases and the same scorer for every method."
+    if len(answered) > 1:
+        shares = (f"{listed(found, len(order))}: {count}" for count, found in answered.items())
+        told = f"The same scorer for every method. Cases of the mix that were answered: {'; '.join(shares)}."
+    return Table(tuple(columns), tuple(rows), told)
 
 
 def _strata(rows: Sequence[Mapping[str, Any]]) -> Table:

@@ -143,6 +143,8 @@ def test_a_method_counts_over_the_parts_that_it_answered(tmp_path: Path) -> None
     assert figures(values)["failed"]["n"] == 50 and figures(values, "bic")["failed"]["n"] == 25
     alone = score_values(marks_of(range(1, 26)))
     assert figures(values, "bic") == figures(alone, "bic")
+    assert "answered: diagnosis: 50; bic: 25." in blind_page(values)
+    assert "The same cases and the same scorer" in blind_page(alone)
 
 
 def test_parts_that_don_t_belong_together_are_refused(tmp_path: Path) -> None:
