@@ -193,6 +193,8 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
         "|---|---:|---:|---:|",
         *(_wrong_names(everything, wrong, *figure) for figure in WRONG_NAMES),
         "",
+        _false_names(effects, wrong, {row["case"] for row in asked if row["mix"]}),
+        "",
         "## How far an unknown can be told from none",
         "",
         f"An unknown that adds less than {SHOWN_NATS:g} nats is hidden: also for one who knows its form it "
@@ -254,6 +256,18 @@ def _wrong_names(
     nats = [row["nats"] for row in wrong if row["wrong"] and row["case"] in counted]
     far = sum(value >= SHOWN_NATS for value in nats)
     return f"| {words} | {len(counted)} | {len(nats) / len(counted):.2f} | {far / len(counted):.2f} |"
+
+
+def _false_names(known: Sequence[Row], wrong: Sequence[Row], mix: set[str]) -> str:
+    """How many of the mix's names are false, and how many of those stand far from the truth."""
+    right = sum(row["named"] for row in known if row["case"] in mix)
+    false = [(len(row["wrong"]), row["nats"]) for row in wrong if row["case"] in mix]
+    all_, far = (sum(n for n, nats in false if nats >= least) for least in (-np.inf, SHOWN_NATS))
+    names = max(right + all_, 1)
+    return (
+        f"In the mix, where something acts, {right} effects are named that do act and {all_} that don't, "
+        f"{all_ / names:.1%} of both; {far} of these, {far / names:.1%}, where the data tell."
+    )
 
 
 def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str:
