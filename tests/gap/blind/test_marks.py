@@ -190,7 +190,7 @@ def test_worst_first_and_right_ones_not_at_all() -> None:
     right = mark(truth("one", "a"), answer(("a", 0.9)))
     wrong = mark(truth("nothing"), answer(("a", 0.99)))
     failed = mark(truth("nothing"), Answer(None, "crashed"))
-    listed = worst([right, wrong, failed], "diagnosis")
+    listed = worst([right, wrong, failed])
     assert [one["verdict"] for one in listed] == ["failed", "explained"]
     assert listed[1]["wrong"] == "names a"
 
