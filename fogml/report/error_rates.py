@@ -57,8 +57,8 @@ def error_sentences(found: Diagnosis) -> list[str]:
     figures = rates["figures"]
     told = [
         f"Checked on {plural(rates['cases'], 'synthetic case')} with their truth withheld, from a reality "
-        "that is not the twin, with the nominal twin and the catalogue's candidates. A real gyro may hold "
-        "what these did not."
+        "that is not the twin, with the nominal twin and the catalogue's candidates: not with another "
+        "simulator or other candidates. A real gyro may hold what these cases did not."
     ]
     if not found.named:
         return [
