@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from fogml.gap.basis import Basis
+from fogml.gap.basis import Basis, stands_still
 from fogml.gap.found import FORM_ERROR
 from fogml.gap.how_far import FORM_LEFT
+from fogml.gap.model import told_by
 from fogml.gap.noise import SAFE_SIDE
 from fogml.gap.preparing import Prepared
 from fogml.gap.priors import SLACK
@@ -43,6 +44,11 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
         said.append(f"One run only ({fitted}): nothing that differs between runs can be told.")
     if not any(o.run.earth_known for o in p.fit):
         said.append("Earth rate is not known from the side files and is part of the bias b0.")
-    if basis.within_constants:
-        said.append("One with the constants on these runs: " + ", ".join(basis.within_constants) + ".")
+    candidates = p.model.candidates()
+    still = [id for id in basis.within_constants if stands_still(candidates[id], basis.frame)]
+    one = [id for id in basis.within_constants if id not in still]
+    if one:
+        said.append("One with the constants on these runs: " + ", ".join(one) + ".")
+    for id in still:
+        said.append(f"{id} is told by changes of '{told_by(candidates[id])}' alone, and none is recorded.")
     return tuple(said)

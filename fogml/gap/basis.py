@@ -15,9 +15,12 @@ from numpy.typing import NDArray
 from fogml.gap.candidate_columns import NodeColumns, candidate_columns
 from fogml.gap.frame import Frame, main_axes
 from fogml.gap.group import Group
-from fogml.gap.model import Candidate
+from fogml.gap.model import Candidate, told_by
 from fogml.gap.screening import Screening
 from fogml.runs.run import FloatArray
+
+STILL = 0.01
+"""A drive that changes by less of its size stands still."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +42,8 @@ class Basis:
     nodes
         Candidates' nodes.
     within_constants
-        Candidates that are one with the constants on these runs, or don't act at all.
+        Candidates that are one with the constants on these runs, or don't act at all, or can't be told
+        from others because a drive stands still.
     """
 
     frame: Frame
@@ -57,6 +61,7 @@ def build_basis(
     groups: Sequence[Group],
     grade: str,
     progress: Callable[[str], None] | None = None,
+    beside: Sequence[FloatArray] | None = None,
 ) -> Basis:
     """Whiten everything on all runs.
 
@@ -72,6 +77,8 @@ def build_basis(
         Whose ranges are usual.
     progress
         Told of each candidate.
+    beside
+        For each run columns beside which candidates are screened as well, shape (m, k).
     """
     blocks = [frame.residual, frame.fixed]
     places: dict[str, NDArray[np.intp]] = {}
@@ -84,13 +91,14 @@ def build_basis(
         blocks.append(whitened @ transform)
         places[group.name] = np.arange(first, first + transform.shape[1])
         first += transform.shape[1]
-    screening = Screening(frame, blocks[2:])
+    screening = Screening(frame, blocks[2:], None if beside is None else frame.white(beside))
     nodes: list[NodeColumns] = []
     within = []
     for id, candidate in candidates.items():
         if progress:
             progress(id)
-        found = candidate_columns(candidate, frame, grade, screening)
+        still = stands_still(candidate, frame)
+        found = [] if still else candidate_columns(candidate, frame, grade, screening)
         if not found:
             within.append(id)
         for node, columns in found:
@@ -102,3 +110,10 @@ def build_basis(
     constants = np.arange(1, 1 + frame.fixed.shape[1])
     kinds = {group.name: group for group in groups if group.name in places}
     return Basis(frame, rows, constants, kinds, places, tuple(nodes), tuple(within))
+
+
+def stands_still(candidate: Candidate, frame: Frame) -> bool:
+    """Whether the drive that would tell a candidate from others is not recorded to change on these runs."""
+    name = told_by(candidate)
+    drives = [o.run.columns[name] for o in frame.observations if name in o.run.columns]
+    return bool(name) and all(np.ptp(drive) <= STILL * np.abs(drive).max() for drive in drives)

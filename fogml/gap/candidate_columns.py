@@ -9,9 +9,10 @@ import numpy as np
 
 from fogml.gap.frame import Frame
 from fogml.gap.model import Candidate, drawn_per_run
+from fogml.gap.observation import Observation
 from fogml.gap.priors import plausible_lengths
 from fogml.gap.screening import Screening
-from fogml.gap.shapes import Node, finer, grid
+from fogml.gap.shapes import Node, corners, finer, grid
 from fogml.runs.run import FloatArray
 
 MOST_NODES = 16
@@ -70,8 +71,8 @@ def candidate_columns(
     Columns have shape (n, rank); their outer products sum to the mean of what the node's shapes
     can do, scaled to a length of 1 beside the constants.
     """
-    widest = max(frame.observations, key=lambda o: float(np.ptp(o.temperature)))
-    nodes = grid(candidate, grade, lambda s: widest.response(candidate.id, s, frame.values), frame.spans)
+    telling = _telling(candidate, frame, grade)
+    nodes = grid(candidate, grade, lambda s: telling.response(candidate.id, s, frame.values), frame.spans)
     count = len(nodes)
     lines, middle = screening.lines(nodes)
     apart = frame.runs if drawn_per_run(candidate) and len(frame.runs) > 1 else []
@@ -107,6 +108,15 @@ def candidate_columns(
             (NodeColumns(candidate.id, node, (), 1.0 / length, usual * length, weights, sign), basis)
         )
     return found
+
+
+def _telling(candidate: Candidate, frame: Frame, grade: str) -> Observation:
+    """The run of the widest temperatures on which a candidate does anything; the widest if there is none."""
+    runs = sorted(frame.observations, key=lambda o: -float(np.ptp(o.temperature)))
+    for o in runs:
+        if any(np.any(o.response(candidate.id, shape, frame.values)) for shape in corners(candidate, grade)):
+            return o
+    return runs[0]
 
 
 class _Tried:

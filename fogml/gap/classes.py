@@ -11,7 +11,8 @@ from scipy.special import expit
 
 from fogml.gap.confidence import UNSURE, named_probability, unknown_probability
 from fogml.gap.evidence import log_sum_exp
-from fogml.gap.search import Chosen, Explanation, Search
+from fogml.gap.explanation import Chosen, Explanation
+from fogml.gap.search import Search
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
 SAME_CLASS_NATS = 3.0
@@ -37,10 +38,14 @@ class Ranked:
         That a member of the class acts, by the evidence.
     margin
         How much the evidence falls without the class [nats].
+    size
+        Whitened length of what it most probably makes, beside the constants.
     form_share
         Share of the explanation's gain that needs other forms than the catalogue's.
     rest
-        Length of what acts beside the set over that of the effect; 0 where nothing does.
+        Length of the unknown beside the set over that of the effect; 0 where none acts.
+    overlap
+        Cosine of the effect's most probable response with that of the unknown beside it.
     unrealised
         Gain that its own form, as fitted, does not bring, which the margin is less by [nats].
     """
@@ -49,8 +54,10 @@ class Ranked:
     members: tuple[str, ...]
     probability: float
     margin: float
+    size: float
     form_share: float = 0.0
     rest: float = 0.0
+    overlap: float = 0.0
     unrealised: float = 0.0
 
 
@@ -164,7 +171,7 @@ def _members(search: Search, best: Explanation, id: str, rivals: Sequence[Explan
         quick = log_sum_exp(gains[search.places[other]]) - log_sum_exp(gains[search.places[id]])
         if quick < -nats - 3.0:
             continue
-        swapped = search.explanation((*others, search._best(other, gains)), best.rest)
+        swapped = search.explanation((*others, search.best_node(other, held)), best.rest)
         if swapped.log_evidence > best.log_evidence - nats:
             members[other] = swapped.log_evidence
     # One that takes the place with something else beside it, or under other noise, is no less likely to act;
@@ -195,8 +202,20 @@ def _ranked(
     if len(without):
         # The smaller of the two: many weak sets without the class may outweigh the best of them.
         margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
-    rest = held.group[1] / chosen.length if held.unknown is not None and held.group is not None else 0.0
+    size, rest, overlap = _beside(search, held, chosen.candidate)
     share = search.form_share(held)
     alone = len(held.effects) == 1 and held.unknown is None
-    named = named_probability(margin, share, rest, chosen.length, alone=alone)
-    return Ranked(chosen, members, named, margin, share, rest)
+    named = named_probability(margin, share, rest, size, alone=alone)
+    return Ranked(chosen, members, named, margin, size, share, rest, overlap)
+
+
+def _beside(search: Search, held: Explanation, id: str) -> tuple[float, float, float]:
+    """Whitened size of an effect of an explanation, that of the unknown over it, and their cosine."""
+    names, products = search.inner_products(held)
+    own = names.index(id)
+    size = math.sqrt(products[own, own])
+    if held.unknown is None or size == 0.0:
+        return size, 0.0, 0.0
+    group = names.index(held.unknown[0])
+    unknown = math.sqrt(products[group, group])
+    return size, unknown / size, float(products[own, group]) / max(size * unknown, 1e-300)

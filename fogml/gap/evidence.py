@@ -9,6 +9,7 @@ where inner products are those beside everything that is integrated out already.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -184,6 +185,15 @@ class Conditioned:
             out[places] = self._gains_of(places)
             self._node_gains[key] = out
         return self._node_gains[key]
+
+    def response_size(self, node: int, length: float) -> float:
+        """Whitened length beside the constants of a node's most probable response at a length."""
+        field = self.field
+        places = list(field.basis.nodes[node].columns)
+        own, across = field.gram[np.ix_(places, places)], self.half[:, places]
+        inner = np.eye(len(places)) / length**2 + own - across.T @ across
+        mean = np.linalg.solve(inner, field.gram[places, 0] - across.T @ self.half[:, 0])
+        return math.sqrt(max(float(mean @ own @ mean), 0.0))
 
     @cached_property
     def group_gains(self) -> FloatArray:

@@ -75,7 +75,8 @@ def found_effects(
                 unrealised=r.unrealised,
                 form_share=r.form_share,
                 rest=r.rest,
-                length=r.chosen.length,
+                length=r.size,
+                overlap=r.overlap,
                 amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
                 parameters={
                     q.name: Estimate(value.shape[q.name], shape_errors[q.name], q.unit)

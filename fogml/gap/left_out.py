@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from fogml.gap.candidate_columns import candidate_columns
+from fogml.gap.explanation import Explanation
 from fogml.gap.frame import Frame
 from fogml.gap.model import Candidate
 from fogml.gap.result import Found, Unknown
 from fogml.gap.screening import Screening
-from fogml.gap.search import Explanation, Search
+from fogml.gap.search import Search
 from fogml.gap.unlike import RELATIVE
 from fogml.runs.run import FloatArray
 

@@ -94,6 +94,11 @@ def drawn_per_run(candidate: Candidate) -> bool:
     return bool(getattr(candidate, "drawn_per_run", False))
 
 
+def told_by(candidate: Candidate) -> str:
+    """The recorded drive that tells a candidate from others: its attribute of this name; else none."""
+    return str(getattr(candidate, "told_by", ""))
+
+
 def amplitudes_about(candidate: Candidate) -> Sequence[float]:
     """Amplitudes about which a response not in proportion to them is taken: ``amplitudes``, if it has any."""
     return tuple(getattr(candidate, "amplitudes", ()))

@@ -56,7 +56,7 @@ def realised(
             effects.append(r)
             continue
         margin = r.margin - nats
-        own = named_probability(margin, r.form_share, r.rest, r.chosen.length, alone=alone)
+        own = named_probability(margin, r.form_share, r.rest, r.size, alone=alone)
         probability = min(r.probability, own)
         known *= 1.0 - (r.probability - probability)
         if margin >= LEAST_MARGIN:

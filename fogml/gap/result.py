@@ -62,7 +62,9 @@ class Found:
     form_share
         Share of the gain that needs another form than the catalogue's.
     rest
-        Length of what acts beside it over its own.
+        Whitened length of the unknown beside it over its own.
+    overlap
+        Cosine of what it makes with what the unknown beside it makes.
     length
         Its whitened length on the fit runs, as the evidence takes it.
     left_out
@@ -85,6 +87,7 @@ class Found:
     unrealised: float = 0.0
     form_share: float = 0.0
     rest: float = 0.0
+    overlap: float = 0.0
     length: float = 0.0
     left_out: tuple[str, ...] = ()
 

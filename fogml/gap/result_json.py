@@ -61,6 +61,7 @@ def _found(found: Found) -> dict[str, Any]:
         "form_share": found.form_share,
         "rest": found.rest,
         "length": found.length,
+        "overlap": found.overlap,
     }
 
 

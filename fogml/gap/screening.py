@@ -16,7 +16,7 @@ _FINER = 4
 
 
 class Screening:
-    """How well single columns fit, beside the constants and beside smooth unknowns as well.
+    """How well single columns fit beside the constants, and beside smooth unknowns or others as well.
 
     Parameters
     ----------
@@ -24,22 +24,25 @@ class Screening:
         The runs.
     groups
         Whitened columns of each group of the unknown.
+    others
+        Whitened columns of what else may act; nothing if None.
     """
 
-    def __init__(self, frame: Frame, groups: Sequence[FloatArray]) -> None:
+    def __init__(self, frame: Frame, groups: Sequence[FloatArray], others: FloatArray | None = None) -> None:
         self._runs = frame.runs
         self._steps_s = [o.row_s for o in frame.observations]
         residual, fixed = frame.residual, frame.fixed
         smooth = [g for g in groups if g.shape[1] <= 24]
         beside = np.concatenate([fixed, *smooth], axis=1) if smooth else fixed
         self._sets: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        for held in (fixed, beside):
+        known = [] if others is None else [np.concatenate([fixed, others], axis=1)]
+        for held in (fixed, beside, *known):
             inverse = np.linalg.inv(held.T @ held + np.eye(held.shape[1]))
             left = residual[:, 0] - held @ (inverse @ (held.T @ residual[:, 0]))
             self._sets.append((held, np.asarray(inverse, dtype=np.float64), left))
 
     def gains(self, columns: FloatArray, starts: Sequence[int]) -> list[FloatArray]:
-        """Gain of each node, whose columns begin at `starts`, in nats, beside each of the two."""
+        """Gain of each node, whose columns begin at `starts`, in nats, beside each of these."""
         gains = []
         for held, inverse, left in self._sets:
             cross = held.T @ columns

@@ -13,11 +13,11 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
+from fogml.gap.explanation import Chosen, Explanation, Rest
 from fogml.gap.forms import Forms
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
 from fogml.gap.unlike import Unlike
@@ -30,6 +30,8 @@ UNKNOWN = 0.25
 """Prior probability that something unknown acts besides."""
 SECOND = 0.2
 """Prior probability that a second group is needed where an unknown acts."""
+EXACT = 0.5
+"""Prior probability that effects of a set have the catalogue's forms, to what the runs can show."""
 FORM, FORM_ROOM = 0.3, 0.25
 """Prior probability of a rest of form where it can be seen, and its largest length over the effects'."""
 BEAM = (5, 4, 3)
@@ -39,54 +41,9 @@ HOPELESS = 25.0
 BEHIND = (4.0, 5.0, 6.0)
 """Sets of one effect, of two, and of more, don't grow where all are so many nats behind a smaller one."""
 BRANCHES = 4
+SIZES_PER_OCTAVE = 2
 MATTERS = 8.0
 """Groups that are so many nats behind the best one, or gain less, are not compared with candidates."""
-Rest = Literal["nothing", "form", "unknown"]
-"""What acts beside a set of effects."""
-
-
-@dataclass(frozen=True)
-class Chosen:
-    """An effect in a set: its best node and its best length."""
-
-    candidate: str
-    node: int
-    length: float
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A set of effects, and what acts beside it.
-
-    Attributes
-    ----------
-    effects
-        The effects at their best shapes.
-    rest
-        What acts besides.
-    group
-        The best group of columns for the rest, and its length; None where nothing acts.
-    log_evidence
-        Over that of no effect and no unknown, shapes and sizes averaged.
-    log_posterior
-        With the prior of the set, not normalised.
-    """
-
-    effects: tuple[Chosen, ...]
-    rest: Rest
-    group: tuple[str, float] | None
-    log_evidence: float
-    log_posterior: float
-
-    @property
-    def ids(self) -> frozenset[str]:
-        """Ids of the effects."""
-        return frozenset(c.candidate for c in self.effects)
-
-    @property
-    def unknown(self) -> tuple[str, float] | None:
-        """The unknown's group and length; None where it does not act."""
-        return self.group if self.rest == "unknown" else None
 
 
 @dataclass
@@ -162,12 +119,13 @@ class Search:
         """Sets of one effect more: the best beside the set, and beside the set and the unknown."""
         more: dict[str, Chosen] = {}
         for held in (self._held[(found.ids, "nothing")], self._held[(found.ids, "unknown")]):
-            gains = self.field_.condition(self.terms(held)).node_gains()
+            conditioned = self.field_.condition(self.terms(held))
+            gains = conditioned.node_gains()
             scores = {
                 id: log_sum_exp(gains[nodes]) for id, nodes in self.places.items() if id not in found.ids
             }
             for id in sorted(scores, key=scores.__getitem__, reverse=True)[:BRANCHES]:
-                more.setdefault(id, self._best(id, gains))
+                more.setdefault(id, self.best_node(id, conditioned))
         for chosen in more.values():
             yield self._best_of((*found.effects, chosen))
 
@@ -187,17 +145,22 @@ class Search:
             for i, chosen in enumerate(effects):
                 others = effects[:i] + effects[i + 1 :]
                 held = self.field_.condition(self._terms(others, group))
-                gains = held.node_gains(self.places[chosen.candidate])
-                effects[i] = self._best(chosen.candidate, gains)
-                own = gains[self.places[chosen.candidate]]
+                effects[i] = self.best_node(chosen.candidate, held)
+                own = held.node_gains(self.places[chosen.candidate])[self.places[chosen.candidate]]
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
-        terms = self._terms(effects, group)
+        terms, bare = (self._terms(effects, group, exact=exact) for exact in (False, True))
+        likely = self.field_.condition(terms).log_evidence
+        exact = False
+        if len(bare) < len(terms):
+            own = self.field_.condition(bare).log_evidence + math.log(EXACT)
+            loose = likely + math.log1p(-EXACT)
+            likely, exact = float(np.logaddexp(own, loose)), own > loose
         if rest == "unknown" and group is not None:
-            averaged_rest += self._second(terms)
-        evidence = self.field_.condition(terms).log_evidence - self._empty + averaged + averaged_rest
+            averaged_rest += self._second(bare if exact else terms)
+        evidence = likely - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
-        return Explanation(tuple(effects), rest, group, evidence, evidence + prior)
+        return Explanation(tuple(effects), rest, group, evidence, evidence + prior, exact)
 
     def _log_prior(self, effects: Sequence[Chosen], rest: Rest) -> float:
         count, size = len(self.places), len(effects)
@@ -209,10 +172,16 @@ class Search:
             prior += math.log(FORM if rest == "form" else 1.0 - FORM)
         return prior
 
-    def _best(self, id: str, gains: np.ndarray) -> Chosen:
+    def best_node(self, id: str, held: Conditioned) -> Chosen:
+        """An effect at the node and the length that it gains the most with beside a conditioned field."""
         nodes = self.places[id]
-        row, column = np.unravel_index(int(np.argmax(gains[nodes])), gains[nodes].shape)
-        return Chosen(id, int(nodes[row]), float(LENGTHS[column]))
+        gains = held.node_gains(nodes)[nodes]
+        row, column = np.unravel_index(int(np.argmax(gains)), gains.shape)
+        node, length = int(nodes[row]), float(LENGTHS[column])
+        size = held.response_size(node, length)
+        # Sizes that are nearly alike share what is integrated out for one of them.
+        size = 2.0 ** (round(SIZES_PER_OCTAVE * math.log2(max(size, 1.0))) / SIZES_PER_OCTAVE)
+        return Chosen(id, node, length, min(size, length))
 
     def _weight(self, chosen: Chosen, held: Conditioned) -> float:
         """Logarithm of the prior weight of a node and a length, what its sign gains included."""
@@ -274,40 +243,60 @@ class Search:
         """Share of what the effects of an explanation gain that needs other forms than the catalogue's."""
         nodes = self.field_.basis.nodes
         bare = [Term(nodes[c.node].columns, c.length) for c in found.effects]
-        whole = self._terms(found.effects, found.group if found.rest == "form" else None)
+        group = found.group if found.rest == "form" else None
+        whole = self._terms(found.effects, group, exact=found.exact)
         gain = self.field_.condition(whole).log_evidence - self._empty
         return 1.0 - (self.field_.condition(bare).log_evidence - self._empty) / max(gain, 1e-9)
 
     def terms(self, found: Explanation) -> list[Term]:
         """An explanation's terms."""
-        return self._terms(found.effects, found.group)
+        return self._terms(found.effects, found.group, exact=found.exact)
 
     def beside(self, found: Explanation, id: str) -> list[Term]:
         """The terms of an explanation without one of its effects."""
-        return self._terms([c for c in found.effects if c.candidate != id], found.group)
+        others = [c for c in found.effects if c.candidate != id]
+        return self._terms(others, found.group, exact=found.exact)
 
     def estimates(self, found: Explanation) -> dict[str, FloatArray]:
         """What each effect of an explanation, and its group, most probably makes, whitened, shape (n,)."""
-        parts = {c.candidate: self._terms([c], None) for c in found.effects}
+        return {
+            name: self.field_.columns(at) @ mean for name, (at, mean) in self._coefficients(found).items()
+        }
+
+    def inner_products(self, found: Explanation) -> tuple[tuple[str, ...], FloatArray]:
+        """Names of an explanation's effects and its group, and the inner products of their estimates.
+
+        Beside the constants, shape (names, names).
+        """
+        parts, gram = self._coefficients(found), self.field_.gram
+        products = [[a @ gram[np.ix_(i, j)] @ b for j, b in parts.values()] for i, a in parts.values()]
+        return tuple(parts), np.array(products, dtype=np.float64).reshape(len(parts), len(parts))
+
+    def _coefficients(self, found: Explanation) -> dict[str, tuple[list[int], FloatArray]]:
+        """Columns of an explanation's effects and of its group, with their most probable coefficients."""
+        parts = {c.candidate: self._terms([c], None, exact=found.exact) for c in found.effects}
         if found.group is not None:
             parts[found.group[0]] = [self._term(*found.group)]
         if not parts:
             return {}
         mean, _ = self.field_.condition([t for terms in parts.values() for t in terms]).coefficients()
-        estimates, first = {}, 0
+        held, first = {}, 0
         for name, terms in parts.items():
             places = [place for t in terms for place in t.columns]
-            estimates[name] = self.field_.columns(places) @ mean[first : first + len(places)]
+            held[name] = (places, mean[first : first + len(places)])
             first += len(places)
-        return estimates
+        return held
 
-    def _terms(self, effects: Iterable[Chosen], group: tuple[str, float] | None) -> list[Term]:
+    def _terms(
+        self, effects: Iterable[Chosen], group: tuple[str, float] | None, *, exact: bool = False
+    ) -> list[Term]:
+        """Terms of effects and a group; with what forms may differ by unless they are `exact`."""
         nodes = self.field_.basis.nodes
         terms = []
         for c in effects:
             terms.append(Term(nodes[c.node].columns, c.length))
-            if c.length >= SLACK_FROM:
-                terms.append(Term(self.field_.slack(c.node), SLACK * c.length))
+            if c.size >= SLACK_FROM and not exact:
+                terms.append(Term(self.field_.slack(c.node), SLACK * c.size))
         if group is not None:
             terms.append(self._term(*group))
         return terms
@@ -319,4 +308,4 @@ class Search:
 
 def _form_room(effects: Sequence[Chosen]) -> float:
     """Largest whitened length of a rest that is no more than a matter of form."""
-    return FORM_ROOM * max((c.length for c in effects), default=0.0)
+    return FORM_ROOM * max((c.size for c in effects), default=0.0)

@@ -96,6 +96,18 @@ def grid(
     return _grid(candidate, grade, response, spans)
 
 
+def corners(candidate: Candidate, grade: str) -> tuple[dict[str, float], ...]:
+    """Usual shapes: in the middle of their ranges, all at their lowest, all at their highest.
+
+    At the first of its amplitudes where a candidate has any.
+    """
+    amplitudes = amplitudes_about(candidate)
+    at = {AT_AMPLITUDE: float(amplitudes[0])} if amplitudes else {}
+    usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+    ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))  # type: ignore[arg-type]
+    return tuple({**shape, **at} for shape in (usual, *ends))
+
+
 def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:
     """A node parted into several nearby ones, which share what it stands for: a line's in frequency alone.
 
@@ -164,12 +176,14 @@ def _grid(
     linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
     bent = [q for q in rest if q not in linear]
     axes = [_axis(q, grade, NODES[min(len(bent), 3)], spans) for q in bent]
-    points = _spread(linear, turning, grade)
+    directions = {q.name: _directions(q, response, usual) for q in turning}
+    points = _spread(linear, directions, grade)
     nodes = []
     for values in product(*axes):
         shape = usual | {q.name: value for q, value in zip(bent, values)}
         draws = tuple(shape | more for more in points)
-        nodes.append(Node(shape, draws, 2 ** len(turning), _frequency(bent, values)))
+        turns = math.prod(map(len, directions.values()))
+        nodes.append(Node(shape, draws, turns, _frequency(bent, values)))
     return tuple(nodes)
 
 
@@ -232,7 +246,21 @@ def _lines(quantity: Quantity, low: float, high: float, spans: Mapping[str, floa
     return [float(x) for x in (1.0 / frequencies if is_period else frequencies)]
 
 
-def _spread(linear: Sequence[Quantity], turning: Sequence[Quantity], grade: str) -> list[dict[str, float]]:
+def _directions(quantity: Quantity, response: Response, usual: Mapping[str, float]) -> tuple[float, ...]:
+    """Values of an angle whose responses have the mean and the second moments of all directions.
+
+    Two at a right angle do where the opposite direction is the opposite response; where a part of it stays
+    as it is, all four.
+    """
+    first = quantity.tactical[0]
+    there, back = (response({**usual, quantity.name: first + turn}) for turn in (0.0, 180.0))
+    opposite = np.linalg.norm(there + back) <= 1e-9 * np.linalg.norm(there)
+    return tuple(first + turn for turn in ((0.0, 90.0) if opposite else (0.0, 90.0, 180.0, 270.0)))
+
+
+def _spread(
+    linear: Sequence[Quantity], directions: Mapping[str, Sequence[float]], grade: str
+) -> list[dict[str, float]]:
     """The middle of linear parameters and a standard deviation along each, in all directions of angles."""
     middles, spreads = {}, {}
     for quantity in linear:
@@ -240,7 +268,6 @@ def _spread(linear: Sequence[Quantity], turning: Sequence[Quantity], grade: str)
         middles[quantity.name] = 0.5 * (low + high)
         spreads[quantity.name] = (high - low) / math.sqrt(12.0)
     points = [middles, *(middles | {name: middles[name] + spreads[name]} for name in spreads)]
-    for quantity in turning:
-        low = quantity.tactical[0]
-        points = [point | {quantity.name: low + turn} for point in points for turn in (0.0, 90.0)]
+    for name, values in directions.items():
+        points = [point | {name: value} for point in points for value in values]
     return points

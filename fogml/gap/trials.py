@@ -18,6 +18,7 @@ from fogml.gap.basis import Basis, build_basis
 from fogml.gap.classes import Ranking, rank
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field
+from fogml.gap.explanation import Explanation
 from fogml.gap.found import fit_named
 from fogml.gap.frame import Frame
 from fogml.gap.model import Candidate, drawn_per_run
@@ -25,7 +26,7 @@ from fogml.gap.near_library import near_library
 from fogml.gap.noise import Noise, tension
 from fogml.gap.preparing import Prepared, Progress, with_noise_beside
 from fogml.gap.quieter import log_joint, louder, quieter
-from fogml.gap.search import Explanation, Search
+from fogml.gap.search import Search
 from fogml.runs.run import FloatArray
 
 AVERAGING_TIMES_S = (10.0, 100.0, 3000.0)
@@ -122,9 +123,16 @@ def _trials(p: Prepared, candidates: Mapping[str, Candidate], tell: Progress) ->
 
 
 def _trial(
-    p: Prepared, candidates: Mapping[str, Candidate], values: Mapping[str, float], tell: Progress
+    p: Prepared,
+    candidates: Mapping[str, Candidate],
+    values: Mapping[str, float],
+    tell: Progress,
+    beside: Sequence[FloatArray] | None = None,
 ) -> Trial:
-    """Everything whitened and searched, constants linearised at their values."""
+    """Everything whitened and searched, constants linearised at their values.
+
+    Candidates are screened `beside` columns of each run as well.
+    """
     frame = Frame(p.fit, p.whiteners, p.model.constants, values)
     near = near_library(p.fit, candidates, values, p.model.grade)
     basis = build_basis(
@@ -133,6 +141,7 @@ def _trial(
         (*p.groups, *near, *event_groups(frame)),
         p.model.grade,
         lambda id: tell(f"whitening candidates: {id}"),
+        beside,
     )
     tell("searching sets of effects")
     search = Search(Field(basis))
@@ -151,7 +160,8 @@ def _again(
 ) -> Iterator[Trial]:
     """The search with the noise fitted beside what a trial found; none where that changes nothing.
 
-    What was taken for noise may have been the effect, and the constants may have made up for it.
+    What was taken for noise may have been the effect, and the constants may have made up for it. Where
+    something is left beside an effect, candidates were screened beside nothing, too.
     """
     p, best = trial.prepared, trial.ranking.best
     if not best.effects and best.unknown is None:
@@ -160,12 +170,14 @@ def _again(
     values = p.recalibrated.constants
     if best.effects:
         values = fit_named(p, candidates, trial.search, trial.ranking).constants
-    again = with_noise_beside(p, _explained(trial, candidates), alone=alone)
+    effects = _of_effects(trial, candidates)
+    again = with_noise_beside(p, _with_unknown(trial, effects), alone=alone)
     on_inputs = not alone and _act_on_inputs(candidates, trial.ranking)
-    if not (_differ(p.noise, again.noise) or on_inputs):
+    left = not alone and bool(best.effects) and best.unknown is not None
+    if not (_differ(p.noise, again.noise) or on_inputs or left):
         return
     for _ in range(MOST_LINEARISED):
-        before, trial = trial.log_joint, _trial(again, candidates, values, tell)
+        before, trial = trial.log_joint, _trial(again, candidates, values, tell, effects)
         yield trial
         if not (on_inputs and trial.ranking.named and trial.log_joint > before + BETTER):
             return
@@ -173,22 +185,29 @@ def _again(
         values = fit_named(again, candidates, trial.search, trial.ranking).constants
 
 
-def _explained(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatArray]:
-    """Rows of what the effects of the best explanation can do, and its unknown, on each run."""
+def _of_effects(trial: Trial, candidates: Mapping[str, Candidate]) -> list[FloatArray]:
+    """For each run columns of what the effects of the best explanation can do, shape (m, k)."""
     p, basis, best = trial.prepared, trial.basis, trial.ranking.best
-    rows = []
+    blocks = []
     for r, o in enumerate(p.fit):
-        columns = []
+        columns = [np.zeros((len(o), 0))]
         for c in best.effects:
             shapes = basis.nodes[c.node].node.draws[:MOST_DRAWS]
             own = np.column_stack([o.response(c.candidate, s, basis.frame.values) for s in shapes])
             # One that each run draws anew has columns of its own on each.
             apart = drawn_per_run(candidates[c.candidate])
             columns += [own * (i == r) for i in range(len(p.fit))] if apart else [own]
-        if best.unknown is not None:
-            columns.append(basis.kinds[best.unknown[0]].columns[r])
-        rows.append(np.concatenate(columns, axis=1))
-    return rows
+        blocks.append(np.concatenate(columns, axis=1))
+    return blocks
+
+
+def _with_unknown(trial: Trial, blocks: Sequence[FloatArray]) -> list[FloatArray]:
+    """Columns of each run with those of the best explanation's unknown."""
+    unknown = trial.ranking.best.unknown
+    if unknown is None:
+        return list(blocks)
+    own = trial.basis.kinds[unknown[0]].columns
+    return [np.concatenate([block, more], axis=1) for block, more in zip(blocks, own)]
 
 
 def _differ(first: Noise, second: Noise) -> bool:

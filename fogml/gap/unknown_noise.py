@@ -13,10 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import log_ndtr, logsumexp
 
+from fogml.gap.explanation import Explanation
 from fogml.gap.frame import Frame
 from fogml.gap.observation import Observation
 from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
-from fogml.gap.search import Explanation, Search
+from fogml.gap.search import Search
 from fogml.runs.run import FloatArray
 from fogml.twin.memory import Memory
 

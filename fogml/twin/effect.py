@@ -58,6 +58,8 @@ class Effect(ABC):
         Id of a look-alike to what separates the two.
     candidate
         Whether a diagnosis offers it unless told otherwise.
+    told_by
+        Name of a drive without whose changes a run can't tell the effect from others; "" if there is none.
     drawn_per_run
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
@@ -75,6 +77,7 @@ class Effect(ABC):
     shows: ClassVar[str] = ""
     confused_with: ClassVar[Mapping[str, str]] = {}
     candidate: ClassVar[bool] = True
+    told_by: ClassVar[str] = ""
     drawn_per_run: ClassVar[bool] = False
 
     @abstractmethod

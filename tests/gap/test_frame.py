@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from fogml.gap.basis import build_basis
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.frame import main_axes
-from tests.gap.small_model import SmallModel, dense, framed, noise_of, ramps, recorded
+from tests.gap.small_model import KINDS, Kind, SmallModel, dense, framed, noise_of, ramps, recorded
 
 MODEL = SmallModel(("bend", "cube", "tilted"))
 
@@ -89,6 +91,29 @@ def test_the_basis_holds_everything_and_knows_what_lies_within_the_constants(fra
         assert np.trace(frame.beside(basis.rows[:, columns])) == pytest.approx(1.0)
     for node in basis.nodes:
         assert np.trace(frame.beside(basis.rows[:, list(node.columns)])) == pytest.approx(1.0)
+
+
+@dataclass(frozen=True)
+class Told(Kind):
+    """A candidate that only changes of the supply tell from others."""
+
+    told_by: str = "supply"
+
+
+@pytest.mark.parametrize("supply, offered", [(None, False), (5.0, False), ("steps", True)])
+def test_what_a_drive_tells_is_offered_where_the_drive_is_recorded_to_change(runs, supply, offered):
+    def with_supply(run, steps):
+        if supply is None:
+            return run
+        volts = 5.0 + 0.01 * np.sin(run.time / 900.0)
+        return run.with_columns(supply=volts + 0.5 * (run.time > run.time.mean()) * steps)
+
+    # One run on which it changes is enough.
+    made = [with_supply(run, steps=(i == 0 and supply == "steps")) for i, run in enumerate(runs)]
+    candidates = {"cube": Told("cube", KINDS["cube"].amplitude)}
+    basis = build_basis(framed(made, MODEL), candidates, [], MODEL.grade)
+    assert ("cube" not in basis.within_constants) == offered
+    assert bool(basis.nodes) == offered
 
 
 def test_a_nodes_size_is_the_amplitude_of_unit_length(frame):

@@ -16,13 +16,14 @@ from fogml.gap.classes import rank
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.evidence import Field
 from fogml.gap.model import EffectValue
-from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK
 from fogml.gap.search import MATTERS, SECOND, Search
 from tests.gap.small_model import SmallModel, framed, noise_of, ramps, recorded
 
 TRUE = {"offset": 1.0, "slope": -0.5}
 BEND = ("bend", 2.0, (("centre_temperature", 18.0), ("width", 6.0)))
 CUBE = ("cube", 3.0, ())
+OTHER_FORM = ("bend", -1.5, (("centre_temperature", 18.0), ("width", 6.0)))
 LINE = ("line", 0.8, (("period", 900.0), ("phase", 70.0)))
 
 
@@ -66,7 +67,7 @@ def test_no_set_beats_the_one_that_the_search_ends_on():
     best = search.run()[0]
     every = Search(search.field_)
     held = every.field_.condition([])
-    first = {id: every._best(id, held.node_gains()) for id in every.places}
+    first = {id: every.best_node(id, held) for id in every.places}
     for size in (0, 1, 2):
         for ids in combinations(every.places, size):
             for unknown in (False, True):
@@ -76,12 +77,68 @@ def test_no_set_beats_the_one_that_the_search_ends_on():
 
 def test_evidence_of_one_effect_is_the_sum_over_its_shapes_and_sizes():
     search = searched((BEND,))
-    gains = search.field_.condition([]).node_gains()
+    held = search.field_.condition([])
+    gains = held.node_gains()
     # Below the length from which room for a form is made the two are the same sum.
     for id in ("cube", "mixture"):
-        found = search.explanation([search._best(id, gains)])
+        found = search.explanation([search.best_node(id, held)])
         if found.effects[0].length < 10.0:
             assert found.log_evidence == pytest.approx(float(logsumexp(gains[search.places[id]])), abs=1e-6)
+
+
+def test_the_size_of_an_effect_is_the_whitened_length_of_what_it_makes():
+    search = searched((CUBE,))
+    frame = search.field_.basis.frame
+    true = 3.0 * np.sqrt(frame.beside(frame.responses("cube", [{}]))[0, 0])
+    chosen = search.best_node("cube", search.field_.condition([]))
+    # To half a step of sizes, and the noise.
+    assert 0.8 < chosen.size / true < 1.25
+
+
+def cancelling(time):
+    """Made of the two parts of `mixture` against each other, far outside of its shares."""
+    return -4.0 * np.sin(time / 700.0)
+
+
+def test_room_for_a_form_goes_with_what_an_effect_makes_not_with_its_coefficients():
+    search = searched((("mixture", 1.0, (("share", 1.0),)),), added=cancelling)
+    chosen = search.best_node("mixture", search.field_.condition([]))
+    assert chosen.size <= chosen.length
+    (room,) = [t for t in search._terms([chosen], None) if t.columns == search.field_.slack(chosen.node)]
+    assert room.length == pytest.approx(SLACK * chosen.size)
+
+
+@pytest.mark.parametrize("effects, exact", [((CUBE,), True), ((CUBE, OTHER_FORM), False)])
+def test_effects_have_the_catalogues_form_or_room_for_another(effects, exact, monkeypatch):
+    # Without the bend among the candidates it is another form of the cube.
+    search = searched(effects, ids=("cube", "line"))
+    held = search.field_.condition([])
+
+    def explained(share):
+        monkeypatch.setattr("fogml.gap.search.EXACT", share)
+        return Search(search.field_).explanation([search.best_node("cube", held)])
+
+    found = explained(0.5)
+    loose, own = explained(1e-12).log_evidence, explained(1.0 - 1e-12).log_evidence
+    assert found.log_evidence == pytest.approx(np.logaddexp(loose, own) - np.log(2.0), abs=1e-6)
+    assert found.exact == exact == (own > loose)
+    assert len(search.terms(found)) == (1 if exact else 2)
+
+
+def test_what_acts_beside_an_effect_is_measured_against_it():
+    def wander(time):
+        return 0.8 * np.sin(2.0 * np.pi * time / 2500.0 + 1.0) * (time > time.mean())
+
+    search = searched((CUBE,), ids=("cube", "bend"), added=wander)
+    ranking, _ = ranked(search)
+    assert ranking.best.unknown is not None
+    (one,) = (r for r in ranking.effects if r.chosen.candidate == "cube")
+    rows = search.estimates(ranking.best)
+    both = np.column_stack([rows["cube"], rows[ranking.best.unknown[0]]])
+    ((own, across), (_, unknown)) = search.field_.basis.frame.beside(both)
+    assert one.size == pytest.approx(np.sqrt(own))
+    assert one.rest == pytest.approx(np.sqrt(unknown / own))
+    assert one.overlap == pytest.approx(across / np.sqrt(own * unknown))
 
 
 def test_two_that_are_alike_form_a_class_whose_probability_is_of_both():

@@ -69,6 +69,15 @@ def test_what_is_linear_needs_one_node_with_the_moments_of_its_prior():
     assert grid_of("cube")[0].draws == ({},)
 
 
+@pytest.mark.parametrize("id, stays", [("line", 0.0), ("rippled", 1.0)])
+def test_an_angle_has_the_moments_of_all_directions(id, stays):
+    node = grid_of(id)[0]
+    turned = np.radians([draw["phase"] for draw in node.draws])
+    columns = np.array([np.full(len(turned), stays), np.cos(turned), np.sin(turned)]) @ node.mix
+    # Of a direction evenly spread all round: what stays does not go with it.
+    np.testing.assert_allclose(columns @ columns.T, np.diag([stays, 0.5, 0.5]), atol=1e-12)
+
+
 def test_no_line_is_faster_than_the_rows_can_show():
     slow = {**SPANS, "sample": 200.0}
     nodes = grid(KINDS["line"], "tactical", response_of("line"), slow)

@@ -30,6 +30,7 @@ class ElectronicCrosstalk(BiasEffect):
     )
     shape = (Quantity("supply_ratio", "degC/V", (-20.0, 20.0), (-20.0, 20.0), "e_2 / e_1", (-1e4, 1e4)),)
     needs = ("T_electronics", "supply")
+    told_by = "supply"
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "a bias that follows the electronics: self-heating after power-on, then the chamber"
     confused_with = {
