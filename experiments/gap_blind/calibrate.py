@@ -1,24 +1,28 @@
-"""Constants of `fogml.gap.confidence` from a development suite that the diagnosis has answered.
+"""Constants of `fogml.gap.confidence` from suites that the diagnosis has answered.
 
 ``python -m experiments.gap_blind.calibrate DIR`` prints logistic constants of named effects over the
-features of their evidence, and of the unknown over its log odds. Final seeds are refused.
+features of their evidence, and of the unknown over its log odds. Suites are those to develop on, and final
+ones that are spent: figures were taken from them, and ``config.yaml`` keeps another seed for the next ones.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from dataclasses import fields
 from pathlib import Path
 
 import numpy as np
+import yaml
 from sklearn.linear_model import LogisticRegression
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
-from fogml.gap.blind.seeds import is_final
+from fogml.gap.blind.seeds import is_final, uses
 from fogml.gap.blind.truth import Truth
-from fogml.gap.confidence import LARGEST_LOG_ODDS, named_features
+from fogml.gap.confidence import LARGEST_LOG_ODDS, Support
 
+HERE = Path(__file__).parent
 Row = tuple[tuple[float, ...], bool]
 """Features of a finding, and whether it is right."""
 
@@ -36,11 +40,18 @@ def main() -> None:
             raise SystemExit(f"{directory}: no answers; run the diagnosis first: fogml blind run {directory}")
         for path in answers:
             truth = Truth.model_validate_json((folder.truth / f"{path.parent.name}.json").read_text())
-            if is_final(truth.seed):
+            if not may_be_learned_from(truth.seed):
                 raise InputError(f"{directory}: made from a seed that is kept for final figures")
             _read(json.loads(path.read_text()), truth, named, unknown)
     for name, rows in (("NAMED", named), ("UNKNOWN", unknown)):
         print(f"{name} = ({', '.join(f'{c:.2f}' for c in _fitted(rows))})   from {len(rows)} findings")
+
+
+def may_be_learned_from(seed: int) -> bool:
+    """Whether a suite's seed is one to develop on, or one that is kept no longer."""
+    kept = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))["final"]["seed"]
+    spent = {use["seed"] for use in uses(HERE / "final_uses.json")} - {kept}
+    return not is_final(seed) or seed in spent
 
 
 def _read(gap: dict, truth: Truth, named: list[Row], unknown: list[Row]) -> None:
@@ -48,8 +59,8 @@ def _read(gap: dict, truth: Truth, named: list[Row], unknown: list[Row]) -> None
         if item["margin"] <= 0.0:
             # The best explanation does without it, and it is not named whatever the constants are.
             continue
-        features = named_features(item["margin"], item["form_share"], item["rest"], item["length"])
-        named.append((features, bool(set(item["class"]) & truth.right_names)))
+        support = Support(**{field.name: item[field.name] for field in fields(Support)})
+        named.append((support.features, bool(set(item["class"]) & truth.right_names)))
     if truth.kind != "wrong_thermal":
         odds = float(np.clip(gap["unknown"]["log_odds"], -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))
         unknown.append(((odds,), truth.kind.startswith("unknown")))

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
-from fogml.gap.confidence import UNSURE, named_probability, unknown_probability
+from fogml.gap.confidence import UNSURE, Support, named_probability, unknown_probability
 from fogml.gap.evidence import log_sum_exp
 from fogml.gap.explanation import Chosen, Explanation
 from fogml.gap.search import Search
@@ -36,16 +36,8 @@ class Ranked:
         Ids of its class, itself first.
     probability
         That a member of the class acts, by the evidence.
-    margin
-        How much the evidence falls without the class [nats].
-    size
-        Whitened length of what it most probably makes, beside the constants.
-    form_share
-        Share of the explanation's gain that needs other forms than the catalogue's.
-    rest
-        Length of the unknown beside the set over that of the effect; 0 where none acts.
-    overlap
-        Cosine of the effect's most probable response with that of the unknown beside it.
+    support
+        What that follows.
     unrealised
         Gain that its own form, as fitted, does not bring, which the margin is less by [nats].
     """
@@ -53,12 +45,13 @@ class Ranked:
     chosen: Chosen
     members: tuple[str, ...]
     probability: float
-    margin: float
-    size: float
-    form_share: float = 0.0
-    rest: float = 0.0
-    overlap: float = 0.0
+    support: Support
     unrealised: float = 0.0
+
+    @property
+    def margin(self) -> float:
+        """How much the evidence falls without the class [nats]."""
+        return self.support.margin
 
 
 @dataclass(frozen=True)
@@ -113,7 +106,7 @@ def rank(
     rivals
         Explanations under other noise, on the same scale.
     """
-    best = explanations[0]
+    best = _leading(explanations)
     classes = {c.candidate: _members(search, best, c.candidate, rivals) for c in best.effects}
     whole = _merged(explanations, rivals)
     weights = _weights(whole)
@@ -121,12 +114,9 @@ def rank(
     noise = uneven_noise(search, best)
     uneven = expit(float(np.logaddexp(noise.gain, tension)) + math.log(UNEVEN / (1.0 - UNEVEN)))
     unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
-    ranked = []
-    taken: set[str] = set()
-    for chosen in best.effects:
-        members = classes[chosen.candidate]
-        ranked.append(_ranked(search, best, chosen, members, whole))
-        taken |= set(members)
+    ranked = [_ranked(search, best, chosen, classes[chosen.candidate], whole) for chosen in best.effects]
+    ranked = _in_order(ranked, best)
+    taken = {id for members in classes.values() for id in members}
     for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
@@ -139,6 +129,38 @@ def rank(
     log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))
     nothing = float(sum(w for e, w in zip(whole, weights) if not e.ids and e.unknown is None))
     return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise, nothing)
+
+
+def _in_order(ranked: Sequence[Ranked], best: Explanation) -> list[Ranked]:
+    """Effects of the best explanation, that of the largest margin first and the others as second ones."""
+    alone = len(best.effects) == 1 and best.unknown is None
+    told = sorted(ranked, key=lambda r: -r.margin)
+    for i, r in enumerate(told[1:], 1):
+        support = replace(r.support, second=True)
+        told[i] = replace(r, support=support, probability=named_probability(support, alone=alone))
+    return told
+
+
+def _leading(explanations: Sequence[Explanation]) -> Explanation:
+    """The best explanation of those that are the most probable together.
+
+    Together are those with an unknown, or without one, that differ by one effect that takes another's place
+    at less than `SAME_CLASS_NATS`, or by nothing but the form of their effects.
+    """
+    near = [e for e in explanations if e.log_posterior > explanations[0].log_posterior - SAME_CLASS_NATS]
+
+    def together(e: Explanation) -> float:
+        held = (
+            x.log_posterior
+            for x in explanations
+            if len(x.ids) == len(e.ids)
+            and len(x.ids - e.ids) <= 1
+            and (x.unknown is None) == (e.unknown is None)
+            and 0.0 <= e.log_posterior - x.log_posterior < SAME_CLASS_NATS
+        )
+        return log_sum_exp(np.fromiter(held, np.float64))
+
+    return max(near, key=together)
 
 
 def _merged(explanations: Sequence[Explanation], rivals: Sequence[Explanation]) -> list[Explanation]:
@@ -197,25 +219,16 @@ def _ranked(
 ) -> Ranked:
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
     logs = np.array([e.log_posterior for e in explanations])
-    with_it, without = logs[inside], logs[~inside]
-    margin = float(with_it.max() - without.max(initial=-math.inf))
-    if len(without):
-        # The smaller of the two: many weak sets without the class may outweigh the best of them.
-        margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
-    size, rest, overlap = _beside(search, held, chosen.candidate)
-    share = search.form_share(held)
+    margin = log_sum_exp(logs[inside]) - log_sum_exp(logs[~inside]) if not inside.all() else math.inf
+    length, rest = _lengths(search, held, chosen.candidate)
+    support = Support(margin, search.form_share(held), rest, length)
     alone = len(held.effects) == 1 and held.unknown is None
-    named = named_probability(margin, share, rest, size, alone=alone)
-    return Ranked(chosen, members, named, margin, size, share, rest, overlap)
+    return Ranked(chosen, members, named_probability(support, alone=alone), support)
 
 
-def _beside(search: Search, held: Explanation, id: str) -> tuple[float, float, float]:
-    """Whitened size of an effect of an explanation, that of the unknown over it, and their cosine."""
-    names, products = search.inner_products(held)
-    own = names.index(id)
-    size = math.sqrt(products[own, own])
-    if held.unknown is None or size == 0.0:
-        return size, 0.0, 0.0
-    group = names.index(held.unknown[0])
-    unknown = math.sqrt(products[group, group])
-    return size, unknown / size, float(products[own, group]) / max(size * unknown, 1e-300)
+def _lengths(search: Search, held: Explanation, id: str) -> tuple[float, float]:
+    """Whitened length of what an effect of an explanation most probably makes, and the unknown's over it."""
+    lengths = search.lengths(held)
+    own = lengths[id]
+    unknown = lengths[held.unknown[0]] if held.unknown is not None else 0.0
+    return own, unknown / own if own > 0.0 else 0.0

@@ -9,56 +9,80 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
 LEAST_MARGIN = -3.0
 SMALL_LENGTH = 5.0
+MOST_OUTSIDE = 2
 FIRST_NAME = 1.5
 """Least margin of an effect that nothing else is named beside [nats]: a false name costs more than none."""
+SECOND_NAME = 0.6
+"""Least probability of a name beside a more certain one: it may explain no more than that one's form."""
 MOSTLY_FORM = 0.5
 """Share of a gain that needs another form beyond which it is not the effect's."""
 UNSURE = 0.49
 """Largest probability of an effect that is not named for another reason."""
 LARGEST_LOG_ODDS = 12.0
-NAMED = (0.75, 0.5, 0.2, -0.75, -0.85, -0.53)
-"""Logistic constants of a class's probability: constant, then one for each of `named_features`."""
+NAMED = (0.8, 0.52, 0.11, -0.32, -1.35, 0.1, -1.62, -0.83)
+"""Logistic constants of a class's probability: constant, then one for each of `Support.features`."""
 UNKNOWN = (-0.37, 0.42)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 
 
-def named_features(margin: float, form_share: float, rest: float, length: float) -> tuple[float, ...]:
-    """What a finding's probability follows.
+@dataclass(frozen=True)
+class Support:
+    """What stands behind a finding, and its probability follows.
 
-    Parameters
+    Attributes
     ----------
     margin
         Evidence that is lost without its class [nats].
     form_share
         Share of the gain that needs other forms than the catalogue's.
     rest
-        Length of what acts beside it over its own.
+        Whitened length of the unknown beside it over its own.
     length
-        Its whitened length: of a large effect as many nats hang on details of its form.
+        Its whitened length on the runs: of a large effect as many nats hang on details of its form.
+    outside
+        How many of its shape parameters were fitted outside of their usual ranges.
+    second
+        Whether one beside it is more certain.
     """
-    return (
-        min(max(margin, LEAST_MARGIN), SMALL_MARGIN),
-        max(min(margin, LARGEST_MARGIN) - SMALL_MARGIN, 0.0),
-        min(max(form_share, 0.0), 1.0),
-        math.log1p(min(rest, 20.0)),
-        math.log(max(length, SMALL_LENGTH) / SMALL_LENGTH),
+
+    margin: float = 0.0
+    form_share: float = 0.0
+    rest: float = 0.0
+    length: float = 0.0
+    outside: int = 0
+    second: bool = False
+
+    @property
+    def features(self) -> tuple[float, ...]:
+        """What the logistic constants `NAMED` go with, but for the first."""
+        return (
+            min(max(self.margin, LEAST_MARGIN), SMALL_MARGIN),
+            max(min(self.margin, LARGEST_MARGIN) - SMALL_MARGIN, 0.0),
+            min(max(self.form_share, 0.0), 1.0),
+            math.log1p(min(self.rest, 20.0)),
+            math.log(max(self.length, SMALL_LENGTH) / SMALL_LENGTH),
+            float(min(self.outside, MOST_OUTSIDE)),
+            float(self.second),
+        )
+
+
+def named_probability(support: Support, *, alone: bool = False) -> float:
+    """Probability that a class is right.
+
+    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none, a
+    second one as probable as `SECOND_NAME`; and no name is given for a gain that is `MOSTLY_FORM`.
+    """
+    probability = _logistic(NAMED, support.features)
+    unsure = (
+        (alone and support.margin < FIRST_NAME)
+        or (support.second and probability < SECOND_NAME)
+        or support.form_share > MOSTLY_FORM
     )
-
-
-def named_probability(
-    margin: float, form_share: float = 0.0, rest: float = 0.0, length: float = 0.0, *, alone: bool = False
-) -> float:
-    """Probability that a class is right; for the parameters see `named_features`.
-
-    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none; and
-    no name is given for a gain that is `MOSTLY_FORM`.
-    """
-    probability = _logistic(NAMED, named_features(margin, form_share, rest, length))
-    unsure = (alone and margin < FIRST_NAME) or form_share > MOSTLY_FORM
     return min(probability, UNSURE) if unsure else probability
 
 

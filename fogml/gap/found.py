@@ -71,12 +71,8 @@ def found_effects(
                 stage=declared.stage,
                 members=r.members,
                 probability=r.probability,
-                margin=r.margin,
+                support=r.support,
                 unrealised=r.unrealised,
-                form_share=r.form_share,
-                rest=r.rest,
-                length=r.size,
-                overlap=r.overlap,
                 amplitude=Estimate(value.amplitude, se, declared.amplitude.unit),
                 parameters={
                     q.name: Estimate(value.shape[q.name], shape_errors[q.name], q.unit)

@@ -21,8 +21,10 @@ from fogml.gap.found import fit_named
 from fogml.gap.model import Candidate, amplitudes_about, drawn_per_run
 from fogml.gap.preparing import Prepared
 from fogml.gap.search import Search
-from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 
+SHAPE_ROOM = 0.02
+"""Share of its range by which a shape parameter may miss it."""
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
 
@@ -32,8 +34,8 @@ def realised(
 ) -> Ranking:
     """The ranking with margins of the fitted effects less what their own forms don't bring.
 
-    Of a class that member stands first which brings the most. The unknown becomes more probable by what
-    the names become less so.
+    Effects that had to be fitted with unusual shapes are less probable, too. Of a class that member stands
+    first which brings the most. The unknown becomes more probable by what the names become less so.
 
     Parameters
     ----------
@@ -46,23 +48,35 @@ def realised(
     fit
         The named effects, fitted on the replay.
     """
-    lost = unrealised(candidates, search, ranking, fit)
-    ranking, lost = _best_heads(p, candidates, search, ranking, lost)
+    ranking, lost, fit = _best_heads(p, candidates, search, ranking, fit)
     alone = len(ranking.best.effects) == 1 and ranking.best.unknown is None
+    outside = {e.id: shapes_outside(candidates[e.id], e.shape) for e in fit.effects}
     effects, known = [], 1.0 - ranking.unknown
     for r in ranking.effects:
-        nats = lost.get(r.chosen.candidate, 0.0)
-        if nats == 0.0:
+        id = r.chosen.candidate
+        nats = lost.get(id, 0.0)
+        support = replace(r.support, margin=r.margin - nats, outside=outside.get(id, 0))
+        if support == r.support:
             effects.append(r)
             continue
-        margin = r.margin - nats
-        own = named_probability(margin, r.form_share, r.rest, r.size, alone=alone)
-        probability = min(r.probability, own)
+        probability = min(r.probability, named_probability(support, alone=alone))
         known *= 1.0 - (r.probability - probability)
-        if margin >= LEAST_MARGIN:
-            effects.append(replace(r, margin=margin, probability=probability, unrealised=nats))
+        if support.margin >= LEAST_MARGIN:
+            effects.append(replace(r, support=support, probability=probability, unrealised=nats))
     effects.sort(key=lambda r: -r.probability)
     return replace(ranking, effects=tuple(effects), unknown=1.0 - known)
+
+
+def shapes_outside(candidate: Candidate, shape: Mapping[str, float]) -> int:
+    """How many shape parameters lie outside of their usual ranges, of any grade; directions never do."""
+    count = 0
+    for quantity in candidate.shape:
+        low = min(quantity.tactical[0], quantity.navigation[0])
+        high = max(quantity.tactical[1], quantity.navigation[1])
+        room = SHAPE_ROOM * (high - low)
+        value = shape.get(quantity.name, low)
+        count += not is_angle(quantity) and not low - room <= value <= high + room
+    return count
 
 
 def no_more_certain(ranking: Ranking, other: Ranking) -> Ranking:
@@ -128,9 +142,10 @@ def _best_heads(
     candidates: Mapping[str, Candidate],
     search: Search,
     ranking: Ranking,
-    lost: dict[str, float],
-) -> tuple[Ranking, dict[str, float]]:
-    """The ranking with that member of each class first which brings the most, and what is lost with it."""
+    fit: Fit,
+) -> tuple[Ranking, dict[str, float], Fit]:
+    """The ranking with that member of each class first which brings the most, what is lost, and its fit."""
+    lost = unrealised(candidates, search, ranking, fit)
     paid: dict[str, float] = {}
     for r in ranking.effects:
         id = r.chosen.candidate
@@ -142,13 +157,14 @@ def _best_heads(
             behind = max(before.best.log_posterior - swapped.best.log_posterior, 0.0)
             if behind >= least:
                 continue
-            fit = fit_named(p, candidates, search, swapped)
-            found = unrealised(candidates, search, swapped, fit)
+            fitted = fit_named(p, candidates, search, swapped)
+            found = unrealised(candidates, search, swapped, fitted)
             if behind + found.get(member, 0.0) < least:
                 least = behind + found.get(member, 0.0)
-                ranking, lost = swapped, found
+                ranking, lost, fit = swapped, found, fitted
                 paid = {other: nats for other, nats in paid.items() if other != id} | {member: behind}
-    return ranking, {i: lost.get(i, 0.0) + paid.get(i, 0.0) for i in lost.keys() | paid.keys()}
+    total = {i: lost.get(i, 0.0) + paid.get(i, 0.0) for i in lost.keys() | paid.keys()}
+    return ranking, total, fit
 
 
 def _headed_by(search: Search, ranking: Ranking, ranked: Ranked, member: str) -> Ranking | None:

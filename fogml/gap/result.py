@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.gap.confidence import Support
 from fogml.gap.model import EffectValue, GyroModel, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
@@ -55,18 +56,10 @@ class Found:
         In the card's unit; its standard error holds what the true form may differ by.
     parameters
         Shape parameters by name.
-    margin
-        By how much the evidence falls without the class, less what is `unrealised` [nats].
+    support
+        What its probability follows; the margin is less what is `unrealised`.
     unrealised
         Gain that the evidence credits it with, and that its own form as fitted does not bring [nats].
-    form_share
-        Share of the gain that needs another form than the catalogue's.
-    rest
-        Whitened length of the unknown beside it over its own.
-    overlap
-        Cosine of what it makes with what the unknown beside it makes.
-    length
-        Its whitened length on the fit runs, as the evidence takes it.
     left_out
         Ids of effects that are no candidates, and that look like it.
     by_run
@@ -83,12 +76,8 @@ class Found:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     by_run: tuple[RunAmplitude, ...] = ()
     consistent: bool = True
-    margin: float = 0.0
+    support: Support = field(default_factory=Support)
     unrealised: float = 0.0
-    form_share: float = 0.0
-    rest: float = 0.0
-    overlap: float = 0.0
-    length: float = 0.0
     left_out: tuple[str, ...] = ()
 
     @property

@@ -56,12 +56,8 @@ def _found(found: Found) -> dict[str, Any]:
         "stage": found.stage,
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
-        "margin": found.margin,
+        **asdict(found.support),
         "unrealised": found.unrealised,
-        "form_share": found.form_share,
-        "rest": found.rest,
-        "length": found.length,
-        "overlap": found.overlap,
     }
 
 

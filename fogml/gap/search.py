@@ -263,14 +263,14 @@ class Search:
             name: self.field_.columns(at) @ mean for name, (at, mean) in self._coefficients(found).items()
         }
 
-    def inner_products(self, found: Explanation) -> tuple[tuple[str, ...], FloatArray]:
-        """Names of an explanation's effects and its group, and the inner products of their estimates.
+    def lengths(self, found: Explanation) -> dict[str, float]:
+        """Whitened length of what each effect of an explanation, and its group, most probably makes.
 
-        Beside the constants, shape (names, names).
+        Beside the constants.
         """
-        parts, gram = self._coefficients(found), self.field_.gram
-        products = [[a @ gram[np.ix_(i, j)] @ b for j, b in parts.values()] for i, a in parts.values()]
-        return tuple(parts), np.array(products, dtype=np.float64).reshape(len(parts), len(parts))
+        gram, parts = self.field_.gram, self._coefficients(found)
+        squares = {name: float(c @ gram[np.ix_(at, at)] @ c) for name, (at, c) in parts.items()}
+        return {name: math.sqrt(max(square, 0.0)) for name, square in squares.items()}
 
     def _coefficients(self, found: Explanation) -> dict[str, tuple[list[int], FloatArray]]:
         """Columns of an explanation's effects and of its group, with their most probable coefficients."""

@@ -14,9 +14,16 @@ from fogml.gap.found import fit_named
 from fogml.gap.frame import Frame
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
-from fogml.gap.realised import FORM_SHARE, lost_names, no_more_certain, realised, unrealised
+from fogml.gap.realised import (
+    FORM_SHARE,
+    lost_names,
+    no_more_certain,
+    realised,
+    shapes_outside,
+    unrealised,
+)
 from fogml.gap.search import Search
-from tests.gap.small_model import SmallModel, dense, noise_of, ramps, recorded
+from tests.gap.small_model import KINDS, SmallModel, dense, noise_of, ramps, recorded
 
 MODEL = SmallModel(("mixture", "cube"))
 MEANS = {"offset": 0.0, "slope": 0.0}
@@ -112,9 +119,10 @@ def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
         log_posterior=whole.log_posterior - 2.0,
     )
     search._held[(frozenset({"cube"}), "nothing")] = cube
-    both = replace(ranking, effects=(replace(mixture, members=("mixture", "cube"), margin=12.0),))
+    supported = replace(mixture, members=("mixture", "cube"), support=replace(mixture.support, margin=12.0))
+    both = replace(ranking, effects=(supported,))
     lost = {"mixture": 9.0, "cube": 0.0}
-    monkeypatch.setattr(module, "fit_named", lambda p, candidates, search, ranking: ranking)
+    monkeypatch.setattr(module, "fit_named", lambda *given: replace(fit, effects=()))
     monkeypatch.setattr(
         module,
         "unrealised",
@@ -129,6 +137,21 @@ def test_a_member_of_the_class_that_brings_it_is_put_first(monkeypatch):
     kept = realised(p, candidates, search, both, fit)
     assert [r.members for r in kept.effects] == [("mixture", "cube")]
     assert kept.effects[0].margin == pytest.approx(10.5)
+
+
+def test_a_shape_outside_of_its_usual_range_makes_a_name_less_probable():
+    p, candidates, search, ranking, fit = searched(share=0.7)
+    (effect,) = fit.effects
+    far = replace(fit, effects=(replace(effect, shape={"share": 1.5}),))
+    (usual,), (outside,) = (realised(p, candidates, search, ranking, f).effects for f in (fit, far))
+    assert (usual.support.outside, outside.support.outside) == (0, 1)
+    assert shapes_outside(candidates["mixture"], {"share": 1.015}) == 0
+    assert outside.probability < usual.probability
+
+
+def test_directions_have_no_usual_range():
+    assert shapes_outside(KINDS["line"], {"period": 900.0, "phase": 500.0}) == 0
+    assert shapes_outside(KINDS["line"], {"period": 9000.0, "phase": 70.0}) == 1
 
 
 def test_what_was_found_beside_a_lost_name_is_no_more_certain_than_without_it():

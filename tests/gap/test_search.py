@@ -135,10 +135,9 @@ def test_what_acts_beside_an_effect_is_measured_against_it():
     (one,) = (r for r in ranking.effects if r.chosen.candidate == "cube")
     rows = search.estimates(ranking.best)
     both = np.column_stack([rows["cube"], rows[ranking.best.unknown[0]]])
-    ((own, across), (_, unknown)) = search.field_.basis.frame.beside(both)
-    assert one.size == pytest.approx(np.sqrt(own))
-    assert one.rest == pytest.approx(np.sqrt(unknown / own))
-    assert one.overlap == pytest.approx(across / np.sqrt(own * unknown))
+    own, unknown = np.diag(search.field_.basis.frame.beside(both))
+    assert one.support.length == pytest.approx(np.sqrt(own))
+    assert one.support.rest == pytest.approx(np.sqrt(unknown / own))
 
 
 def test_two_that_are_alike_form_a_class_whose_probability_is_of_both():
@@ -164,6 +163,25 @@ def test_what_takes_the_place_under_other_noise_or_beside_an_unknown_is_of_the_c
     without = replace(rival, effects=line, log_posterior=rival.log_posterior + 0.5)
     told = rank(search, explanations, rivals=[rival, without])
     assert all("cube" not in r.members for r in told.effects if r.chosen.candidate == "bend")
+
+
+def test_a_class_leads_by_what_its_members_are_worth_together():
+    search = searched((BEND, LINE))
+    ranking, explanations = ranked(search)
+    best = ranking.best
+    assert best.ids == {"bend", "line"} and best.unknown is None
+    (alone,) = (e for e in explanations if not e.ids and e.rest == "unknown")
+    ahead = replace(alone, log_posterior=best.log_posterior + 0.5)
+
+    def leading(behind):
+        swapped = tuple(replace(c, candidate="cube") if c.candidate == "bend" else c for c in best.effects)
+        second = replace(best, effects=swapped, log_posterior=best.log_posterior - behind)
+        others = [e for e in explanations if e.log_posterior < best.log_posterior - 3.0]
+        return rank(search, sorted([ahead, best, second, *others], key=lambda e: -e.log_posterior)).best
+
+    # Of two members that are worth as much each is half as probable as both together.
+    assert leading(0.2).ids == {"bend", "line"}
+    assert leading(2.0).ids == frozenset()
 
 
 def test_one_that_nothing_else_is_like_stands_alone():

@@ -14,7 +14,7 @@ from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, plausible_lengths
 from fogml.gap.screening import Screening
 from fogml.gap.shapes import AT_AMPLITUDE, Node, finer, grid
 from fogml.twin.quantities import Quantity
-from tests.gap.small_model import KINDS, MEANS, SmallModel, framed, noise_of, ramps, recorded
+from tests.gap.small_model import KINDS, MEANS, OnRun, SmallModel, framed, noise_of, ramps, recorded
 
 MODEL = SmallModel()
 RUN = ramps("a", count=400, step=20.0)
@@ -110,6 +110,46 @@ def test_the_true_line_is_kept_of_many(period):
         gains.append(-float(np.sum(left**2)))
     best = found[int(np.argmax(gains))][0]
     assert abs(best.node.frequency_hz - 1.0 / period) < 0.5 / RUN.span_s
+
+
+def test_a_weak_line_is_kept_beside_a_strong_one_that_was_found():
+    weak, strong = 1900.0, 330.0
+    lines = [
+        EffectValue("line", size, {"period": period, "phase": 70.0})
+        for size, period in ((0.3, weak), (30.0, strong))
+    ]
+    noise = noise_of(RUN, np.random.default_rng(2))
+    frame = framed([recorded(RUN, MODEL, {}, tuple(lines), noise)], MODEL)
+    nodes = grid_of("line")
+    nearest = min(range(len(nodes)), key=lambda i: abs(nodes[i].frequency_hz - 1.0 / weak))
+    found = frame.responses("line", [{"period": strong, "phase": phase} for phase in (0.0, 90.0)])
+    assert nearest not in Screening(frame, []).lines(nodes)[0]
+    assert nearest in Screening(frame, [], found).lines(nodes)[0]
+
+
+class OnRunOfB(OnRun):
+    """The model on a run, whose bend acts on the run named b alone."""
+
+    def response(self, id, shape, constants):
+        own = super().response(id, shape, constants)
+        return own if self.run.name == "b" or id != "bend" else 0.0 * own
+
+
+class ActsOnB(SmallModel):
+    """The small model with a bend that acts on the run named b alone."""
+
+    def on(self, run):
+        return OnRunOfB(run)
+
+
+def test_a_grid_follows_the_run_on_which_a_candidate_acts():
+    # Where it does nothing, nothing depends on its shape.
+    runs = [ramps("a", count=200, low=-10.0, high=50.0), ramps("b", count=200)]
+    model = ActsOnB()
+    frame = framed([recorded(run, model, {}) for run in runs], model)
+    found = candidate_columns(KINDS["bend"], frame, "tactical", Screening(frame, []))
+    for name in ("centre_temperature", "width"):
+        assert len({n.node.shape[name] for n, _ in found}) > 3
 
 
 def test_a_node_parts_within_what_it_stands_for():

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.classes import rank
-from fogml.gap.confidence import FIRST_NAME, MOSTLY_FORM, named_probability
+from fogml.gap.confidence import FIRST_NAME, MOSTLY_FORM, Support, named_probability
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
 from fogml.gap.trials import best_trial
@@ -50,15 +50,15 @@ def test_what_is_nothing_under_other_noise_takes_the_margin_off(ahead):
     rival = replace(nothing, log_posterior=best.log_posterior + ahead)
     told = rank(one.search, one.explanations, -math.inf, [rival])
     (cube,) = (r for r in told.effects if r.chosen.candidate == "cube")
-    # The search's own sets without it count beside the rival, so that the margin can only be less.
-    assert cube.margin <= -ahead + 1e-9
-    assert cube.margin == pytest.approx(-ahead, abs=0.2) or ahead < 0.0
     with_it = sum(math.exp(e.log_posterior - best.log_posterior) for e in one.explanations if "cube" in e.ids)
     without = sum(
         math.exp(e.log_posterior - best.log_posterior)
         for e in one.explanations
         if "cube" not in e.ids and (e.ids or e.rest != "nothing")
     )
+    # The search's own sets count beside the best one and its rival.
+    assert cube.members == ("cube",)
+    assert cube.margin == pytest.approx(math.log(with_it) - math.log(without + math.exp(ahead)))
     share = math.exp(ahead) / (with_it + without + math.exp(ahead))
     assert told.nothing == pytest.approx(share, rel=1e-6)
 
@@ -100,10 +100,18 @@ def test_an_effect_that_each_run_draws_anew_is_no_noise():
 
 
 def test_a_first_name_has_to_be_more_probable_than_none():
-    assert named_probability(FIRST_NAME - 0.01, alone=True) < 0.5 < named_probability(FIRST_NAME, alone=True)
-    assert named_probability(FIRST_NAME - 0.01) > 0.5
+    def alone(margin: float) -> float:
+        return named_probability(Support(margin), alone=True)
+
+    assert alone(FIRST_NAME - 0.01) < 0.5 < alone(FIRST_NAME)
+    assert named_probability(Support(FIRST_NAME - 0.01)) > 0.5
     # What hangs on another form is not the effect's, however much it gains.
-    assert named_probability(30.0, MOSTLY_FORM + 0.01) < 0.5 < named_probability(30.0, MOSTLY_FORM)
-    # As many nats of a longer effect, or beside more that is unexplained, say less.
-    assert named_probability(5.0, length=40.0) < named_probability(5.0, length=5.0)
-    assert named_probability(5.0, rest=1.0) < named_probability(5.0)
+    assert named_probability(Support(1e3, MOSTLY_FORM + 0.01)) < 0.5
+
+
+@pytest.mark.parametrize(
+    "less", [{"margin": 3.0}, {"form_share": 0.1}, {"rest": 1.0}, {"outside": 1}, {"second": True}]
+)
+def test_as_many_nats_with_another_form_or_beside_more_say_less(less):
+    support = Support(margin=5.0, length=10.0)
+    assert named_probability(replace(support, **less)) < named_probability(support)

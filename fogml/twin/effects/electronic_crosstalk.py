@@ -16,7 +16,8 @@ class ElectronicCrosstalk(BiasEffect):
         b = e_1 (T_electronics - 25) + e_2 (V - V_0)
 
     The amplitude is e_1; ``supply_ratio`` is e_2 / e_1. V_0 is the supply at the first sample. The
-    constant part e_0 is one of the bias itself.
+    constant part e_0 is one of the bias itself. Where no supply is recorded to change, nothing tells it from
+    whatever else follows the electronics, and a diagnosis does not offer it.
 
     Source: Lefevre (literature); ranges, 0.05 to 1 deg/h (tactical) and 1e-3 to 1e-2 deg/h (navigation)
     over 50 degC, are engineering ones.

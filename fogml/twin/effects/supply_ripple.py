@@ -18,7 +18,8 @@ class SupplyRipple(BiasEffect):
 
     The amplitude is k_dc; V_0 is the supply at the first sample. ``ripple`` a is the ripple as the
     samples hold it, k_ac / k_dc times its size after their averaging [V]; ``alias_frequency`` f is
-    |f_r - m f_s| [Hz] for a ripple at f_r and samples at f_s.
+    |f_r - m f_s| [Hz] for a ripple at f_r and samples at f_s. Where no supply is recorded to change, nothing
+    tells it from any other line, and a diagnosis does not offer it.
 
     Source: aliasing of a line (derived); Lefevre (literature); ranges are engineering ones.
     """

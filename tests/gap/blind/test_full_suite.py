@@ -11,6 +11,7 @@ import yaml
 
 from experiments.gap_blind import __main__ as full
 from experiments.gap_blind import per_case
+from experiments.gap_blind.calibrate import may_be_learned_from
 from fogml.cli.blind_job import MakeSettings
 from fogml.gap.blind.make import make_cases
 from fogml.gap.blind.plan import plans
@@ -46,6 +47,14 @@ def test_the_parts_never_meet_and_give_every_wanted_row_enough() -> None:
             if plan.kind in figure.kinds and (plan.mix or not figure.of_mix)
         )
         assert cases >= ENOUGH, (figure.key, cases)
+
+
+def test_a_final_seed_is_learned_from_when_another_is_kept() -> None:
+    kept = CONFIG["final"]["seed"]
+    used = {use["seed"] for use in uses(full.HERE / "final_uses.json")}
+    assert may_be_learned_from(1) and not may_be_learned_from(kept)
+    assert all(may_be_learned_from(seed) for seed in used - {kept})
+    assert not may_be_learned_from(max(used | {kept}) + 1)
 
 
 def test_a_part_is_scored_with_the_marks_that_are_there(
