@@ -1,7 +1,7 @@
 """Probabilities that hold: the evidence mapped to how often such findings are right.
 
 Evidence takes the forms of effects and of noise for known. How often a finding is right that has a
-given margin, needs so much of another form and leaves so much beside it was fitted on a development
+given margin, needs so much of another form and leaves so much beside it was fitted on a spent
 suite of the check on withheld effects, by ``python -m experiments.gap_blind.calibrate DIR``.
 """
 
@@ -15,18 +15,18 @@ SMALL_MARGIN, LARGEST_MARGIN = 4.0, 30.0
 LEAST_MARGIN = -3.0
 SMALL_LENGTH = 5.0
 MOST_OUTSIDE = 2
-FIRST_NAME = 1.5
+FIRST_NAME = 1.0
 """Least margin of an effect that nothing else is named beside [nats]: a false name costs more than none."""
-SECOND_NAME = 0.6
-"""Least probability of a name beside a more certain one: it may explain no more than that one's form."""
+BESIDE = 0.7
+"""Least probability of a name beside a more certain one or an unknown, whose form it may make up for."""
 MOSTLY_FORM = 0.5
 """Share of a gain that needs another form beyond which it is not the effect's."""
 UNSURE = 0.49
 """Largest probability of an effect that is not named for another reason."""
 LARGEST_LOG_ODDS = 12.0
-NAMED = (0.8, 0.52, 0.11, -0.32, -1.35, 0.1, -1.62, -0.83)
+NAMED = (0.8, 0.7, 0.06, -0.4, -1.0, -0.28, -1.2, -0.7)
 """Logistic constants of a class's probability: constant, then one for each of `Support.features`."""
-UNKNOWN = (-0.37, 0.42)
+UNKNOWN = (0.2, 0.7)
 """Logistic constants of the unknown's probability over the log odds of the evidence."""
 
 
@@ -74,13 +74,13 @@ class Support:
 def named_probability(support: Support, *, alone: bool = False) -> float:
     """Probability that a class is right.
 
-    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none, a
-    second one as probable as `SECOND_NAME`; and no name is given for a gain that is `MOSTLY_FORM`.
+    The first name at all, that of an effect `alone`, has to be `FIRST_NAME` more probable than none, one
+    beside others as probable as `BESIDE`; and no name is given for a gain that is `MOSTLY_FORM`.
     """
     probability = _logistic(NAMED, support.features)
     unsure = (
         (alone and support.margin < FIRST_NAME)
-        or (support.second and probability < SECOND_NAME)
+        or ((support.second or support.rest > 0.0) and probability < BESIDE)
         or support.form_share > MOSTLY_FORM
     )
     return min(probability, UNSURE) if unsure else probability

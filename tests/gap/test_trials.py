@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.classes import rank
-from fogml.gap.confidence import FIRST_NAME, MOSTLY_FORM, Support, named_probability
+from fogml.gap.confidence import BESIDE, FIRST_NAME, MOSTLY_FORM, Support, named_probability
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
 from fogml.gap.trials import best_trial
@@ -105,6 +105,12 @@ def test_a_first_name_has_to_be_more_probable_than_none():
 
     assert alone(FIRST_NAME - 0.01) < 0.5 < alone(FIRST_NAME)
     assert named_probability(Support(FIRST_NAME - 0.01)) > 0.5
+    # Beside others it has to be more certain than not.
+    for second in (False, True):
+        supports = [Support(m, rest=0.3, second=second) for m in np.linspace(-2.0, 30.0, 65)]
+        told = [named_probability(support) for support in supports]
+        assert all(p >= BESIDE or p < 0.5 for p in told)
+        assert told[0] < 0.5 < told[-1]
     # What hangs on another form is not the effect's, however much it gains.
     assert named_probability(Support(1e3, MOSTLY_FORM + 0.01)) < 0.5
 
