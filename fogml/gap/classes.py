@@ -219,7 +219,12 @@ def _ranked(
 ) -> Ranked:
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
     logs = np.array([e.log_posterior for e in explanations])
-    margin = log_sum_exp(logs[inside]) - log_sum_exp(logs[~inside]) if not inside.all() else math.inf
+    with_it, without = logs[inside], logs[~inside]
+    margin = float(with_it.max() - without.max(initial=-math.inf))
+    if len(without):
+        # The smaller of the two: many weak sets without the class may outweigh the best of them, and many
+        # unlike members that do as well say that none of them is it.
+        margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
     length, rest = _lengths(search, held, chosen.candidate)
     support = Support(margin, search.form_share(held), rest, length)
     alone = len(held.effects) == 1 and held.unknown is None
