@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 from dataclasses import fields
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -47,6 +48,7 @@ def main() -> None:
         print(f"{name} = ({', '.join(f'{c:.2f}' for c in _fitted(rows))})   from {len(rows)} findings")
 
 
+@cache
 def may_be_learned_from(seed: int) -> bool:
     """Whether a suite's seed is one to develop on, or one that is kept no longer."""
     kept = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))["final"]["seed"]

@@ -115,7 +115,7 @@ def rank(
     uneven = expit(float(np.logaddexp(noise.gain, tension)) + math.log(UNEVEN / (1.0 - UNEVEN)))
     unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
     ranked = [_ranked(search, best, chosen, classes[chosen.candidate], whole) for chosen in best.effects]
-    ranked = _in_order(ranked, best)
+    ranked = _in_order(ranked)
     taken = {id for members in classes.values() for id in members}
     for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
@@ -131,13 +131,12 @@ def rank(
     return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise, nothing)
 
 
-def _in_order(ranked: Sequence[Ranked], best: Explanation) -> list[Ranked]:
+def _in_order(ranked: Sequence[Ranked]) -> list[Ranked]:
     """Effects of the best explanation, that of the largest margin first and the others as second ones."""
-    alone = len(best.effects) == 1 and best.unknown is None
     told = sorted(ranked, key=lambda r: -r.margin)
     for i, r in enumerate(told[1:], 1):
         support = replace(r.support, second=True)
-        told[i] = replace(r, support=support, probability=named_probability(support, alone=alone))
+        told[i] = replace(r, support=support, probability=named_probability(support))
     return told
 
 
@@ -227,8 +226,7 @@ def _ranked(
         margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
     length, rest = _lengths(search, held, chosen.candidate)
     support = Support(margin, search.form_share(held), rest, length)
-    alone = len(held.effects) == 1 and held.unknown is None
-    return Ranked(chosen, members, named_probability(support, alone=alone), support)
+    return Ranked(chosen, members, named_probability(support, alone=held.alone), support)
 
 
 def _lengths(search: Search, held: Explanation, id: str) -> tuple[float, float]:

@@ -145,6 +145,7 @@ class Conditioned:
     def __init__(self, field: Field, terms: Sequence[Term]) -> None:
         self.field, self.terms = field, tuple(terms)
         self._node_gains: dict[bytes, FloatArray] = {}
+        self._every_gain: FloatArray | None = None
         self.sign_gains = np.zeros((len(field.basis.nodes), len(LENGTHS)))
         self._columns = np.array([c for t in terms for c in t.columns], dtype=np.intp)
         self._scale = np.array([t.length for t in terms for _ in t.columns])
@@ -182,8 +183,10 @@ class Conditioned:
         key = places.tobytes()
         if key not in self._node_gains:
             out = np.full((len(field.basis.nodes), len(LENGTHS)), -np.inf)
-            out[places] = self._gains_of(places)
+            out[places] = self._gains_of(places) if self._every_gain is None else self._every_gain[places]
             self._node_gains[key] = out
+            if nodes is None:
+                self._every_gain = out
         return self._node_gains[key]
 
     def response_size(self, node: int, length: float) -> float:

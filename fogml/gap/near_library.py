@@ -13,7 +13,7 @@ import numpy as np
 from fogml.gap.group import Group
 from fogml.gap.model import Candidate
 from fogml.gap.observation import Observation
-from fogml.gap.shapes import is_angle, is_line
+from fogml.gap.shapes import is_angle, is_line, usual_shape
 
 NAME = "near_library"
 LOW, HIGH = 0.15, 0.85
@@ -59,7 +59,7 @@ def _shapes(candidate: Candidate, grade: str) -> list[dict[str, float]]:
     """The usual shape and those with one parameter low or high; none for lines in time."""
     if any(is_line(q) for q in candidate.shape):
         return []
-    usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+    usual = usual_shape(candidate, grade)
     shapes = [usual]
     for quantity in candidate.shape:
         low, high = quantity.range(grade)  # type: ignore[arg-type]

@@ -33,8 +33,7 @@ def plausible_lengths(candidate: Candidate, size: float) -> FloatArray:
     `size` is the amplitude that has a whitened length of 1, in the card's unit.
     """
     quantity = candidate.amplitude
-    low = min(quantity.tactical[0], quantity.navigation[0])
-    high = max(quantity.tactical[1], quantity.navigation[1])
+    low, high = quantity.of_any_grade
     low = low if low > 0.0 else 1e-3 * high
     decades = np.log10(LENGTHS * size)
     above = np.maximum(decades - np.log10(high), 0.0)

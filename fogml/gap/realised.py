@@ -49,7 +49,6 @@ def realised(
         The named effects, fitted on the replay.
     """
     ranking, lost, fit = _best_heads(p, candidates, search, ranking, fit)
-    alone = len(ranking.best.effects) == 1 and ranking.best.unknown is None
     outside = {e.id: shapes_outside(candidates[e.id], e.shape) for e in fit.effects}
     effects, known = [], 1.0 - ranking.unknown
     for r in ranking.effects:
@@ -59,7 +58,7 @@ def realised(
         if support == r.support:
             effects.append(r)
             continue
-        probability = min(r.probability, named_probability(support, alone=alone))
+        probability = min(r.probability, named_probability(support, alone=ranking.best.alone))
         known *= 1.0 - (r.probability - probability)
         if support.margin >= LEAST_MARGIN:
             effects.append(replace(r, support=support, probability=probability, unrealised=nats))
@@ -71,8 +70,7 @@ def shapes_outside(candidate: Candidate, shape: Mapping[str, float]) -> int:
     """How many shape parameters lie outside of their usual ranges, of any grade; directions never do."""
     count = 0
     for quantity in candidate.shape:
-        low = min(quantity.tactical[0], quantity.navigation[0])
-        high = max(quantity.tactical[1], quantity.navigation[1])
+        low, high = quantity.of_any_grade
         room = SHAPE_ROOM * (high - low)
         value = shape.get(quantity.name, low)
         count += not is_angle(quantity) and not low - room <= value <= high + room

@@ -149,18 +149,24 @@ class Search:
                 own = held.node_gains(self.places[chosen.candidate])[self.places[chosen.candidate]]
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
-        terms, bare = (self._terms(effects, group, exact=exact) for exact in (False, True))
-        likely = self.field_.condition(terms).log_evidence
-        exact = False
-        if len(bare) < len(terms):
-            own = self.field_.condition(bare).log_evidence + math.log(EXACT)
-            loose = likely + math.log1p(-EXACT)
-            likely, exact = float(np.logaddexp(own, loose)), own > loose
+        likely, exact = self._of_either_form(effects, group)
         if rest == "unknown" and group is not None:
-            averaged_rest += self._second(bare if exact else terms)
+            averaged_rest += self._second(self._terms(effects, group, exact=exact))
         evidence = likely - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
         return Explanation(tuple(effects), rest, group, evidence, evidence + prior, exact)
+
+    def _of_either_form(
+        self, effects: Sequence[Chosen], group: tuple[str, float] | None
+    ) -> tuple[float, bool]:
+        """Evidence with room for other forms and without, averaged, and whether it is more without."""
+        loose, bare = (self._terms(effects, group, exact=exact) for exact in (False, True))
+        with_room = self.field_.condition(loose).log_evidence
+        if len(bare) == len(loose):
+            return with_room, False
+        with_room += math.log1p(-EXACT)
+        without = self.field_.condition(bare).log_evidence + math.log(EXACT)
+        return float(np.logaddexp(without, with_room)), without > with_room
 
     def _log_prior(self, effects: Sequence[Chosen], rest: Rest) -> float:
         count, size = len(self.places), len(effects)
@@ -241,8 +247,7 @@ class Search:
 
     def form_share(self, found: Explanation) -> float:
         """Share of what the effects of an explanation gain that needs other forms than the catalogue's."""
-        nodes = self.field_.basis.nodes
-        bare = [Term(nodes[c.node].columns, c.length) for c in found.effects]
+        bare = self._terms(found.effects, None, exact=True)
         group = found.group if found.rest == "form" else None
         whole = self._terms(found.effects, group, exact=found.exact)
         gain = self.field_.condition(whole).log_evidence - self._empty

@@ -25,7 +25,7 @@ from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.rehearsal import FINE_S, Rehearsal, Rehearsed, Stage, stage
 from fogml.gap.result import SeparatingRun
-from fogml.gap.shapes import Node, grid
+from fogml.gap.shapes import Node, grid, usual_shape
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
@@ -172,7 +172,7 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
         candidate = on.candidate(value.id)
         if value.amplitude == 0.0:
             raise InputError(f"effect '{value.id}' has a size of 0; give the size that is to be told")
-        usual = {q.name: q.typical(on.model.grade) for q in candidate.shape}
+        usual = usual_shape(candidate, on.model.grade)
         shape = usual | {name: number for name, number in value.shape.items() if name in usual}
         response = _response(rehearsal, value.id)
         nodes = grid(candidate, on.model.grade, response, spans)

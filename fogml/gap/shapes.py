@@ -96,6 +96,11 @@ def grid(
     return _grid(candidate, grade, response, spans)
 
 
+def usual_shape(candidate: Candidate, grade: str) -> dict[str, float]:
+    """Shape parameters in the middle of a grade's ranges."""
+    return {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+
+
 def corners(candidate: Candidate, grade: str) -> tuple[dict[str, float], ...]:
     """Usual shapes: in the middle of their ranges, all at their lowest, all at their highest.
 
@@ -103,7 +108,7 @@ def corners(candidate: Candidate, grade: str) -> tuple[dict[str, float], ...]:
     """
     amplitudes = amplitudes_about(candidate)
     at = {AT_AMPLITUDE: float(amplitudes[0])} if amplitudes else {}
-    usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+    usual = usual_shape(candidate, grade)
     ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))  # type: ignore[arg-type]
     return tuple({**shape, **at} for shape in (usual, *ends))
 
@@ -170,7 +175,7 @@ def _grid(
 ) -> tuple[Node, ...]:
     if not candidate.shape:
         return (Node({}, ({},)),)
-    usual = {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
+    usual = usual_shape(candidate, grade)
     turning = [q for q in candidate.shape if is_angle(q)]
     rest = [q for q in candidate.shape if q not in turning]
     linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
