@@ -1,8 +1,9 @@
 """Probabilities that hold: the evidence mapped to how often such findings are right.
 
 Evidence takes the forms of effects and of noise for known. How often a finding is right that has a
-given margin, needs so much of another form and leaves so much beside it was fitted on a spent
-suite of the check on withheld effects, by ``python -m experiments.gap_blind.calibrate DIR``.
+given margin, needs so much of another form and leaves so much beside it was fitted on spent cases of the
+check on withheld effects, those beside its mix weighing less.
+``python -m experiments.gap_blind.calibrate DIR`` fits such constants, with all cases weighing alike.
 """
 
 from __future__ import annotations
