@@ -20,8 +20,12 @@ AVERAGING_S = 100.0
 DRAWS, NOISES, CHOICES = 40, 200, 4000
 LEAST_GAP = 0.2
 """A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
-FORM_LEFT = 0.07
-"""What of a closing may be missing because no form is known exactly, as a share of it."""
+FORM_LEFT = 0.04
+"""What of a closing may be missing because no form is known exactly, as a share of it.
+
+So that of 182 intervals of spent blind cases nine in ten held what the true form closes: 0.92, where 0.07
+gave 0.94.
+"""
 _Z90 = 1.6448536269514722
 
 
