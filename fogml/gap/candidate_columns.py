@@ -133,19 +133,28 @@ class _Tried:
         self._candidate, self._frame, self._screening, self._apart = candidate, frame, screening, apart
         self.nodes, self.shares = nodes, [1.0] * len(nodes)
         self.columns = self._responses(nodes)
+        self._gains: list[FloatArray | None] = [None] * len(nodes)
 
     @property
     def starts(self) -> list[int]:
         """First column of each node."""
         return [0, *np.cumsum([len(node.draws) for node in self.nodes])[:-1].tolist()]
 
-    def gains(self) -> list[FloatArray]:
-        """Gain of each node in nats, shape (nodes,), beside each of what the screening holds."""
-        parts = [_only(self.columns, run) for run in self._apart] if self._apart else [self.columns]
-        return [
-            np.asarray(np.sum(gain, axis=0))
-            for gain in zip(*(self._screening.gains(part, self.starts) for part in parts))
-        ]
+    def gains(self) -> FloatArray:
+        """Gain of each node in nats, beside each of what the screening holds, shape (ways, nodes)."""
+        edges = [*self.starts, self.columns.shape[1]]
+        new = [i for i, gain in enumerate(self._gains) if gain is None]
+        if new:
+            widths = [edges[i + 1] - edges[i] for i in new]
+            columns = self.columns
+            if len(new) < len(self.nodes):
+                columns = np.concatenate([columns[:, edges[i] : edges[i + 1]] for i in new], axis=1)
+            parts = [_only(columns, run) for run in self._apart] if self._apart else [columns]
+            starts = [0, *np.cumsum(widths)[:-1].tolist()]
+            found = np.sum([self._screening.gains(part, starts) for part in parts], axis=0)
+            for i, gain in zip(new, found.T):
+                self._gains[i] = gain
+        return np.stack(self._gains, axis=1)  # type: ignore[arg-type]
 
     def refine(self, grid: Sequence[Node]) -> None:
         """Part the nodes that stand out: a strong effect is told to less than a whole grid can afford."""
@@ -163,7 +172,7 @@ class _Tried:
         for i in best:
             # The first part takes the node's place, the others go to the end.
             parts = finer(self._candidate, grid, self.nodes[i])
-            self.nodes[i], self.shares[i] = parts[0], 1.0 / len(parts)
+            self.nodes[i], self.shares[i], self._gains[i] = parts[0], 1.0 / len(parts), None
             columns = self._responses(parts)
             own = slice(self.starts[i], self.starts[i] + len(parts[0].draws))
             self.columns[:, own] = columns[:, : own.stop - own.start]
@@ -176,6 +185,7 @@ class _Tried:
     def _append(self, nodes: Sequence[Node], columns: FloatArray, share: float) -> None:
         self.nodes.extend(nodes)
         self.shares.extend([share] * len(nodes))
+        self._gains.extend([None] * len(nodes))
         self.columns = np.concatenate([self.columns, columns], axis=1)
 
     def _responses(self, nodes: Sequence[Node]) -> FloatArray:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.gap.frame import Frame
 from fogml.gap.shapes import Node
@@ -33,30 +34,48 @@ class Screening:
         self._steps_s = [o.row_s for o in frame.observations]
         residual, fixed = frame.residual, frame.fixed
         smooth = [g for g in groups if g.shape[1] <= 24]
-        beside = np.concatenate([fixed, *smooth], axis=1) if smooth else fixed
-        self._sets: list[tuple[FloatArray, FloatArray, FloatArray]] = []
-        known = [] if others is None else [np.concatenate([fixed, others], axis=1)]
-        for held in (fixed, beside, *known):
-            inverse = np.linalg.inv(held.T @ held + np.eye(held.shape[1]))
-            left = residual[:, 0] - held @ (inverse @ (held.T @ residual[:, 0]))
-            self._sets.append((held, np.asarray(inverse, dtype=np.float64), left))
+        known = [] if others is None else [others]
+        self._held = np.concatenate([fixed, *smooth, *known], axis=1)
+        own, wide = fixed.shape[1], fixed.shape[1] + sum(g.shape[1] for g in smooth)
+        every = np.arange(self._held.shape[1])
+        sets = [every[:own], every[:wide]]
+        if known:
+            sets.append(np.concatenate([every[:own], every[wide:]]))
+        gram, fit = self._held.T @ self._held, self._held.T @ residual[:, 0]
+        self._sets: list[tuple[NDArray[np.intp], FloatArray]] = []
+        left = []
+        for places in sets:
+            inverse = np.linalg.inv(gram[np.ix_(places, places)] + np.eye(len(places)))
+            self._sets.append((places, np.asarray(inverse, dtype=np.float64)))
+            left.append(residual[:, 0] - self._held[:, places] @ (inverse @ fit[places]))
+        self._left = np.array(left)
 
-    def gains(self, columns: FloatArray, starts: Sequence[int]) -> list[FloatArray]:
-        """Gain of each node, whose columns begin at `starts`, in nats, beside each of these."""
-        gains = []
-        for held, inverse, left in self._sets:
-            cross = held.T @ columns
-            fit = left @ columns
-            edges = [*starts, columns.shape[1]]
-            gain = np.empty(len(starts))
-            width = columns.shape[1] // len(starts)
-            if width * len(starts) == columns.shape[1] and np.all(np.diff(starts) == width):
-                gain = _even_gains(columns, cross, inverse, fit, width)
-            else:
-                edges = [*starts, columns.shape[1]]
-                for i, (a, b) in enumerate(pairwise(edges)):
-                    gain[i] = _even_gains(columns[:, a:b], cross[:, a:b], inverse, fit[a:b], b - a)[0]
-            gains.append(gain)
+    def gains(self, columns: FloatArray, starts: Sequence[int]) -> FloatArray:
+        """Gain of each node, whose columns begin at `starts`, in nats, beside each of these.
+
+        Shape (ways to screen, nodes).
+        """
+        cross, fits = self._held.T @ columns, self._left @ columns
+        gains = np.empty((len(self._sets), len(starts)))
+        width = columns.shape[1] // len(starts)
+        if width * len(starts) == columns.shape[1] and np.all(np.diff(starts) == width):
+            return self._even_gains(columns, cross, fits, width)
+        for i, (a, b) in enumerate(pairwise([*starts, columns.shape[1]])):
+            gains[:, i] = self._even_gains(columns[:, a:b], cross[:, a:b], fits[:, a:b], b - a)[:, 0]
+        return gains
+
+    def _even_gains(self, columns: FloatArray, cross: FloatArray, fits: FloatArray, width: int) -> FloatArray:
+        """Gains of nodes of the same number of columns, in nats, shape (ways to screen, nodes)."""
+        count = columns.shape[1] // width
+        own = _products(columns, columns, width)
+        gains = np.empty((len(self._sets), count))
+        for i, (places, inverse) in enumerate(self._sets):
+            held = cross[places]
+            grams = own - _products(held, inverse @ held, width)
+            least = 1e-6 * np.maximum(np.trace(grams, axis1=1, axis2=2), 1e-30)
+            grams += least[:, None, None] * np.eye(width)
+            fit = fits[i].reshape(count, width)
+            gains[i] = 0.5 * np.einsum("ni,ni->n", fit, np.linalg.solve(grams, fit[:, :, None])[:, :, 0])
         return gains
 
     def lines(self, nodes: Sequence[Node]) -> tuple[list[int], int | None]:
@@ -69,7 +88,7 @@ class Screening:
             return list(range(len(nodes))), None
         kept: set[int] = set()
         total = np.zeros(len(nodes))
-        for _, _, left in self._sets:
+        for left in self._left:
             power = np.zeros(len(nodes))
             for run, step in zip(self._runs, self._steps_s):
                 part = left[run]
@@ -83,18 +102,11 @@ class Screening:
         return sorted(kept), others[len(others) // 2] if others else None
 
 
-def _even_gains(
-    columns: FloatArray, cross: FloatArray, inverse: FloatArray, fit: FloatArray, width: int
-) -> FloatArray:
-    """Gains of nodes of the same number of columns, in nats, shape (nodes,)."""
-    count = columns.shape[1] // width
-    grams = np.empty((count, width, width))
-    weighed = inverse @ cross
+def _products(first: FloatArray, second: FloatArray, width: int) -> FloatArray:
+    """Inner products of the columns of each node, `width` columns each, shape (nodes, width, width)."""
+    products = np.empty((first.shape[1] // width, width, width))
     for a in range(width):
         for b in range(a, width):
-            own = np.einsum("ij,ij->j", columns[:, a::width], columns[:, b::width])
-            grams[:, a, b] = own - np.einsum("ij,ij->j", cross[:, a::width], weighed[:, b::width])
-            grams[:, b, a] = grams[:, a, b]
-    grams += 1e-6 * np.maximum(np.trace(grams, axis1=1, axis2=2), 1e-30)[:, None, None] * np.eye(width)
-    fits = fit.reshape(count, width)
-    return np.asarray(0.5 * np.einsum("ni,ni->n", fits, np.linalg.solve(grams, fits[:, :, None])[:, :, 0]))
+            products[:, a, b] = np.einsum("ij,ij->j", first[:, a::width], second[:, b::width])
+            products[:, b, a] = products[:, a, b]
+    return products
