@@ -132,8 +132,15 @@ class _Tried:
     ) -> None:
         self._candidate, self._frame, self._screening, self._apart = candidate, frame, screening, apart
         self.nodes, self.shares = nodes, [1.0] * len(nodes)
-        self.columns = self._responses(nodes)
+        self._blocks = [self._responses(nodes)]
         self._gains: list[FloatArray | None] = [None] * len(nodes)
+
+    @property
+    def columns(self) -> FloatArray:
+        """Whitened responses of all draws of all nodes, shape (n, draws)."""
+        if len(self._blocks) > 1:
+            self._blocks = [np.concatenate(self._blocks, axis=1)]
+        return self._blocks[0]
 
     @property
     def starts(self) -> list[int]:
@@ -175,7 +182,7 @@ class _Tried:
             self.nodes[i], self.shares[i], self._gains[i] = parts[0], 1.0 / len(parts), None
             columns = self._responses(parts)
             own = slice(self.starts[i], self.starts[i] + len(parts[0].draws))
-            self.columns[:, own] = columns[:, : own.stop - own.start]
+            self._blocks[0][:, own] = columns[:, : own.stop - own.start]
             self._append(parts[1:], columns[:, own.stop - own.start :], 1.0 / len(parts))
 
     def add(self, node: Node) -> None:
@@ -186,7 +193,7 @@ class _Tried:
         self.nodes.extend(nodes)
         self.shares.extend([share] * len(nodes))
         self._gains.extend([None] * len(nodes))
-        self.columns = np.concatenate([self.columns, columns], axis=1)
+        self._blocks.append(columns)
 
     def _responses(self, nodes: Sequence[Node]) -> FloatArray:
         return self._frame.responses(self._candidate.id, [shape for node in nodes for shape in node.draws])
