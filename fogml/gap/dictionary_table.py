@@ -9,7 +9,7 @@ import numpy as np
 from fogml.gap.group import BANDS_S, EDGES_S, Kind, lag, shared_differences, temperature_rate
 from fogml.gap.observation import Observation
 from fogml.runs.run import FloatArray
-from fogml.signals.sample_means import mean_cosine
+from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.twin.memory import Memory
 
 HARMONICS, HARMONICS_OF_RATE = 3, 8
@@ -78,12 +78,13 @@ def _scale_factor(observations: Sequence[Observation]) -> list[FloatArray]:
 def _waves(o: Observation, harmonics: int) -> FloatArray:
     """Harmonics of the table's angle, recorded or followed from its rate, shape (m, 2 * harmonics)."""
     recorded = o.run.columns.get("angle")
-    steps = np.diff(o.run.time, prepend=o.run.time[0])
-    turned = np.radians(np.cumsum(o.run.rate * steps) if recorded is None else recorded)
-    before = np.append(turned[:1], turned[:-1])
+    told = o.run.rate * np.diff(o.run.time, prepend=o.run.time[0])
+    angle = np.cumsum(told) if recorded is None else recorded
+    after = np.radians(angle)
+    before = after - np.radians(with_whole_turns(np.diff(angle, prepend=angle[0]), told))
     return np.column_stack(
         [
-            o.averaged(mean_cosine(k * before - phase, k * turned - phase))
+            o.averaged(mean_cosine(k * before - phase, k * after - phase))
             for k in range(1, harmonics + 1)
             for phase in (0.0, 0.5 * np.pi)
         ]

@@ -18,6 +18,21 @@ def mean_cosine(before: FloatArray, after: FloatArray) -> FloatArray:
     return np.cos(before + half) * _sine_ratio(half)
 
 
+def with_whole_turns(turned_deg: FloatArray, told_deg: FloatArray) -> FloatArray:
+    """Differences of an angle [deg] with the whole turns that its record may have left out, shape (n,).
+
+    Parameters
+    ----------
+    turned_deg
+        Differences of neighbouring samples of an angle that may begin anew after each turn. Over a turn
+        they are whole already.
+    told_deg
+        The same by the rate, good to half a turn.
+    """
+    turns = np.rint((told_deg - turned_deg) / 360.0)
+    return np.where(np.abs(turned_deg) > 360.0, turned_deg, turned_deg + 360.0 * turns)
+
+
 def _sine_ratio(x: FloatArray) -> FloatArray:
     """sin(x) / x, shape (n,), exact to rounding."""
     if max(float(x.max(initial=0.0)), -float(x.min(initial=0.0))) > _SMALL:

@@ -102,7 +102,9 @@ def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
     shape = _off_default(effect)
     given = inputs["programme"]
     whole = signature(effect, given, shape)
-    alone = signature(effect, scrambled(given, keep=effect.needs), shape)
+    # The rate tells whole turns of an angle.
+    with_angle = {"rate"} if "angle" in effect.needs else set()
+    alone = signature(effect, scrambled(given, keep={*effect.needs, *with_angle}), shape)
     assert np.array_equal(whole, alone), (
         f"{effect.id}: its signature depends on inputs outside {effect.needs}"
     )

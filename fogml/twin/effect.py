@@ -17,7 +17,10 @@ if TYPE_CHECKING:
     from fogml.twin.plant.network import ThermalNetwork
 
 SET_UP = ("rate", "angle", "earth", "powered_on", "facts", "output", "slopes")
-"""What an effect may need beside temperatures and drives; `angle` is that of `Inputs.angle_deg`."""
+"""What an effect may need beside temperatures and drives; `angle` is that of `Inputs.angle_deg`.
+
+With the angle goes the rate, which tells its whole turns.
+"""
 Stage = Literal["thermal", "rig", "bias", "scale_factor", "loop", "readout", "sensor", "logger", "noise"]
 STAGES: tuple[Stage, ...] = (
     "thermal",

@@ -173,18 +173,6 @@ class Inputs:
             self.cache["angle"] = self.memory.total("angle", step * self.table_rate)
         return self.cache["angle"]
 
-    def mean_cosine(self, phase_deg: float) -> FloatArray:
-        """Mean of cos(table angle - phase) since the sample before, shape (n,).
-
-        Of a table that turns by less than half a turn between samples.
-        """
-        angle = self.angle_deg
-        if "turned" not in self.cache:
-            turned = angle - self.memory.previous("angle before", angle)
-            self.cache["turned"] = (turned + 180.0) % 360.0 - 180.0
-        half = 0.5 * np.radians(self.cache["turned"])
-        return np.asarray(np.cos(np.radians(angle - phase_deg) - half) * np.sinc(half / np.pi))
-
     @cached_property
     def time_on_s(self) -> FloatArray:
         """Time since the latest power-on [s], at least 0; infinite where it was long before; shape (n,)."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.runs.run import FloatArray
-from fogml.signals.sample_means import mean_cosine
+from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.signals.waves import sine
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
@@ -33,9 +33,15 @@ def slope_per_s(inputs: Inputs, key: str, x: FloatArray) -> FloatArray:
 
 
 def table_cosine(inputs: Inputs, key: str, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
-    """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,)."""
-    angle = harmonic * np.radians(inputs.angle_deg) + math.radians(phase_deg)
-    return mean_cosine(inputs.memory.previous(f"{key} angle", angle), angle)
+    """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,).
+
+    Of a recorded angle that begins anew after a turn the whole turns follow from the table's rate.
+    """
+    angle, time = inputs.angle_deg, inputs.time
+    told = (time - inputs.memory.previous(f"{key} time", time)) * inputs.table_rate
+    turned = with_whole_turns(angle - inputs.memory.previous(f"{key} angle", angle), told)
+    after = np.radians(harmonic * angle + phase_deg)
+    return mean_cosine(after - np.radians(harmonic * turned), after)
 
 
 def line(inputs: Inputs, period_s: float, phase_deg: float) -> FloatArray:

@@ -16,6 +16,7 @@ from fogml.signals.sample_means import mean_cosine
 from fogml.twin.effects.input_axis_misalignment import InputAxisMisalignment, scale_factor_loss_ppm
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect
+from fogml.twin.responses import table_cosine
 
 N = 720
 TIME = np.arange(float(N))
@@ -108,6 +109,19 @@ def test_uneven_table_rate_has_its_harmonic_and_keeps_whole_turns() -> None:
     wanted = np.diff(np.sin(edges)) / 3.0 / np.radians(1.0) * 3600e-6
     assert found[1:] == pytest.approx(wanted[1:], rel=1e-9, abs=1e-12)
     assert np.sum(found[24 : 24 + 72 * 9]) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("rate", [0.3, -17.0, 77.0])
+@pytest.mark.parametrize("record", ["whole", "anew after a turn", "none"])
+def test_cosine_of_a_table_is_its_mean_however_fast_it_turns(rate: float, record: str) -> None:
+    step = 10.0
+    angle = rate * step * np.arange(N) + 30.0
+    drives = {"whole": {"angle": angle}, "anew after a turn": {"angle": angle % 360.0}, "none": {}}[record]
+    turning = inputs(time=step * np.arange(N), table_rate=np.full(N, rate), drives=drives)
+    start = 30.0 if drives else 0.0
+    edges = np.radians(rate * step * np.arange(N) + start - 70.0)
+    found = table_cosine(turning, "table", -70.0)
+    assert found[1:] == pytest.approx(np.diff(np.sin(edges)) / np.radians(rate * step), abs=1e-9)
 
 
 @settings(max_examples=30, deadline=None)

@@ -6,6 +6,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
+from fogml.twin.responses import table_cosine
 
 
 class AzimuthalGradient(BiasEffect):
@@ -44,4 +45,4 @@ class AzimuthalGradient(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h/(degC/min) [deg/h], shape (n,)."""
-        return inputs.mean_cosine(shape["phase"]) * (inputs.dT("T_out") - inputs.dT("T_in"))
+        return table_cosine(inputs, self.id, -shape["phase"]) * (inputs.dT("T_out") - inputs.dT("T_in"))
