@@ -1,8 +1,9 @@
 """Constants of `fogml.gap.confidence` from suites that the diagnosis has answered.
 
 ``python -m experiments.gap_blind.calibrate DIR`` prints logistic constants of named effects over the
-features of their evidence, and of the unknown over its log odds. Suites are those to develop on, and final
-ones that are spent: figures were taken from them, and ``config.yaml`` keeps another seed for the next ones.
+features of their evidence, and of the unknown over its log odds and the number of names. Suites are those
+to develop on, and final ones that are spent: figures were taken from them, and ``config.yaml`` keeps
+another seed for the next ones.
 
 Probabilities are to hold in the mix. Cases drawn by their kind or strength beside it tell how evidence
 grows, but not how often there is an effect or an unknown at all: ``--beside`` lets them weigh less.
@@ -16,7 +17,6 @@ from dataclasses import fields
 from functools import cache
 from pathlib import Path
 
-import numpy as np
 import yaml
 from sklearn.linear_model import LogisticRegression
 
@@ -24,7 +24,8 @@ from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.gap.blind.seeds import is_final, uses
 from fogml.gap.blind.truth import Truth
-from fogml.gap.confidence import LARGEST_LOG_ODDS, Support
+from fogml.gap.confidence import Support, unknown_features
+from fogml.gap.result import NAMED
 
 HERE = Path(__file__).parent
 Row = tuple[tuple[float, ...], bool, float]
@@ -74,8 +75,9 @@ def _read(gap: dict, truth: Truth, weight: float, named: list[Row], unknown: lis
         support = Support(**{field.name: item[field.name] for field in fields(Support)})
         named.append((support.features, bool(set(item["class"]) & truth.right_names), weight))
     if truth.kind != "wrong_thermal":
-        odds = float(np.clip(gap["unknown"]["log_odds"], -LARGEST_LOG_ODDS, LARGEST_LOG_ODDS))
-        unknown.append(((odds,), truth.kind.startswith("unknown"), weight))
+        names = sum(item["probability"] >= NAMED for item in gap["which"])
+        features = unknown_features(gap["unknown"]["log_odds"], names)
+        unknown.append((features, truth.kind.startswith("unknown"), weight))
 
 
 def _fitted(rows: list[Row]) -> list[float]:

@@ -12,6 +12,7 @@ from scipy.special import expit
 from fogml.gap.confidence import UNSURE, Support, named_probability, unknown_probability
 from fogml.gap.evidence import log_sum_exp
 from fogml.gap.explanation import Chosen, Explanation
+from fogml.gap.result import NAMED
 from fogml.gap.search import Search
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
@@ -84,7 +85,7 @@ class Ranking:
     @property
     def named(self) -> frozenset[str]:
         """Ids of the best explanation's effects that are named."""
-        return self.best.ids & {r.chosen.candidate for r in self.effects if r.probability >= 0.5}
+        return self.best.ids & {r.chosen.candidate for r in self.effects if r.probability >= NAMED}
 
 
 def rank(
@@ -128,7 +129,8 @@ def rank(
     ranked.sort(key=lambda r: -r.probability)
     log_odds = math.log(max(unknown, 1e-12)) - math.log(max(1.0 - unknown, 1e-12))
     nothing = float(sum(w for e, w in zip(whole, weights) if not e.ids and e.unknown is None))
-    return Ranking(best, tuple(ranked), unknown_probability(log_odds), log_odds, noise, nothing)
+    names = sum(r.probability >= NAMED for r in ranked)
+    return Ranking(best, tuple(ranked), unknown_probability(log_odds, names), log_odds, noise, nothing)
 
 
 def _in_order(ranked: Sequence[Ranked]) -> list[Ranked]:
