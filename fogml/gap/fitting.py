@@ -16,7 +16,7 @@ from fogml.gap.frame import constant_rows
 from fogml.gap.model import Candidate, Constant, EffectValue, Foreseeable
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.shapes import is_line
+from fogml.gap.shapes import WHOLE, is_line
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
@@ -38,7 +38,8 @@ class Fit:
     effects
         With fitted amplitudes and shapes.
     covariance
-        Of constants, then of each effect's amplitude and shape parameters in the card's order.
+        Of constants, then of each effect's amplitude and shape parameters in the card's order, those that
+        are whole numbers left out.
     square
         Sum of squared whitened residuals.
     rows
@@ -173,6 +174,9 @@ class _Problem:
             scale.append(max(abs(effect.amplitude), 1e-12))
             self.limits.append(declared.amplitude.limits)
             for quantity in declared.shape:
+                if quantity.name in WHOLE:
+                    # The grid has every whole number.
+                    continue
                 self.shapes.append((i, quantity))
                 names.append(f"{effect.id}.{quantity.name}")
                 low, high = quantity.range(grade)  # type: ignore[arg-type]
@@ -221,7 +225,8 @@ class _Problem:
         for i, effect in enumerate(self.first):
             names = [q.name for j, q in self.shapes if j == i]
             amplitude, shape = values[place], values[place + 1 : place + 1 + len(names)]
-            effects.append(EffectValue(effect.id, float(amplitude), dict(zip(names, map(float, shape)))))
+            fitted = {**effect.shape, **dict(zip(names, map(float, shape)))}
+            effects.append(EffectValue(effect.id, float(amplitude), fitted))
             place += 1 + len(names)
         return constants, tuple(effects)
 

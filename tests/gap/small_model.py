@@ -38,6 +38,7 @@ WIDTH = Quantity("width", "degC", (3.0, 12.0), (3.0, 12.0), limits=(0.1, 50.0))
 SHARE = Quantity("share", "1", (0.0, 1.0), (0.0, 1.0), limits=(0.0, 1.0))
 PERIOD = Quantity("period", "s", (200.0, 4000.0), (200.0, 4000.0), limits=(1.0, 1e5))
 PHASE = Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), limits=(-720.0, 720.0))
+TEETH = Quantity("harmonic", "1", (1.0, 36.0), (1.0, 36.0), limits=(0.01, 1e4))
 KINDS = {
     k.id: k
     for k in (
@@ -46,6 +47,7 @@ KINDS = {
         Kind("mixture", SIZE, (SHARE,)),
         Kind("line", SIZE, (PERIOD, PHASE)),
         Kind("rippled", SIZE, (PERIOD, PHASE)),
+        Kind("toothed", SIZE, (TEETH, PHASE)),
         Kind("tilted", SIZE),
         Kind("mute", SIZE),
     )
@@ -99,6 +101,9 @@ class OnRun:
             return u**2 + shape["share"] * np.sin(t / 700.0)
         if id == "line":
             return np.sin(2.0 * np.pi * t / shape["period"] + np.radians(shape["phase"]))
+        if id == "toothed":
+            # A table that turns once in 500 s.
+            return np.cos(2.0 * np.pi * shape["harmonic"] * t / 500.0 + np.radians(shape["phase"]))
         return 0.0 * u if id == "mute" else 0.3 * u - 0.1
 
 

@@ -188,6 +188,22 @@ def test_a_line_is_followed_to_its_frequency_over_many_cycles():
     assert abs(found.amplitude - 0.4) < 4.0 * errors[0]
 
 
+def test_a_whole_number_stays_what_the_grid_found():
+    """Over many turns a fit would leave it for a number between two, where the response is another one."""
+    toothed = EffectValue("toothed", 0.2, {"harmonic": 4.0, "phase": 30.0})
+    model = SmallModel(("toothed",))
+    run = ramps("a", count=400)
+    frame = framed([recorded(run, model, TRUE, (toothed,), noise_of(run, np.random.default_rng(2)))], model)
+    first = EffectValue("toothed", 0.1, {"harmonic": 4.0, "phase": 60.0})
+    fit = fit_model(frame.observations, frame.whiteners, model.constants, [first], model.candidates())
+    (effect,), errors = fit.effects, fit.standard_errors
+    assert effect.shape["harmonic"] == 4.0 and "toothed.harmonic" not in errors
+    assert effect.amplitude == pytest.approx(0.2, abs=3.0 * errors["toothed.amplitude"])
+    assert effect.shape["phase"] == pytest.approx(30.0, abs=3.0 * errors["toothed.phase"])
+    assert errors["toothed.amplitude"] < 0.02
+    assert all("harmonic" in drawn[0].shape for _, drawn in fit.draws(np.random.default_rng(1), 3))
+
+
 def test_what_a_response_is_linear_in_starts_near_its_best_value_whatever_its_unit():
     mixture = EffectValue("mixture", 5.0, {"share": 1.0})
     frame = ready(8, effects=(mixture,))
