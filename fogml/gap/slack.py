@@ -3,7 +3,7 @@
 No gyro follows a catalogue's equation to the last per cent. Without room for that, the rest of a
 large effect would be given another effect's name. The room is made of the response times powers of
 temperature and time, of the response later or earlier, with other thermal orders, and of the
-candidate's other shapes.
+candidate's other shapes, of a line those of nearly its frequency.
 """
 
 from __future__ import annotations
@@ -21,12 +21,15 @@ from fogml.twin.memory import Memory
 
 if TYPE_CHECKING:
     from fogml.gap.basis import Basis
+    from fogml.gap.candidate_columns import NodeColumns
 
 LAGS_S = (60.0, 300.0, 1200.0)
 EARLY_S = 30.0
 """A response that smoothed readings make late may truly be earlier by so much [s]."""
 MOST_COLUMNS = 8
 MOST_DRAWS = 4
+NEAR_CYCLES = 2.0
+"""Lines further apart, in cycles over the longest run, are other lines, not another form of one."""
 
 
 def slack_columns(basis: Basis, node: int) -> FloatArray:
@@ -45,13 +48,22 @@ def slack_columns(basis: Basis, node: int) -> FloatArray:
         np.column_stack([*part, *[np.zeros(len(o))] * (most - len(part))])
         for o, part in zip(frame.observations, parts)
     ]
-    others = [n.columns for n in basis.nodes if n.candidate == chosen.candidate and n is not chosen]
+    others = [
+        n.columns
+        for n in basis.nodes
+        if n.candidate == chosen.candidate and n is not chosen and _near(n, chosen, frame.spans["s"])
+    ]
     neighbours = basis.rows[:, [c for columns in others for c in columns]]
     columns = np.concatenate([frame.white(stacked), neighbours], axis=1)
     own = basis.rows[:, list(chosen.columns)]
     columns = columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0]
     axes = main_axes(frame.beside(columns), 1e-2)[:, :MOST_COLUMNS]
     return np.asarray(columns @ axes)
+
+
+def _near(other: NodeColumns, node: NodeColumns, span_s: float) -> bool:
+    a, b = other.node.frequency_hz, node.node.frequency_hz
+    return a is None or b is None or abs(a - b) * span_s <= NEAR_CYCLES
 
 
 def _other_orders(
