@@ -24,7 +24,7 @@ from fogml.gap.search import Search
 from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 
 SHAPE_ROOM = 0.02
-"""Share of its range by which a shape parameter may miss it."""
+"""Share of its range by which a shape parameter may miss it, where its standard error is no larger."""
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
 
@@ -49,7 +49,7 @@ def realised(
         The named effects, fitted on the replay.
     """
     ranking, lost, fit = _best_heads(p, candidates, search, ranking, fit)
-    outside = {e.id: shapes_outside(candidates[e.id], e.shape) for e in fit.effects}
+    outside = {e.id: shapes_outside(candidates[e.id], e.shape, fit.standard_errors) for e in fit.effects}
     effects, known = [], 1.0 - ranking.unknown
     for r in ranking.effects:
         id = r.chosen.candidate
@@ -66,12 +66,18 @@ def realised(
     return replace(ranking, effects=tuple(effects), unknown=1.0 - known)
 
 
-def shapes_outside(candidate: Candidate, shape: Mapping[str, float]) -> int:
-    """How many shape parameters lie outside of their usual ranges, of any grade; directions never do."""
+def shapes_outside(
+    candidate: Candidate, shape: Mapping[str, float], standard_errors: Mapping[str, float]
+) -> int:
+    """How many shape parameters lie outside of their usual ranges, of any grade; directions never do.
+
+    By more than a standard error: of one that the runs hardly tell chance decides on which side it lies.
+    """
     count = 0
     for quantity in candidate.shape:
         low, high = quantity.of_any_grade
-        room = SHAPE_ROOM * (high - low)
+        error = standard_errors.get(f"{candidate.id}.{quantity.name}", 0.0)
+        room = max(SHAPE_ROOM * (high - low), error)
         value = shape.get(quantity.name, low)
         count += not is_angle(quantity) and not low - room <= value <= high + room
     return count

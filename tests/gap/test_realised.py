@@ -145,13 +145,20 @@ def test_a_shape_outside_of_its_usual_range_makes_a_name_less_probable():
     far = replace(fit, effects=(replace(effect, shape={"share": 1.5}),))
     (usual,), (outside,) = (realised(p, candidates, search, ranking, f).effects for f in (fit, far))
     assert (usual.support.outside, outside.support.outside) == (0, 1)
-    assert shapes_outside(candidates["mixture"], {"share": 1.015}) == 0
+    assert shapes_outside(candidates["mixture"], {"share": 1.015}, {}) == 0
     assert outside.probability < usual.probability
 
 
+@pytest.mark.parametrize(("error", "count"), [(0.0, 1), (0.1, 1), (0.25, 0)])
+def test_a_shape_that_chance_may_have_put_outside_of_its_range_is_not_outside(error, count):
+    for share in (1.2, -0.2):
+        errors = {"mixture.share": error, "cube.share": 9.0}
+        assert shapes_outside(KINDS["mixture"], {"share": share}, errors) == count
+
+
 def test_directions_have_no_usual_range():
-    assert shapes_outside(KINDS["line"], {"period": 900.0, "phase": 500.0}) == 0
-    assert shapes_outside(KINDS["line"], {"period": 9000.0, "phase": 70.0}) == 1
+    assert shapes_outside(KINDS["line"], {"period": 900.0, "phase": 500.0}, {}) == 0
+    assert shapes_outside(KINDS["line"], {"period": 9000.0, "phase": 70.0}, {}) == 1
 
 
 def test_what_was_found_beside_a_lost_name_is_no_more_certain_than_without_it():
