@@ -14,7 +14,18 @@ from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, plausible_lengths
 from fogml.gap.screening import Screening
 from fogml.gap.shapes import AT_AMPLITUDE, Node, finer, grid
 from fogml.twin.quantities import Quantity
-from tests.gap.small_model import KINDS, MEANS, OnRun, SmallModel, framed, noise_of, ramps, recorded
+from tests.gap.small_model import (
+    KINDS,
+    MEANS,
+    SIZE,
+    Kind,
+    OnRun,
+    SmallModel,
+    framed,
+    noise_of,
+    ramps,
+    recorded,
+)
 
 MODEL = SmallModel()
 RUN = ramps("a", count=400, step=20.0)
@@ -42,6 +53,24 @@ def test_any_shape_within_its_range_is_near_a_node():
     for _ in range(40):
         off = {"centre_temperature": rng.uniform(10.0, 30.0), "width": rng.uniform(3.0, 12.0)}
         assert max(cosine(response(off), node) for node in nodes) > 0.97
+
+
+def test_a_narrow_range_has_soft_ends():
+    """A rule of thumb does not end at a sharp value; what no unit can have does."""
+    time = np.arange(0.0, 2e4, 20.0)
+
+    def reached(low, high, lowest):
+        tau = Quantity("time_constant", "s", (low, high), (low, high), limits=(lowest, 1e6))
+        nodes = grid(
+            Kind("tail", SIZE, (tau,)), "tactical", lambda s: np.exp(-time / s["time_constant"]), SPANS
+        )
+        values = np.sort([n.shape["time_constant"] for n in nodes])
+        return values[0], values[-1], np.diff(values).max()
+
+    assert reached(1200.0, 3600.0, 1.0)[:2] == pytest.approx((1200.0 / 1.3, 3600.0 * 1.3))
+    assert reached(1200.0, 3600.0, 1.0)[2] < 400.0
+    assert reached(1200.0, 3600.0, 1100.0)[:2] == pytest.approx((1100.0, 4680.0))
+    assert reached(1200.0, 36000.0, 1.0)[:2] == pytest.approx((1200.0, 36000.0))
 
 
 def test_a_line_of_any_period_and_phase_is_near_a_node():
