@@ -23,8 +23,8 @@ from fogml.gap.preparing import Prepared
 from fogml.gap.search import Search
 from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 
-SHAPE_ROOM = 0.02
-"""Share of its range by which a shape parameter may miss it, where its standard error is no larger."""
+SHAPE_ROOM, LARGEST_ROOM = 0.02, 0.1
+"""Shares of its range that a shape parameter may miss it by: whatever its standard error is, and within it."""
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
 
@@ -71,13 +71,13 @@ def shapes_outside(
 ) -> int:
     """How many shape parameters lie outside of their usual ranges, of any grade; directions never do.
 
-    By more than a standard error: of one that the runs hardly tell chance decides on which side it lies.
+    Near an end chance decides on which side one lies that the runs hardly tell.
     """
     count = 0
     for quantity in candidate.shape:
         low, high = quantity.of_any_grade
         error = standard_errors.get(f"{candidate.id}.{quantity.name}", 0.0)
-        room = max(SHAPE_ROOM * (high - low), error)
+        room = (high - low) * min(max(SHAPE_ROOM, error / (high - low)), LARGEST_ROOM)
         value = shape.get(quantity.name, low)
         count += not is_angle(quantity) and not low - room <= value <= high + room
     return count

@@ -29,7 +29,8 @@ FINER_LINE, FINER = 5, {1: 3, 2: 3, 3: 2}
 WHOLE = ("harmonic",)
 """Parameters that are whole numbers."""
 NARROW, BEYOND = 3.0, 1.3
-"""A usual range of no more than the first factor is a rule of thumb: a grid goes beyond it by the second."""
+"""A usual range of no more than the first factor is a rule of thumb: the grid of a candidate that hangs on it
+alone goes beyond it by the second."""
 MOST_LINES = 6000
 AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
@@ -234,7 +235,7 @@ def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]
         return [float(x) for x in np.arange(low, high + 1e-9, PLACE_DEGC)]
     if low > 0.0 and high / low > NARROW:
         return [float(x) for x in np.geomspace(low, high, count)]
-    if low > 0.0:
+    if low > 0.0 and count == NODES[1]:
         lowest, highest = quantity.limits
         low, high, count = max(low / BEYOND, lowest), min(high * BEYOND, highest), count + 2
     return [float(x) for x in np.linspace(low, high, count)]
