@@ -24,7 +24,7 @@ from fogml.gap.search import Search
 from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 
 SHAPE_ROOM, LARGEST_ROOM = 0.02, 0.1
-"""Shares of its range that a shape parameter may miss it by: whatever its standard error is, and within it."""
+"""Shares of its range that a shape parameter may miss it by: whatever its standard error, and within that."""
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
 
