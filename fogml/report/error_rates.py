@@ -6,7 +6,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -67,12 +68,8 @@ def error_sentences(found: Diagnosis) -> list[str]:
             f"Where one effect of the catalogue acted, {_STRONG}, the right one or its class came first in "
             f"{_of(figures['one_top'])}.",
         ]
-    for band in reversed(rates["named"]):
-        if any(_inside(band, finding.probability) for finding in found.named):
-            told.append(
-                f"Of {plural(band['n'], 'name')} given with {100 * band['from']:.0f} to "
-                f"{100 * band['to']:.0f} %, {percent(band['value'])} were right {_interval(band)}."
-            )
+    given = sorted({_tenth(finding.probability) for finding in found.named}, reverse=True)
+    told.extend(_band_sentence(tenth, rates["named"]) for tenth in given)
     told.append(
         f"Where nothing but something outside the candidates acted, {_STRONG}, a candidate was named all the "
         f"same in {_of(figures['unknown_wrong_name'])}."
@@ -80,8 +77,21 @@ def error_sentences(found: Diagnosis) -> list[str]:
     return told
 
 
-def _inside(band: Mapping[str, Any], probability: float) -> bool:
-    return bool(band["from"] <= probability < band["to"] or probability == band["to"] == 1.0)
+def _tenth(probability: float) -> int:
+    """The band of a probability, as the score's: 8 from 0.8 on, 9 from 0.9 up to 1."""
+    return min(math.floor(10.0 * probability), 9)
+
+
+def _band_sentence(tenth: int, bands: Sequence[Mapping[str, Any]]) -> str:
+    """How often names with such a probability were right, if any was given."""
+    edges = f"given with {10 * tenth} to {10 * tenth + 10} %"
+    for band in bands:
+        if _tenth(band["from"]) == tenth:
+            return (
+                f"Of {plural(band['n'], 'name')} {edges}, {percent(band['value'])} were right "
+                f"{_interval(band)}."
+            )
+    return f"No name was {edges} there: how often such a name is right is not known."
 
 
 @cache

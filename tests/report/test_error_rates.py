@@ -57,3 +57,14 @@ def test_each_name_is_told_in_its_own_band_once(probabilities: tuple[float, ...]
     told = [s for s in error_sentences(diagnosis("explained", named)) if " given with " in s]
     assert len(told) == len(bands)
     assert all(band in sentence for band, sentence in zip(bands, told))
+
+
+def test_a_band_that_no_name_fell_into_is_said_to_be_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    held = [band for band in RATES["named"] if band["from"] >= 0.9]
+    monkeypatch.setattr("fogml.report.error_rates._held", lambda: {**RATES, "named": held})
+    named = (hysteresis(probability=0.95), hysteresis(probability=0.65))
+    told = [s for s in error_sentences(diagnosis("explained", named)) if " given with " in s]
+    assert told[0].startswith(f"Of {held[0]['n']} names given with 90 to 100 %")
+    assert told[1:] == [
+        "No name was given with 60 to 70 % there: how often such a name is right is not known."
+    ]
