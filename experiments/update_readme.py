@@ -13,6 +13,7 @@ SECTIONS = {
     "thermal-cycle-stability": ("thermal_cycle/results.md", "## Bias stability"),
     "thermal-cycle-both": ("thermal_cycle/results.md", "and `up`, judged on `last down`"),
     "known-floor": ("known_floor/results.md", "# Residual over a known floor"),
+    "gap-blind": ("gap_blind/results.md", "# The diagnosis on withheld effects"),
     "default-rates": ("default_rates/results.md", "# The default at other ramp rates"),
 }
 

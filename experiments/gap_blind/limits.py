@@ -2,8 +2,7 @@
 
 For each effect that acts, ``gain`` is what its true form adds to the evidence of the runs beside the true
 forms of whatever else acts, its amplitude alone unknown, beside the nominal constants and the errors of
-ordinary sensors with their priors [nats]. Nobody who has to find an effect among 36 of unknown shape can
-name it from much under 8: a choice of 36 costs 4, its size and shape about as much.
+ordinary sensors with their priors [nats].
 
 For each wrong name, and each effect that was missed, the distance between what truly acts and what was
 answered is ``||r||^2 / 2`` nats: r is what the answered effects, at the shapes stated and the best
@@ -20,16 +19,25 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from experiments.gap_blind.per_case import measure_cases, true_frame, write_page
+from experiments.gap_blind.reach import (
+    SHOWN_NATS,
+    STRONG,
+    UNKNOWNS,
+    Figure,
+    Row,
+    false_names,
+    open_set_reach,
+    shown,
+    wrongly_named,
+)
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness, relatives_of
 from fogml.gap.blind.scoring.answers import read_answer
 from fogml.gap.blind.scoring.marks import mark
-from fogml.gap.blind.scoring.statistics import open_set
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.twin_model import TwinModel
@@ -41,34 +49,25 @@ TELLING_NATS = 3.0
 SURE_NATS = 10.0
 GAIN_EDGES = (-np.inf, 4.0, 8.0, 12.0, 16.0, 24.0, 40.0, 80.0, np.inf)
 KINDS = ("one", "two", "three", "unknown_and_known")
-STRONG = 10.0
-SHOWN_NATS = 8.0
-UNKNOWNS = ("unknown_left_out", "unknown_invented")
-OPEN = (*UNKNOWNS, "unknown_and_known")
-STRONG_OUTSIDE = ("one", *UNKNOWNS)
-"""Kinds whose cases outside the mix are strong ones alone; see `config.yaml`."""
 FIGURES = (
-    ("one effect, d′ over 10: class exact", ("one",), True, STRONG, True),
-    ("one effect, any d′: class exact", ("one",), True, 0.0, True),
-    ("two effects: class exact", ("two",), True, 0.0, True),
-    ("three effects: class exact", ("three",), True, 0.0, True),
-    ("unknown and known: known kept", ("unknown_and_known",), True, 0.0, False),
-    ("unknown, d′ over 10: said to be unknown", UNKNOWNS, False, STRONG, False),
-    ("unknown, any d′: said to be unknown", UNKNOWNS, False, 0.0, False),
+    Figure("one effect, d′ over 10: class exact", ("one",), STRONG),
+    Figure("one effect, any d′: class exact", ("one",), 0.0),
+    Figure("two effects: class exact", ("two",), 0.0),
+    Figure("three effects: class exact", ("three",), 0.0),
+    Figure("unknown and known: known kept", ("unknown_and_known",), 0.0, alone=False),
+    Figure("unknown, d′ over 10: said to be unknown", UNKNOWNS, STRONG, known=False, alone=False),
+    Figure("unknown, any d′: said to be unknown", UNKNOWNS, 0.0, known=False, alone=False),
 )
-"""Words, kinds, whether known effects count or unknown ones, least d′, whether a wrong name spoils it."""
 WRONG_NAMES = (
-    ("one effect, d′ over 10", ("one",), STRONG),
-    ("one effect, any d′", ("one",), 0.0),
-    ("two effects", ("two",), 0.0),
-    ("three effects", ("three",), 0.0),
-    ("unknown, d′ over 10", UNKNOWNS, STRONG),
-    ("unknown, any d′", UNKNOWNS, 0.0),
-    ("unknown and known", ("unknown_and_known",), 0.0),
+    Figure("one effect, d′ over 10", ("one",), STRONG),
+    Figure("one effect, any d′", ("one",), 0.0),
+    Figure("two effects", ("two",), 0.0),
+    Figure("three effects", ("three",), 0.0),
+    Figure("unknown, d′ over 10", UNKNOWNS, STRONG),
+    Figure("unknown, any d′", UNKNOWNS, 0.0),
+    Figure("unknown and known", ("unknown_and_known",), 0.0),
 )
-"""Words, kinds, least d′."""
 GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
-Row = dict[str, Any]
 
 
 def main() -> None:
@@ -182,7 +181,7 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
         "",
         "| figure | cases | the data show | the answer has |",
         "|---|---:|---:|---:|",
-        *(_within_reach(everything, *figure) for figure in FIGURES),
+        *(_within_reach(everything, figure) for figure in FIGURES),
         "",
         "## Wrong names that the data could have told",
         "",
@@ -191,7 +190,7 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
         "",
         "| figure | cases | a wrong name | that the data tell |",
         "|---|---:|---:|---:|",
-        *(_wrong_names(everything, wrong, *figure) for figure in WRONG_NAMES),
+        *(_wrong_names(everything, wrong, figure) for figure in WRONG_NAMES),
         "",
         _false_names(effects, wrong, {row["case"] for row in asked if row["mix"]}),
         "",
@@ -234,70 +233,42 @@ def _share(rows: Sequence[Row]) -> str:
     return f"{np.mean([row['named'] for row in rows]):.2f} of {len(rows)}" if rows else "–"
 
 
-def _within_reach(
-    effects: Sequence[Row], words: str, kinds: Sequence[str], known: bool, above: float, alone: bool
-) -> str:
-    """A line of the table: what the data show of a figure's cases, and what was answered."""
-    counted = list(_cases([row for row in effects if row["known"] == known], kinds, above).values())
-    if not counted:
-        return f"| {words} | 0 | – | – |"
-    shown = np.mean([all(row["gain"] >= SHOWN_NATS for row in rows) for rows in counted])
-    has = np.mean([all(r["named"] and not (alone and r["wrong_beside"]) for r in rows) for rows in counted])
-    return f"| {words} | {len(counted)} | {shown:.2f} | {has:.2f} |"
+def _within_reach(effects: Sequence[Row], figure: Figure) -> str:
+    found = shown(effects, figure)
+    if found is None:
+        return f"| {figure.words} | 0 | – | – |"
+    return f"| {figure.words} | {found.cases} | {found.allowed:.2f} | {found.reached:.2f} |"
 
 
-def _wrong_names(
-    effects: Sequence[Row], wrong: Sequence[Row], words: str, kinds: Sequence[str], above: float
-) -> str:
-    """A line of the table: how many cases have a wrong name, and one that is far from the truth."""
-    counted = _cases(effects, kinds, above)
-    if not counted:
-        return f"| {words} | 0 | – | – |"
-    nats = [row["nats"] for row in wrong if row["wrong"] and row["case"] in counted]
-    far = sum(value >= SHOWN_NATS for value in nats)
-    return f"| {words} | {len(counted)} | {len(nats) / len(counted):.2f} | {far / len(counted):.2f} |"
+def _wrong_names(effects: Sequence[Row], wrong: Sequence[Row], figure: Figure) -> str:
+    found = wrongly_named(effects, wrong, figure)
+    if found is None:
+        return f"| {figure.words} | 0 | – | – |"
+    told = found.reached - found.allowed
+    return f"| {figure.words} | {found.cases} | {found.reached:.2f} | {told:.2f} |"
 
 
 def _false_names(known: Sequence[Row], wrong: Sequence[Row], mix: set[str]) -> str:
-    """How many of the mix's names are false, and how many of those stand far from the truth."""
-    right = sum(row["named"] for row in known if row["case"] in mix)
-    false = [(len(row["wrong"]), row["nats"]) for row in wrong if row["case"] in mix]
-    all_, far = (sum(n for n, nats in false if nats >= least) for least in (-np.inf, SHOWN_NATS))
-    names = max(right + all_, 1)
+    found = false_names(known, wrong, mix)
+    false = round(found.cases * found.reached)
+    told = found.reached - found.allowed
     return (
-        f"In the mix, where something acts, {right} effects are named that do act and {all_} that don't, "
-        f"{all_ / names:.1%} of both; {far} of these, {far / names:.1%}, where the data tell."
+        f"In the mix, where something acts, {found.cases - false} effects are named that do act and {false} "
+        f"that don't, {found.reached:.1%} of both; {round(found.cases * told)} of these, {told:.1%}, where "
+        "the data tell."
     )
 
 
 def _open_set(effects: Sequence[Row], asked: Sequence[Row], above: float) -> str:
-    """A line of the table: unknowns over a d' against every case without one."""
-    asked = [r for r in asked if r["mix"]]
-    open_ = [r for r in effects if r["mix"] and not r["known"] and r["kind"] in OPEN]
-    unknown = {r["case"]: r for r in open_ if r["d_prime"] > above}
-    without = [r for r in asked if r["kind"] not in (*OPEN, "wrong_thermal")]
-    if not unknown or not without:
-        return f"| d′ over {above:g} | 0 | – | – | – | – | – |"
-    scores = [r["unknown"] for r in asked if r["case"] in unknown] + [r["unknown"] for r in without]
-    found = open_set(scores, [True] * len(unknown) + [False] * len(without))
-    hidden = float(np.mean([row["gain"] < SHOWN_NATS for row in unknown.values()]))
+    found = open_set_reach(effects, asked, above)
     words = f"d′ over {above:g}" if above else "any d′"
-    reach = (
-        f"{1.0 - 0.5 * hidden:.3f} | {found.auroc.value:.3f} | {max(0.0, 1.0 - 0.05 / max(hidden, 0.05)):.2f}"
+    if found is None:
+        return f"| {words} | 0 | – | – | – | – | – |"
+    (area, over), (auroc, fpr95) = found.allowed, found.reached
+    return (
+        f"| {words} | {found.unknowns} | {found.hidden:.2f} | {area:.3f} | {auroc:.3f} | {over:.2f} | "
+        f"{fpr95:.2f} |"
     )
-    return f"| {words} | {len(unknown)} | {hidden:.2f} | {reach} | {found.fpr95.value:.2f} |"
-
-
-def _cases(effects: Sequence[Row], kinds: Sequence[str], above: float) -> dict[str, list[Row]]:
-    """Effects by case, of cases of these kinds whose weakest effect has a d' above a limit.
-
-    Of any d' are cases of the mix, where those outside it are strong ones.
-    """
-    held: dict[str, list[Row]] = {}
-    for row in effects:
-        if row["kind"] in kinds and (above or row["mix"] or row["kind"] not in STRONG_OUTSIDE):
-            held.setdefault(row["case"], []).append(row)
-    return {case: rows for case, rows in held.items() if min(row["d_prime"] for row in rows) > above}
 
 
 if __name__ == "__main__":

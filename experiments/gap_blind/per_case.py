@@ -49,7 +49,7 @@ def measure_cases(
     found = list(Parallel(n_jobs=given.workers)(delayed(measured)(folder, case) for case in names))
     seed = read_truth(folder.truth / f"{names[0]}.json").seed
     _keep(name, folder.path.resolve().name, {"seed": seed, "cases": found})
-    return _of_seed(name, seed)
+    return of_seed(name, seed)
 
 
 def _keep(name: str, part: str, content: Any) -> None:
@@ -57,7 +57,8 @@ def _keep(name: str, part: str, content: Any) -> None:
         partial.write_text(json.dumps(content, separators=(",", ":")) + "\n", encoding="utf-8")
 
 
-def _of_seed(name: str, seed: int) -> list[Any]:
+def of_seed(name: str, seed: int) -> list[Any]:
+    """What was measured of every part of a seed."""
     parts = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(HERE.glob(f"{name}-*.json"))]
     return [case for part in parts if part["seed"] == seed for case in part["cases"]]
 
