@@ -14,6 +14,10 @@ from fogml.runs.run import FloatArray
 
 MOST_LINES_TRIED = 28
 _FINER = 4
+# Of a Gram matrix's trace: beside what is held; and before, of which round-off alone may be left.
+_RIDGE = 1e-6
+_ROUND_OFF = 1e-10
+_NOTHING = 1e-36
 
 
 class Screening:
@@ -72,7 +76,8 @@ class Screening:
         for i, (places, inverse) in enumerate(self._sets):
             held = cross[places]
             grams = own - _products(held, inverse @ held, width)
-            least = 1e-6 * np.maximum(np.trace(grams, axis1=1, axis2=2), 1e-30)
+            before, beside = (np.trace(part, axis1=1, axis2=2) for part in (own, grams))
+            least = np.maximum.reduce([_RIDGE * beside, _ROUND_OFF * before, np.full(count, _NOTHING)])
             grams += least[:, None, None] * np.eye(width)
             fit = fits[i].reshape(count, width)
             gains[i] = 0.5 * np.einsum("ni,ni->n", fit, np.linalg.solve(grams, fit[:, :, None])[:, :, 0])

@@ -120,6 +120,25 @@ def with_line(period):
     return framed([made], MODEL)
 
 
+@pytest.mark.parametrize("size", [1.0, 3.0, 7.0, 11.0, 300.0])
+def test_what_is_a_constant_but_for_round_off_gains_nothing(size):
+    """Of a node inside the constants only round-off is left, which may be singular or below zero."""
+    time = np.arange(400.0)
+    line = np.sin(time / 7.0)[:, None]
+    constant = np.random.default_rng(0).normal(size=(400, 1))
+    frame = SimpleNamespace(
+        runs=[slice(0, 400)],
+        observations=[SimpleNamespace(row_s=20.0)],
+        residual=line,
+        fixed=1e8 * constant,
+    )
+    same = size * constant
+    columns = np.concatenate([same, same, line, np.cos(time / 7.0)[:, None]], axis=1)
+    inside, real = Screening(frame, []).gains(columns, [0, 2])[0]
+    assert real == pytest.approx(0.5 * np.sum(line**2), rel=0.02)
+    assert abs(inside) < 1e-6 * real
+
+
 @pytest.mark.parametrize("period", [263.0, 771.0, 1900.0])
 def test_the_true_line_is_kept_of_many(period):
     frame = with_line(period)
