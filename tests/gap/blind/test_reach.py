@@ -86,7 +86,7 @@ def test_each_figure_has_its_distance_and_its_best_baseline() -> None:
     for held, shift in ((rival, 0.125), (worse, 0.25)):
         for row in held["rows"]:
             row["value"] = 0.5 - shift if row["wanted"]["low"] is not None else 0.5 + shift
-    values["methods"] |= {"worse": worse, "rival": rival, "abstain": diagnosis}
+    values["methods"] = {"diagnosis": diagnosis, "worse": worse, "rival": rival, "abstain": diagnosis}
     page = results._page(values, per_case.of_seed("limits", values["seed"]))
     rows = {r["words"]: r for r in diagnosis["rows"]}
     told = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
