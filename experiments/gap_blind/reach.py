@@ -15,6 +15,8 @@ import numpy as np
 from fogml.gap.blind.scoring.statistics import open_set
 
 SHOWN_NATS = 8.0
+MISSED_FORMS = 0.05
+"""Share of right effects that may be missed for their form."""
 STRONG = 10.0
 """Least d' of the figures on strong effects."""
 UNKNOWNS = ("unknown_left_out", "unknown_invented")
@@ -67,14 +69,24 @@ def shown(effects: Sequence[Row], figure: Figure) -> Share | None:
     return Share(len(counted), float(allowed), float(np.mean(has)))
 
 
-def wrongly_named(effects: Sequence[Row], wrong: Sequence[Row], figure: Figure) -> Share | None:
+def wrongly_named(
+    effects: Sequence[Row], wrong: Sequence[Row], figure: Figure, near_nats: float = SHOWN_NATS
+) -> Share | None:
     """Cases with a wrong name that the truth is near to, which nobody can tell; with any wrong name."""
     counted = _cases(effects, figure)
     if not counted:
         return None
     nats = np.array([row["nats"] for row in wrong if row["wrong"] and row["case"] in counted])
     n = len(counted)
-    return Share(n, int(np.sum(nats < SHOWN_NATS)) / n, len(nats) / n)
+    return Share(n, int(np.sum(nats < near_nats)) / n, len(nats) / n)
+
+
+def left_by_right_forms(forms: Sequence[Row]) -> float:
+    """What the catalogue's form of an effect leaves of it at most, but for `MISSED_FORMS` of them [nats].
+
+    Who doesn't know the true forms has to bear with so much, or else misses more of the effects.
+    """
+    return float(np.quantile([row["lost_nats"] for row in forms], 1.0 - MISSED_FORMS))
 
 
 def false_names(known: Sequence[Row], wrong: Sequence[Row], mix: set[str]) -> Share:

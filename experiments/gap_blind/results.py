@@ -1,7 +1,7 @@
 """Every wanted figure of the final seed in one table: reached, allowed by the data, reached by baselines.
 
 ``python -m experiments.gap_blind.results`` writes ``results.md`` from ``score.json`` and what
-``limits.py`` measured of the same seed.
+``limits.py`` and ``forms.py`` measured of the same seed.
 """
 
 from __future__ import annotations
@@ -12,11 +12,13 @@ from typing import Any
 
 from experiments.gap_blind.per_case import HERE, of_seed, write_page
 from experiments.gap_blind.reach import (
+    MISSED_FORMS,
     SHOWN_NATS,
     STRONG,
     UNKNOWNS,
     Figure,
     false_names,
+    left_by_right_forms,
     open_set_reach,
     shown,
     wrongly_named,
@@ -28,14 +30,15 @@ DIAGNOSIS, ORACLE = "diagnosis", "oracle"
 NO_RIVALS = (DIAGNOSIS, ORACLE, "abstain", "gp-discrepancy")
 """Methods that are no rival in naming: what is judged, what knows the truth, and what names nothing."""
 BY_ORACLE = ("closed_ratio", "overlap")
-ONE = Figure("", ("one",), STRONG)
+ONE, UNKNOWN = Figure("", ("one",), STRONG), Figure("", UNKNOWNS, STRONG)
 Row = Mapping[str, Any]
 
 
 def main() -> None:
     """Write the table of the seed whose score is kept."""
     values = json.loads((HERE / "score.json").read_text(encoding="utf-8"))
-    write_page("results", _page(values, of_seed("limits", values["seed"])))
+    limits, forms = (of_seed(name, values["seed"]) for name in ("limits", "forms"))
+    write_page("results", _page(values, limits, [row for case in forms for row in case]))
 
 
 def allowed(cases: Sequence[Row]) -> dict[str, float]:
@@ -46,8 +49,7 @@ def allowed(cases: Sequence[Row]) -> dict[str, float]:
     cases
         What ``limits.py`` measured.
     """
-    effects = [row | {"mix": case["asked"]["mix"]} for case in cases for row in case["effects"]]
-    wrong = [case["wrong"] for case in cases if case["wrong"] is not None]
+    effects, wrong = _effects_and_wrong(cases)
     asked = [case["asked"] for case in cases]
     known = [row for row in effects if row["known"]]
     both = Figure("", ("unknown_and_known",), 0.0, alone=False)
@@ -56,7 +58,7 @@ def allowed(cases: Sequence[Row]) -> dict[str, float]:
         "one_exact": shown(effects, ONE),
         "two_exact": shown(effects, Figure("", ("two",), 0.0)),
         "mixed_known_kept": shown(effects, both),
-        "unknown_wrong_name": wrongly_named(effects, wrong, Figure("", UNKNOWNS, STRONG)),
+        "unknown_wrong_name": wrongly_named(effects, wrong, UNKNOWN),
         "mixed_false_name": wrongly_named(effects, wrong, both),
         "false_discovery": false_names(known, wrong, {row["case"] for row in asked if row["mix"]}),
     }
@@ -66,7 +68,12 @@ def allowed(cases: Sequence[Row]) -> dict[str, float]:
     return found
 
 
-def _page(values: Row, cases: Sequence[Row]) -> str:
+def _effects_and_wrong(cases: Sequence[Row]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    effects = [row | {"mix": case["asked"]["mix"]} for case in cases for row in case["effects"]]
+    return effects, [case["wrong"] for case in cases if case["wrong"] is not None]
+
+
+def _page(values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]]) -> str:
     tables = {m: {row["key"]: row for row in held["rows"]} for m, held in values["methods"].items()}
     within = allowed(cases)
     if ORACLE in tables:
@@ -88,8 +95,26 @@ def _page(values: Row, cases: Sequence[Row]) -> str:
         "best baseline |",
         "|---|---:|---:|---:|---|---:|---:|---:|",
         *(_line(row, within.get(row["key"]), rivals) for row in wanted),
+        "",
+        _forms_unknown(cases, forms),
     ]
     return "\n".join(lines) + "\n"
+
+
+def _forms_unknown(cases: Sequence[Row], forms: Sequence[dict[str, Any]]) -> str:
+    """What wrong names for an unknown come to for one who does not know the true forms either."""
+    left = left_by_right_forms(forms)
+    found = wrongly_named(*_effects_and_wrong(cases), UNKNOWN, left)
+    if found is None:
+        return ""
+    further = found.reached - found.allowed
+    return (
+        "The diagnosis does not know the true forms, and has to bear with what the right form of the "
+        f"catalogue leaves of an effect: more than {left:.0f} nats in {MISSED_FORMS:.0%} of "
+        f"{plural(len(forms), 'effect')} (`forms.md`). In {found.allowed:.1%} of the "
+        f"{plural(found.cases, 'case')} with an unknown of d′ > {STRONG:g} a wrong name is no further from "
+        f"the truth than that, in {further:.1%} it is."
+    )
 
 
 def _line(row: Row, within: float | None, rivals: Mapping[str, Mapping[str, Row]]) -> str:

@@ -42,7 +42,13 @@ def test_a_wrong_name_near_the_truth_is_one_that_nobody_can_tell() -> None:
         {"case": "elsewhere", "wrong": ["a"], "nats": 1.0},
     ]
     assert reach.wrongly_named(rows, wrong, TWO) == (10, 0.1, 0.2)
+    assert reach.wrongly_named(rows, wrong, TWO, near_nats=9.0) == (10, 0.2, 0.2)
     assert reach.false_names(rows, wrong, {row["case"] for row in rows}) == (13, 1 / 13, 3 / 13)
+
+
+def test_all_but_a_few_right_forms_leave_no_more() -> None:
+    forms = [{"lost_nats": float(nats)} for nats in range(1001)]
+    assert reach.left_by_right_forms(forms) == 1000.0 * (1.0 - reach.MISSED_FORMS)
 
 
 @pytest.mark.parametrize("hidden", [0, 10, 40])
@@ -87,7 +93,8 @@ def test_each_figure_has_its_distance_and_its_best_baseline() -> None:
         for row in held["rows"]:
             row["value"] = 0.5 - shift if row["wanted"]["low"] is not None else 0.5 + shift
     values["methods"] = {"diagnosis": diagnosis, "worse": worse, "rival": rival, "abstain": diagnosis}
-    page = results._page(values, per_case.of_seed("limits", values["seed"]))
+    limits, forms = (per_case.of_seed(name, values["seed"]) for name in ("limits", "forms"))
+    page = results._page(values, limits, [row for case in forms for row in case])
     rows = {r["words"]: r for r in diagnosis["rows"]}
     told = [line.strip("| ").split(" | ") for line in page.splitlines() if line.startswith("| ")][1:]
     assert len(told) == sum(
