@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
 from fogml.gap.model import Constant
 from fogml.gap.observation import Observation
@@ -89,9 +90,9 @@ class Frame:
         With the priors of constants and nuisances, or beside freely varying constants alone.
         """
         held = self.fixed[:, : len(self.constants)] if flat else self.fixed
-        cross = held.T @ columns
-        inverse = self._inverses[1 if flat else 0]
-        return np.asarray(columns.T @ columns - cross.T @ inverse @ cross)
+        # By the factor, not the inverse: what the constants leave of a column may be 1e-8 of it.
+        half = solve_triangular(self._factors[1 if flat else 0], held.T @ columns, lower=True)
+        return np.asarray(columns.T @ columns - half.T @ half)
 
     def without_constants(self, rows: FloatArray) -> FloatArray:
         """What the constants and nuisances, with their priors, leave of whitened rows, shape as given."""
@@ -99,11 +100,11 @@ class Frame:
         return np.asarray(rows - self.fixed @ np.linalg.solve(inner, self.fixed.T @ rows))
 
     @cached_property
-    def _inverses(self) -> tuple[FloatArray, FloatArray]:
+    def _factors(self) -> tuple[FloatArray, FloatArray]:
         gram = self.fixed.T @ self.fixed
-        own = np.linalg.inv(gram + np.eye(len(gram)))
         count = len(self.constants)
-        flat = np.linalg.inv(gram[:count, :count] + np.eye(count) / _FLAT)
+        own = np.linalg.cholesky(gram + np.eye(len(gram)))
+        flat = np.linalg.cholesky(gram[:count, :count] + np.eye(count) / _FLAT)
         return np.asarray(own, dtype=np.float64), np.asarray(flat, dtype=np.float64)
 
 

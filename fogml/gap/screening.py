@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import cho_solve, solve_triangular
 
 from fogml.gap.frame import Frame
 from fogml.gap.shapes import Node
@@ -49,9 +50,9 @@ class Screening:
         self._sets: list[tuple[NDArray[np.intp], FloatArray]] = []
         left = []
         for places in sets:
-            inverse = np.linalg.inv(gram[np.ix_(places, places)] + np.eye(len(places)))
-            self._sets.append((places, np.asarray(inverse, dtype=np.float64)))
-            left.append(residual[:, 0] - self._held[:, places] @ (inverse @ fit[places]))
+            factor = np.linalg.cholesky(gram[np.ix_(places, places)] + np.eye(len(places)))
+            self._sets.append((places, np.asarray(factor, dtype=np.float64)))
+            left.append(residual[:, 0] - self._held[:, places] @ cho_solve((factor, True), fit[places]))
         self._left = np.array(left)
 
     def gains(self, columns: FloatArray, starts: Sequence[int]) -> FloatArray:
@@ -73,9 +74,9 @@ class Screening:
         count = columns.shape[1] // width
         own = _products(columns, columns, width)
         gains = np.empty((len(self._sets), count))
-        for i, (places, inverse) in enumerate(self._sets):
-            held = cross[places]
-            grams = own - _products(held, inverse @ held, width)
+        for i, (places, factor) in enumerate(self._sets):
+            half = solve_triangular(factor, cross[places], lower=True, check_finite=False)
+            grams = own - _products(half, half, width)
             before, beside = (np.trace(part, axis1=1, axis2=2) for part in (own, grams))
             least = np.maximum.reduce([_RIDGE * beside, _ROUND_OFF * before, np.full(count, _NOTHING)])
             grams += least[:, None, None] * np.eye(width)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -50,6 +50,23 @@ def test_beside_the_constants_is_what_their_posterior_leaves(frame):
     # With flat priors it is what least squares leaves.
     left = columns - frame.fixed @ np.linalg.lstsq(frame.fixed, columns, rcond=None)[0]
     np.testing.assert_allclose(frame.beside(columns, flat=True), left.T @ left, atol=1e-4)
+
+
+def test_little_that_large_constants_leave_is_not_lost_in_round_off(frame):
+    # A scale factor's constants on a fast table are long and alike, and what they leave of a column short.
+    rng = np.random.default_rng(5)
+    rows = frame.runs[-1].stop
+    rate, warm = rng.standard_normal(rows), rng.standard_normal(rows)
+    fixed = np.column_stack([3e4 * rate, 3e4 * (rate + 1e-3 * warm), 40.0 * warm, 1e-2 * rng.random(rows)])
+    columns = 3e3 * np.outer(rate, [1.0, -0.5]) + 0.3 * rng.standard_normal((rows, 2))
+    large = replace(frame)
+    vars(large)["fixed"] = fixed
+    # What least squares with the constants' priors as rows more leaves, projected out twice.
+    basis, _ = np.linalg.qr(np.vstack([fixed, np.eye(4)]))
+    left = np.vstack([columns, np.zeros((4, 2))])
+    for _ in range(2):
+        left = left - basis @ (basis.T @ left)
+    np.testing.assert_allclose(large.beside(columns), left.T @ left, rtol=1e-5, atol=1e-5)
 
 
 def test_residuals_are_white_and_runs_follow_each_other(frame, runs):
