@@ -8,7 +8,7 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-from scipy.linalg import solve_triangular
+from scipy.linalg import cho_solve, solve_triangular
 
 from fogml.gap.model import Constant
 from fogml.gap.observation import Observation
@@ -90,22 +90,37 @@ class Frame:
         With the priors of constants and nuisances, or beside freely varying constants alone.
         """
         held = self.fixed[:, : len(self.constants)] if flat else self.fixed
-        # By the factor, not the inverse: what the constants leave of a column may be 1e-8 of it.
-        half = solve_triangular(self._factors[1 if flat else 0], held.T @ columns, lower=True)
-        return np.asarray(columns.T @ columns - half.T @ half)
+        return products_beside(columns, held, self._factors[1 if flat else 0])
 
     def without_constants(self, rows: FloatArray) -> FloatArray:
         """What the constants and nuisances, with their priors, leave of whitened rows, shape as given."""
-        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
-        return np.asarray(rows - self.fixed @ np.linalg.solve(inner, self.fixed.T @ rows))
+        return np.asarray(rows - self.fixed @ cho_solve((self._factors[0], True), self.fixed.T @ rows))
 
     @cached_property
     def _factors(self) -> tuple[FloatArray, FloatArray]:
-        gram = self.fixed.T @ self.fixed
-        count = len(self.constants)
-        own = np.linalg.cholesky(gram + np.eye(len(gram)))
-        flat = np.linalg.cholesky(gram[:count, :count] + np.eye(count) / _FLAT)
-        return np.asarray(own, dtype=np.float64), np.asarray(flat, dtype=np.float64)
+        free = self.fixed[:, : len(self.constants)]
+        return posterior_factor(self.fixed), posterior_factor(free, _FLAT)
+
+
+def posterior_factor(held: FloatArray, variance: float = 1.0) -> FloatArray:
+    """Lower Cholesky factor of the posterior precision of whitened columns' coefficients, shape (c, c).
+
+    Parameters
+    ----------
+    held
+        Shape (m, c).
+    variance
+        Prior variance of each coefficient.
+    """
+    precision = held.T @ held + np.eye(held.shape[1]) / variance
+    return np.asarray(np.linalg.cholesky(precision), dtype=np.float64)
+
+
+def products_beside(columns: FloatArray, held: FloatArray, factor: FloatArray) -> FloatArray:
+    """Inner products of whitened columns beside held ones of a `posterior_factor`, shape (k, k)."""
+    # By the factor, not the inverse: what is left of a column may be 1e-8 of it.
+    half = solve_triangular(factor, held.T @ columns, lower=True)
+    return np.asarray(columns.T @ columns - half.T @ half)
 
 
 def constant_rows(o: Observation, constants: Sequence[Constant]) -> FloatArray:

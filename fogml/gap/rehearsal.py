@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.gap.frame import constant_rows
+from fogml.gap.frame import constant_rows, posterior_factor, products_beside
 from fogml.gap.model import Candidate
 from fogml.gap.observation import observe
 from fogml.gap.programme_design import Design
@@ -131,9 +131,7 @@ class Rehearsed:
 
     def beside(self, columns: FloatArray) -> FloatArray:
         """Inner products of whitened columns beside the constants, their priors known, shape (k, k)."""
-        cross = self.fixed.T @ columns
-        inner = self.fixed.T @ self.fixed + np.eye(self.fixed.shape[1])
-        return np.asarray(columns.T @ columns - cross.T @ np.linalg.solve(inner, cross))
+        return products_beside(columns, self.fixed, posterior_factor(self.fixed))
 
 
 class Rehearsal(Rehearsed):
