@@ -1,9 +1,10 @@
 """Constants of `fogml.gap.confidence` from suites that the diagnosis has answered.
 
-``python -m experiments.gap_blind.calibrate DIR`` prints logistic constants of named effects over the
-features of their evidence, and of the unknown over its log odds and the number of names. Suites are those
-to develop on, and final ones that are spent: figures were taken from them, and ``config.yaml`` keeps
-another seed for the next ones.
+``python -m experiments.gap_blind.calibrate PATH ...`` prints logistic constants of named effects over the
+features of their evidence, and of the unknown over its log odds and the number of names. A path is a suite
+with its answers, or a file of marks as ``fogml blind score`` writes it, which holds all that is needed.
+Suites are those to develop on, and final ones that are spent: figures were taken from them, and
+``config.yaml`` keeps another seed for the next ones.
 
 Probabilities are to hold in the mix. Cases drawn by their kind or strength beside it tell how evidence
 grows, but not how often there is an effect or an unknown at all: ``--beside`` lets them weigh less.
@@ -12,8 +13,7 @@ grows, but not how often there is an effect or an unknown at all: ``--beside`` l
 from __future__ import annotations
 
 import argparse
-import json
-from dataclasses import fields
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -22,10 +22,12 @@ from sklearn.linear_model import LogisticRegression
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.gap.blind.scoring.answers import read_answer
+from fogml.gap.blind.scoring.marks import Mark, mark
+from fogml.gap.blind.scoring.marks_file import read_marks
 from fogml.gap.blind.seeds import is_final, uses
-from fogml.gap.blind.truth import Truth
-from fogml.gap.confidence import Support, unknown_features
-from fogml.gap.result import NAMED
+from fogml.gap.blind.truth import read_truth
+from fogml.gap.confidence import unknown_features
 
 HERE = Path(__file__).parent
 Row = tuple[tuple[float, ...], bool, float]
@@ -35,28 +37,39 @@ Row = tuple[tuple[float, ...], bool, float]
 def main() -> None:
     """Read answers and truths, fit, print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("directory", nargs="+", help="answered development suites, or spent final ones")
+    parser.add_argument("path", nargs="+", type=Path, help="answered suites, or files of their marks")
     parser.add_argument("--answers", default=DIAGNOSIS, help="name of the answers")
     parser.add_argument("--beside", type=float, default=1.0, help="weight of cases beside the mix, from 0")
     args = parser.parse_args()
     named: list[Row] = []
     unknown: list[Row] = []
-    for directory in args.directory:
-        folder = BlindFolder(Path(directory))
-        answers = sorted(folder.answers(args.answers).glob("*/gap.json"))
-        if not answers:
-            raise SystemExit(f"{directory}: no answers; run the diagnosis first: fogml blind run {directory}")
-        for path in answers:
-            truth = Truth.model_validate_json((folder.truth / f"{path.parent.name}.json").read_text())
-            if not may_be_learned_from(truth.seed):
-                raise InputError(f"{directory}: made from a seed that is kept for final figures")
-            weight = 1.0 if truth.mix else args.beside
-            try:
-                _read(json.loads(path.read_text()), truth, weight, named, unknown)
-            except KeyError as error:
-                raise InputError(f"{path}: an older diagnosis's, without {error}; answer it again") from error
+    for path in args.path:
+        for one in marks_of(path, args.answers):
+            if not may_be_learned_from(one.truth.seed):
+                raise InputError(f"{path}: made from a seed that is kept for final figures")
+            _add(path, one, 1.0 if one.truth.mix else args.beside, named, unknown)
     for name, rows in (("NAMED", named), ("UNKNOWN", unknown)):
         print(f"{name} = ({', '.join(f'{c:.2f}' for c in _fitted(rows))})   from {len(rows)} findings")
+
+
+def marks_of(path: Path, answers: str) -> Iterable[Mark]:
+    """The marks of a suite's answers, or of a file; relatives are known to a file alone.
+
+    Raises
+    ------
+    InputError
+        If there are none.
+    """
+    if path.is_file():
+        found = read_marks(path).methods.get(answers)
+        if not found:
+            raise InputError(f"{path}: holds no marks of '{answers}'")
+        return found
+    folder = BlindFolder(path)
+    answered = sorted(outcome.parent for outcome in folder.answers(answers).glob("*/gap.json"))
+    if not answered:
+        raise InputError(f"{path}: no answers; run the diagnosis first: fogml blind run {path}")
+    return (mark(read_truth(folder.truth / f"{one.name}.json"), read_answer(one)) for one in answered)
 
 
 @cache
@@ -67,20 +80,23 @@ def may_be_learned_from(seed: int) -> bool:
     return not is_final(seed) or seed in spent
 
 
-def _read(gap: dict, truth: Truth, weight: float, named: list[Row], unknown: list[Row]) -> None:
-    for item in gap["which"]:
-        if item["margin"] <= 0.0:
-            # The best explanation does without it, and it is not named whatever the constants are.
-            continue
-        support = Support(**{field.name: item[field.name] for field in fields(Support)})
-        named.append((support.features, bool(set(item["class"]) & truth.right_names), weight))
-    if truth.kind != "wrong_thermal":
-        names = sum(item["probability"] >= NAMED for item in gap["which"])
-        features = unknown_features(gap["unknown"]["log_odds"], names)
-        unknown.append((features, truth.kind.startswith("unknown"), weight))
+def _add(path: Path, one: Mark, weight: float, named: list[Row], unknown: list[Row]) -> None:
+    if one.failure:
+        return
+    for item in one.items:
+        if item.support is None:
+            raise InputError(f"{path}: case {one.truth.case} has names without support; answer it anew")
+        # At no margin the best explanation does without it, and it is not named whatever the constants are.
+        if item.support.margin > 0.0:
+            named.append((item.support.features, item.right, weight))
+    if one.truth.kind != "wrong_thermal" and one.log_odds is not None:
+        features = unknown_features(one.log_odds, len(one.named))
+        unknown.append((features, one.truth.kind.startswith("unknown"), weight))
 
 
 def _fitted(rows: list[Row]) -> list[float]:
+    if len({right for _, right, _ in rows}) < 2:
+        raise InputError("there are not both right and wrong findings; give more cases")
     features, right, weights = zip(*rows)
     fit = LogisticRegression(C=1.0, max_iter=2000).fit(features, right, sample_weight=weights)
     return [float(fit.intercept_[0]), *map(float, fit.coef_[0])]

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from fogml.errors import InputError
 from fogml.gap.blind.folders import OUTCOME, read_json
 from fogml.gap.blind.truth import Amount
+from fogml.gap.confidence import Support
 
 NAMED = 0.5
 """Probability from which an effect counts as named."""
@@ -35,6 +36,19 @@ class Listed(_Answered):
     members: tuple[str, ...] = Field(alias="class")
     probability: float = Field(ge=0.0, le=1.0)
     amplitude: Fitted | None = None
+    margin: float | None = None
+    form_share: float = 0.0
+    rest: float = 0.0
+    length: float = 0.0
+    outside: int = 0
+    second: bool = False
+
+    @property
+    def support(self) -> Support | None:
+        """What its probability follows; None of a method that states no margin."""
+        if self.margin is None:
+            return None
+        return Support(self.margin, self.form_share, self.rest, self.length, self.outside, self.second)
 
     @property
     def named(self) -> bool:
@@ -44,6 +58,7 @@ class Listed(_Answered):
 
 class _Unknown(_Answered):
     probability: float = Field(ge=0.0, le=1.0)
+    log_odds: float | None = None
 
 
 class _Stretch(_Answered):

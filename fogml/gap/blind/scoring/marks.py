@@ -15,6 +15,7 @@ import numpy as np
 from fogml.gap.blind.scoring.answers import Answer, Gap, Listed
 from fogml.gap.blind.scoring.statistics import overlap
 from fogml.gap.blind.truth import Truth
+from fogml.gap.confidence import Support
 
 Relative = Callable[[str], bool]
 """Whether an effect's best-fitted signature can't be told from an unknown one's contribution."""
@@ -26,13 +27,14 @@ _RIGHT_VERDICTS = ("no_gap", "unknown")
 
 @dataclass(frozen=True)
 class Judged:
-    """An item of ``which``: what it names, how certain, whether named, whether right."""
+    """An item of ``which``: what it names, how certain, whether named, whether right, what supports it."""
 
     effect: str
     members: tuple[str, ...]
     probability: float
     named: bool
     right: bool
+    support: Support | None = None
 
 
 @dataclass(frozen=True)
@@ -69,6 +71,8 @@ class Mark:
         Relatives of what was left out that it lists.
     code
         State of the code that answered.
+    log_odds
+        Of the unknown by the evidence, where the method states them.
     """
 
     truth: Truth
@@ -88,6 +92,7 @@ class Mark:
     samples: int | None = None
     relatives: tuple[str, ...] = ()
     code: str | None = None
+    log_odds: float | None = None
 
     @property
     def named(self) -> tuple[Judged, ...]:
@@ -141,7 +146,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
             near = [id for id in item.members if asked(id)]
             relatives += near
             right = bool(near)
-        items.append(Judged(item.effect, item.members, item.probability, item.named, right))
+        items.append(Judged(item.effect, item.members, item.probability, item.named, right, item.support))
     held = {id for item in items if item.named for id in item.members}
     kept = known <= held
     exact = bool(known) and kept and all(item.right for item in items if item.named)
@@ -164,6 +169,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         samples=answer.samples,
         relatives=tuple(relatives),
         code=answer.code,
+        log_odds=gap.unknown.log_odds,
     )
 
 
