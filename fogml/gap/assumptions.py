@@ -50,5 +50,6 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
     if one:
         said.append("One with the constants on these runs: " + ", ".join(one) + ".")
     for id in still:
-        said.append(f"{id} is told by changes of '{told_by(candidates[id])}' alone, and none is recorded.")
+        drives = " and ".join(" or ".join(map(repr, group)) for group in told_by(candidates[id]))
+        said.append(f"{id} is told by changes of {drives} alone, and none is recorded.")
     return tuple(said)

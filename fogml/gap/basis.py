@@ -113,7 +113,11 @@ def build_basis(
 
 
 def stands_still(candidate: Candidate, frame: Frame) -> bool:
-    """Whether the drive that would tell a candidate from others is not recorded to change on these runs."""
-    name = told_by(candidate)
-    drives = [o.run.columns[name] for o in frame.observations if name in o.run.columns]
-    return bool(name) and all(np.ptp(drive) <= STILL * np.abs(drive).max() for drive in drives)
+    """Whether what would tell a candidate from others is not recorded to change on these runs."""
+    held = [o.run.columns for o in frame.observations]
+
+    def changes(name: str) -> bool:
+        drives = [columns[name] for columns in held if name in columns]
+        return any(np.ptp(drive) > STILL * np.abs(drive).max() for drive in drives)
+
+    return not all(any(map(changes, group)) for group in told_by(candidate))

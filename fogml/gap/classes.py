@@ -14,6 +14,7 @@ from fogml.gap.evidence import log_sum_exp
 from fogml.gap.explanation import Chosen, Explanation
 from fogml.gap.result import NAMED
 from fogml.gap.search import Search
+from fogml.gap.surprise import surprise
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
 SAME_CLASS_NATS = 3.0
@@ -109,19 +110,20 @@ def rank(
     """
     best = _leading(explanations)
     classes = {c.candidate: _members(search, best, c.candidate, rivals) for c in best.effects}
+    taken = frozenset(id for members in classes.values() for id in members)
     whole = _merged(explanations, rivals)
     weights = _weights(whole)
     unknown = float(sum(w for e, w in zip(whole, weights) if e.unknown is not None))
     noise = uneven_noise(search, best)
     uneven = expit(float(np.logaddexp(noise.gain, tension)) + math.log(UNEVEN / (1.0 - UNEVEN)))
     unknown = float(1.0 - (1.0 - min(unknown, 1.0)) * (1.0 - uneven))
-    ranked = [_ranked(search, best, chosen, classes[chosen.candidate], whole) for chosen in best.effects]
-    ranked = _in_order(ranked)
-    taken = {id for members in classes.values() for id in members}
+    ranked = [
+        _ranked(search, best, chosen, classes[chosen.candidate], taken, whole) for chosen in best.effects
+    ]
     for id in sorted({i for e in explanations[:60] for i in e.ids} - taken):
         with_it = next(e for e in explanations if id in e.ids)
         chosen = next(c for c in with_it.effects if c.candidate == id)
-        other = _ranked(search, with_it, chosen, (id,), whole)
+        other = _ranked(search, with_it, chosen, (id,), with_it.ids, whole)
         # Named is what the best explanation holds, and what is fitted.
         other = replace(other, probability=min(other.probability, UNSURE))
         if other.margin >= LEAST_MARGIN:
@@ -131,15 +133,6 @@ def rank(
     nothing = float(sum(w for e, w in zip(whole, weights) if not e.ids and e.unknown is None))
     names = sum(r.probability >= NAMED for r in ranked)
     return Ranking(best, tuple(ranked), unknown_probability(log_odds, names), log_odds, noise, nothing)
-
-
-def _in_order(ranked: Sequence[Ranked]) -> list[Ranked]:
-    """Effects of the best explanation, that of the largest margin first and the others as second ones."""
-    told = sorted(ranked, key=lambda r: -r.margin)
-    for i, r in enumerate(told[1:], 1):
-        support = replace(r.support, second=True)
-        told[i] = replace(r, support=support, probability=named_probability(support))
-    return told
 
 
 def _leading(explanations: Sequence[Explanation]) -> Explanation:
@@ -216,8 +209,10 @@ def _ranked(
     held: Explanation,
     chosen: Chosen,
     members: tuple[str, ...],
+    together: frozenset[str],
     explanations: Sequence[Explanation],
 ) -> Ranked:
+    """An effect of an explanation, whose effects or their classes are `together`."""
     inside = np.array([bool(e.ids & set(members)) for e in explanations])
     logs = np.array([e.log_posterior for e in explanations])
     with_it, without = logs[inside], logs[~inside]
@@ -226,9 +221,12 @@ def _ranked(
         # The smaller of the two: many weak sets without the class may outweigh the best of them, and many
         # unlike members that do as well say that none of them is it.
         margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
+    unknown = [e.log_posterior for e in explanations if e.unknown is not None and not e.ids & together]
+    joint = max(margin, held.log_posterior - max(unknown)) if unknown else margin
     length, rest = _lengths(search, held, chosen.candidate)
-    support = Support(margin, search.form_share(held), rest, length)
-    return Ranked(chosen, members, named_probability(support, alone=held.alone), support)
+    support = Support(margin, search.form_share(held), rest, length, joint=joint)
+    support = replace(support, surprise=_surprise(search, held, members))
+    return Ranked(chosen, members, named_probability(support), support)
 
 
 def _lengths(search: Search, held: Explanation, id: str) -> tuple[float, float]:
@@ -237,3 +235,12 @@ def _lengths(search: Search, held: Explanation, id: str) -> tuple[float, float]:
     own = lengths[id]
     unknown = lengths[held.unknown[0]] if held.unknown is not None else 0.0
     return own, unknown / own if own > 0.0 else 0.0
+
+
+def _surprise(search: Search, held: Explanation, members: Sequence[str]) -> float:
+    """How much better the best explanation without a class does than it would if `held` were true."""
+    others = [e for e in search.tried if not e.ids & set(members)]
+    if not others:
+        return 0.0
+    other = max(others, key=lambda e: e.log_posterior)
+    return surprise(search.field_, search.terms(held), search.terms(other))

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.assumptions import assumptions
+from fogml.gap.confidence import UNSURE, likely
 from fogml.gap.describe import describe_unknown
 from fogml.gap.found import fit_named, found_effects
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
@@ -24,7 +26,7 @@ from fogml.gap.reports import (
     weighed_by_runs,
     with_run_amplitudes,
 )
-from fogml.gap.result import Diagnosis, Found, HowFar, Unknown, Verdict
+from fogml.gap.result import NAMED, Diagnosis, Found, HowFar, Unknown, Verdict
 from fogml.gap.structure import gaps_on_runs, stage_energies, systematic_parts
 from fogml.gap.trials import Trial, best_trial
 from fogml.gap.where import where
@@ -115,7 +117,7 @@ def _result(
         fit = fit_named(p, candidates, search, ranking)
     found, fits = found_effects(candidates, search, ranking, fit)
     found = weighed_by_runs(with_run_amplitudes(p, fits, found))
-    found = with_look_alikes(search, ranking.best, found, left_out, p.model.grade)
+    found, suspected = _parted(with_look_alikes(search, ranking.best, found, left_out, p.model.grade))
     looks_like = describe_unknown(p, search, ranking) if ranking.unknown >= 0.05 else ""
     unknown = doubted(Unknown(ranking.unknown, looks_like, ranking.log_odds), found)
     verdict = _verdict(found, unknown, ranking.nothing)
@@ -127,7 +129,7 @@ def _result(
     rng = np.random.default_rng(seed)
     tell("judging on held-out runs")
     far = tuple(how_far(o, p.model.constants, p.recalibrated, after, p.noise, rng) for o in p.held_out)
-    evidence = candidate_evidence(search, ranking, basis, candidates, found)
+    evidence = candidate_evidence(search, ranking, basis, candidates, (*found, *suspected))
     undetectable = tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants"))
     return Diagnosis(
         fit=tuple(o.run.name for o in p.fit),
@@ -136,6 +138,7 @@ def _result(
         held_out_is_part=p.held_out_is_part,
         verdict=verdict,
         found=found,
+        suspected=suspected,
         unknown=unknown,
         where=where(gaps, stage_energies(candidates, systematic), p.noise),
         how_far=far,
@@ -150,6 +153,16 @@ def _result(
         assumed=assumptions(p, basis),
         model=p.model.name,
     )
+
+
+def _parted(found: Sequence[Found]) -> tuple[tuple[Found, ...], tuple[Found, ...]]:
+    """What was found, and what is only suspected: more likely than not, and not sure enough for a name."""
+    suspected = {
+        f.effect: replace(f, probability=likely(f.support))
+        for f in found
+        if UNSURE <= f.probability < NAMED <= likely(f.support) and f.support.margin > 0.0
+    }
+    return tuple(f for f in found if f.effect not in suspected), tuple(suspected.values())
 
 
 def _verdict(found: Sequence[Found], unknown: Unknown, nothing: float) -> Verdict:

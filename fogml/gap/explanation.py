@@ -65,11 +65,6 @@ class Explanation:
         return frozenset(c.candidate for c in self.effects)
 
     @property
-    def alone(self) -> bool:
-        """Whether it is one effect, with no unknown beside it."""
-        return len(self.effects) == 1 and self.unknown is None
-
-    @property
     def unknown(self) -> tuple[str, float] | None:
         """The unknown's group and length; None where it does not act."""
         return self.group if self.rest == "unknown" else None

@@ -94,9 +94,9 @@ def drawn_per_run(candidate: Candidate) -> bool:
     return bool(getattr(candidate, "drawn_per_run", False))
 
 
-def told_by(candidate: Candidate) -> str:
-    """The recorded drive that tells a candidate from others: its attribute of this name; else none."""
-    return str(getattr(candidate, "told_by", ""))
+def told_by(candidate: Candidate) -> tuple[tuple[str, ...], ...]:
+    """Columns that tell a candidate from others, one of each group: its attribute of this name; else none."""
+    return tuple(getattr(candidate, "told_by", ()))
 
 
 def amplitudes_about(candidate: Candidate) -> Sequence[float]:

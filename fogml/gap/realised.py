@@ -50,15 +50,17 @@ def realised(
     """
     ranking, lost, fit = _best_heads(p, candidates, search, ranking, fit)
     outside = {e.id: shapes_outside(candidates[e.id], e.shape, fit.standard_errors) for e in fit.effects}
-    effects, known = [], 1.0 - ranking.unknown
+    effects, known, all_lost = [], 1.0 - ranking.unknown, sum(lost.values())
     for r in ranking.effects:
         id = r.chosen.candidate
         nats = lost.get(id, 0.0)
-        support = replace(r.support, margin=r.margin - nats, outside=outside.get(id, 0))
+        support = replace(
+            r.support, margin=r.margin - nats, joint=r.support.joint - all_lost, outside=outside.get(id, 0)
+        )
         if support == r.support:
             effects.append(r)
             continue
-        probability = min(r.probability, named_probability(support, alone=ranking.best.alone))
+        probability = min(r.probability, named_probability(support))
         known *= 1.0 - (r.probability - probability)
         if support.margin >= LEAST_MARGIN:
             effects.append(replace(r, support=support, probability=probability, unrealised=nats))

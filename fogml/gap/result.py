@@ -224,6 +224,8 @@ class Diagnosis:
         In one word.
     found
         Effects with some probability, the most certain first.
+    suspected
+        Effects that are more likely than not, and not sure enough to be named.
     unknown
         What no candidate explains.
     where, how_far
@@ -269,6 +271,7 @@ class Diagnosis:
     unusable: tuple[tuple[str, str], ...] = ()
     assumed: tuple[str, ...] = ()
     model: str = "nominal"
+    suspected: tuple[Found, ...] = ()
 
     @property
     def named(self) -> tuple[Found, ...]:

@@ -28,6 +28,7 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "model": diagnosis.model,
         "verdict": diagnosis.verdict,
         "which": [_found(found) for found in diagnosis.found],
+        "suspected": [_found(found) for found in diagnosis.suspected],
         "unknown": asdict(diagnosis.unknown),
         "where": _where(diagnosis.where),
         "how_far": [_plain(asdict(item)) for item in diagnosis.how_far],

@@ -135,6 +135,9 @@ def verdict_sentences(found: Diagnosis) -> list[str]:
         ]
     elif found.verdict == "partly_explained":
         sentences.append(f"Beside, {unknown}, something acts that no candidate explains{_looks(found)}.")
+    if found.suspected:
+        told = [f"{cause_words(f, names)} ({probability_words(f.probability)})" for f in found.suspected]
+        sentences.append(f"Suspected, and not sure enough to be named: {listed(told, 5)}.")
     sentences.append(_closing(found))
     return [s for s in sentences if s]
 

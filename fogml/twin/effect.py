@@ -62,7 +62,8 @@ class Effect(ABC):
     candidate
         Whether a diagnosis offers it unless told otherwise.
     told_by
-        Name of a drive without whose changes a run can't tell the effect from others; "" if there is none.
+        Columns without whose changes a run can't tell the effect from others: of each group one has to be
+        recorded to change.
     drawn_per_run
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
@@ -80,7 +81,7 @@ class Effect(ABC):
     shows: ClassVar[str] = ""
     confused_with: ClassVar[Mapping[str, str]] = {}
     candidate: ClassVar[bool] = True
-    told_by: ClassVar[str] = ""
+    told_by: ClassVar[tuple[tuple[str, ...], ...]] = ()
     drawn_per_run: ClassVar[bool] = False
 
     @abstractmethod

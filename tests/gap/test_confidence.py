@@ -11,12 +11,14 @@ from hypothesis import strategies as st
 
 from experiments.gap_blind.calibrate import Row, _fitted
 from fogml.gap.confidence import (
-    BESIDE,
-    FIRST_NAME,
     MOSTLY_FORM,
+    OTHERS,
+    SURE,
+    SURE_BESIDE,
     UNKNOWN,
     UNSURE,
     Support,
+    likely,
     named_probability,
     unknown_features,
     unknown_probability,
@@ -29,14 +31,18 @@ supports = st.builds(
     rest=st.floats(0.0, 50.0),
     length=st.floats(0.0, 200.0),
     outside=st.integers(0, 4),
-    second=st.booleans(),
+    joint=st.floats(-5.0, 200.0),
+    surprise=st.floats(-5.0, 200.0),
 )
 
 
 @given(supports, st.floats(0.0, 50.0))
 def test_more_evidence_is_never_less_probable(support: Support, more: float) -> None:
-    better = replace(support, margin=support.margin + more)
-    assert 0.0 <= named_probability(support) <= named_probability(better) <= 1.0
+    for better in (
+        replace(support, margin=support.margin + more, joint=support.joint + more),
+        replace(support, joint=support.joint + more),
+    ):
+        assert 0.0 <= named_probability(support) <= named_probability(better) <= 1.0
 
 
 @given(supports, st.floats(0.0, 5.0))
@@ -45,20 +51,19 @@ def test_what_is_left_beside_a_name_never_makes_it_more_probable(support: Suppor
         replace(support, rest=support.rest + more),
         replace(support, form_share=min(support.form_share + more, 1.0)),
         replace(support, outside=support.outside + 1),
-        replace(support, second=True),
+        replace(support, surprise=support.surprise + more),
     ):
         assert named_probability(worse) <= named_probability(support)
 
 
 @given(supports)
-def test_a_name_that_may_make_up_for_something_else_has_to_be_sure(support: Support) -> None:
-    found = named_probability(support)
-    if support.second or support.rest > 0.0:
-        assert found <= UNSURE or found >= BESIDE
+def test_a_name_is_given_only_where_it_is_sure(support: Support) -> None:
+    found, honest = named_probability(support), likely(support)
+    assert found <= honest and (found <= UNSURE or found == honest >= SURE_BESIDE)
+    if support.joint - support.margin < OTHERS:
+        assert found <= UNSURE or found >= SURE
     if support.form_share > MOSTLY_FORM:
-        assert found <= UNSURE
-    if support.margin < FIRST_NAME:
-        assert named_probability(support, alone=True) <= UNSURE
+        assert honest <= UNSURE
 
 
 @given(st.floats(-40.0, 40.0), st.floats(0.0, 20.0), st.integers(0, 3))

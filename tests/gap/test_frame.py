@@ -112,25 +112,53 @@ def test_the_basis_holds_everything_and_knows_what_lies_within_the_constants(fra
 
 @dataclass(frozen=True)
 class Told(Kind):
-    """A candidate that only changes of the supply tell from others."""
+    """A candidate that only changes of the supply, and of fan or heater, tell from others."""
 
-    told_by: str = "supply"
+    told_by: tuple[tuple[str, ...], ...] = (("supply",), ("fan", "heater"))
 
 
-@pytest.mark.parametrize("supply, offered", [(None, False), (5.0, False), ("steps", True)])
-def test_what_a_drive_tells_is_offered_where_the_drive_is_recorded_to_change(runs, supply, offered):
-    def with_supply(run, steps):
-        if supply is None:
-            return run
-        volts = 5.0 + 0.01 * np.sin(run.time / 900.0)
-        return run.with_columns(supply=volts + 0.5 * (run.time > run.time.mean()) * steps)
+@pytest.mark.parametrize(
+    "drives, offered",
+    [
+        ((), False),
+        (("supply",), False),
+        (("heater",), False),
+        (("supply", "heater"), True),
+        (("supply", "fan"), True),
+        (("supply", "heater", "fan"), True),
+        (("supply", "steady"), False),
+    ],
+)
+def test_what_drives_tell_is_offered_where_one_of_each_kind_is_recorded_to_change(runs, drives, offered):
+    def driven(run, steps):
+        late = run.time > run.time.mean()
+        held = {
+            "supply": 5.0 + 0.01 * np.sin(run.time / 900.0) + 0.5 * late * steps,
+            "heater": 0.5 + 0.5 * late * steps,
+            "fan": 0.5 + 0.5 * late * steps,
+            "steady": np.full(len(run), 0.5),
+        }
+        named = {"steady": "fan"}
+        return run.with_columns(**{named.get(name, name): held[name] for name in drives})
 
-    # One run on which it changes is enough.
-    made = [with_supply(run, steps=(i == 0 and supply == "steps")) for i, run in enumerate(runs)]
+    # One run on which they change is enough.
+    made = [driven(run, steps=(i == 0)) for i, run in enumerate(runs)]
     candidates = {"cube": Told("cube", KINDS["cube"].amplitude)}
     basis = build_basis(framed(made, MODEL), candidates, [], MODEL.grade)
     assert ("cube" not in basis.within_constants) == offered
     assert bool(basis.nodes) == offered
+
+
+def test_a_drive_that_hardly_changes_tells_nothing(runs):
+    @dataclass(frozen=True)
+    class Supplied(Kind):
+        told_by: tuple[tuple[str, ...], ...] = (("supply",),)
+
+    made = [run.with_columns(supply=5.0 + 0.01 * np.sin(run.time / 900.0)) for run in runs]
+    basis = build_basis(
+        framed(made, MODEL), {"cube": Supplied("cube", KINDS["cube"].amplitude)}, [], MODEL.grade
+    )
+    assert basis.within_constants == ("cube",)
 
 
 def test_a_nodes_size_is_the_amplitude_of_unit_length(frame):

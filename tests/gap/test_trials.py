@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.classes import rank
-from fogml.gap.confidence import BESIDE, FIRST_NAME, MOSTLY_FORM, Support, named_probability
+from fogml.gap.confidence import MOSTLY_FORM, SURE, Support, named_probability
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
 from fogml.gap.trials import best_trial
@@ -100,25 +100,20 @@ def test_an_effect_that_each_run_draws_anew_is_no_noise():
     assert found.prepared.noise.fit.model.K < 3.0 * NOISE.K
 
 
-def test_a_first_name_has_to_be_more_probable_than_none():
-    def alone(margin: float) -> float:
-        return named_probability(Support(margin), alone=True)
-
-    assert alone(FIRST_NAME - 0.01) < 0.5 < alone(FIRST_NAME)
-    assert named_probability(Support(FIRST_NAME - 0.01)) > 0.5
-    # Beside others it has to be more certain than not.
-    for second in (False, True):
-        supports = [Support(m, rest=0.3, second=second) for m in np.linspace(-2.0, 30.0, 65)]
-        told = [named_probability(support) for support in supports]
-        assert all(p >= BESIDE or p < 0.5 for p in told)
-        assert told[0] < 0.5 < told[-1]
+def test_names_are_given_from_so_much_evidence_on():
+    told = [
+        named_probability(Support(m, rest=0.3, length=10.0, joint=m)) for m in np.linspace(-2.0, 30.0, 65)
+    ]
+    assert all(p >= SURE or p < 0.5 for p in told)
+    assert told[0] < 0.5 < told[-1]
     # What hangs on another form is not the effect's, however much it gains.
-    assert named_probability(Support(1e3, MOSTLY_FORM + 0.01)) < 0.5
+    assert named_probability(Support(1e3, MOSTLY_FORM + 0.01, length=10.0, joint=1e3)) < 0.5
 
 
 @pytest.mark.parametrize(
-    "less", [{"margin": 3.0}, {"form_share": 0.1}, {"rest": 1.0}, {"outside": 1}, {"second": True}]
+    "less",
+    [{"margin": 3.0}, {"form_share": 0.1}, {"rest": 1.0}, {"outside": 1}, {"joint": 3.0}, {"surprise": 3.0}],
 )
 def test_as_many_nats_with_another_form_or_beside_more_say_less(less):
-    support = Support(margin=5.0, length=10.0)
+    support = Support(margin=3.5, length=10.0, joint=6.0, surprise=1.0)
     assert named_probability(replace(support, **less)) < named_probability(support)

@@ -17,7 +17,8 @@ class ChamberPickup(BiasEffect):
         b = A (heater + compressor)
 
     with their duties, 0 to 1. Where neither is recorded they are taken for a cycle of their own,
-    (1 + sin(2 pi t / period + phase)) / 2.
+    (1 + sin(2 pi t / period + phase)) / 2; nothing tells that from any other line, and a diagnosis does not
+    offer it.
 
     Source: interference synchronous with the duty cycle; form and ranges are engineering ones.
     """
@@ -31,6 +32,7 @@ class ChamberPickup(BiasEffect):
         Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), "at time 0", (-720.0, 720.0), default=0.0),
     )
     needs = ("compressor", "heater")
+    told_by = (("compressor", "heater"),)
     sources = ("IEEE Std 952-1997",)
     shows = "steps and lines in step with heater and compressor, without delay"
     confused_with = {

@@ -17,7 +17,8 @@ class ElectronicCrosstalk(BiasEffect):
 
     The amplitude is e_1; ``supply_ratio`` is e_2 / e_1. V_0 is the supply at the first sample. The
     constant part e_0 is one of the bias itself. Where no supply is recorded to change, nothing tells it from
-    whatever else follows the electronics, and a diagnosis does not offer it.
+    whatever else follows the electronics, and where their temperature is not, from `supply_ripple`: a
+    diagnosis does not offer it.
 
     Source: Lefevre (literature); ranges, 0.05 to 1 deg/h (tactical) and 1e-3 to 1e-2 deg/h (navigation)
     over 50 degC, are engineering ones.
@@ -31,7 +32,7 @@ class ElectronicCrosstalk(BiasEffect):
     )
     shape = (Quantity("supply_ratio", "degC/V", (-20.0, 20.0), (-20.0, 20.0), "e_2 / e_1", (-1e4, 1e4)),)
     needs = ("T_electronics", "supply")
-    told_by = "supply"
+    told_by = (("supply",), ("T_electronics",))
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "a bias that follows the electronics: self-heating after power-on, then the chamber"
     confused_with = {

@@ -34,7 +34,7 @@ class SupplyRipple(BiasEffect):
         Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), "at time 0", (-720.0, 720.0), default=0.0),
     )
     needs = ("supply",)
-    told_by = "supply"
+    told_by = (("supply",),)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "a narrow line at the alias frequency, and steps with the supply"
     confused_with = {

@@ -34,10 +34,13 @@ def a_file(path: Path, marks: list[Mark], seed: int = 1) -> Path:
 
 
 def test_a_file_of_marks_holds_what_supports_a_name(tmp_path: Path) -> None:
-    stated = {"form_share": 0.1, "rest": 0.3, "length": 12.5, "outside": 1, "second": True}
+    stated = {"form_share": 0.1, "rest": 0.3, "length": 12.5, "outside": 1, "joint": 9.5, "surprise": 2.5}
     found = a_mark(1, "one", "a", [listed("a", 7.25, **stated), listed("b", 1.0)], log_odds=-3.5)
     (again,) = read_marks(a_file(tmp_path / "marks.json.gz", [found])).methods["diagnosis"]
-    assert [item.support for item in again.items] == [Support(7.25, 0.1, 0.3, 12.5, 1, True), Support(1.0)]
+    assert [item.support for item in again.items] == [
+        Support(7.25, 0.1, 0.3, 12.5, 1, 9.5, 2.5),
+        Support(1.0),
+    ]
     assert again.log_odds == -3.5
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -41,14 +41,16 @@ class Listed(_Answered):
     rest: float = 0.0
     length: float = 0.0
     outside: int = 0
-    second: bool = False
+    joint: float = 0.0
+    surprise: float = 0.0
 
     @property
     def support(self) -> Support | None:
         """What its probability follows; None of a method that states no margin."""
         if self.margin is None:
             return None
-        return Support(self.margin, self.form_share, self.rest, self.length, self.outside, self.second)
+        stated = {f.name: getattr(self, f.name) for f in fields(Support)}
+        return Support(**stated)
 
     @property
     def named(self) -> bool:
