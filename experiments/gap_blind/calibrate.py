@@ -83,7 +83,7 @@ def may_be_learned_from(seed: int) -> bool:
 def _add(path: Path, one: Mark, weight: float, named: list[Row], unknown: list[Row]) -> None:
     if one.failure:
         return
-    for item in one.items:
+    for item in (*one.items, *one.suspected):
         if item.support is None:
             raise InputError(f"{path}: case {one.truth.case} has names without support; answer it anew")
         # At no margin the best explanation does without it, and it is not named whatever the constants are.

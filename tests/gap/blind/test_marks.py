@@ -86,6 +86,18 @@ def test_named_means_half() -> None:
     assert not mark(truth("one", "a"), answer(("a", 0.49))).exact
 
 
+def test_what_is_suspected_is_no_name_and_is_judged_apart() -> None:
+    suspected = [{"effect": id, "class": [id], "probability": 0.75} for id in ("a", "c")]
+    found = mark(truth("one", "a"), answer(suspected=suspected, verdict="unknown"))
+    assert not (found.top or found.exact or found.wrong_name or found.named)
+    assert [item.right for item in found.suspected] == [True, False]
+    figures = {row["key"]: row for row in rows([found])}
+    assert (figures["suspected_right"]["value"], figures["suspected_right"]["n"]) == (0.5, 2)
+    # Two of 0.75 each, one right: off by a quarter; listed there is none.
+    assert figures["calibration_error_suspected"]["value"] == pytest.approx(0.25)
+    assert figures["calibration_error"]["value"] is None
+
+
 def test_two_effects_both_needed() -> None:
     assert mark(truth("two", "a", "b"), answer(("a", 0.9), ("b", 0.8))).exact
     assert not mark(truth("two", "a", "b"), answer(("a", 0.9))).exact

@@ -90,6 +90,7 @@ class Gap(_Answered):
 
     verdict: str
     which: tuple[Listed, ...] = ()
+    suspected: tuple[Listed, ...] = ()
     unknown: _Unknown = _Unknown(probability=0.0)
     where: _Where = _Where()
     how_far: tuple[HowFar, ...] = ()

@@ -73,6 +73,8 @@ class Mark:
         State of the code that answered.
     log_odds
         Of the unknown by the evidence, where the method states them.
+    suspected
+        What is more likely than not, and not named.
     """
 
     truth: Truth
@@ -93,6 +95,7 @@ class Mark:
     relatives: tuple[str, ...] = ()
     code: str | None = None
     log_odds: float | None = None
+    suspected: tuple[Judged, ...] = ()
 
     @property
     def named(self) -> tuple[Judged, ...]:
@@ -139,14 +142,17 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
             code=answer.code,
         )  # fmt: skip
     asked = relative if any(effect.id is not None for effect in truth.unknown) else None
-    items, relatives = [], []
-    for item in gap.which:
+    relatives: list[str] = []
+
+    def judged(item: Listed) -> Judged:
         right = bool(truth.right_names & set(item.members))
         if not right and asked is not None:
             near = [id for id in item.members if asked(id)]
-            relatives += near
+            relatives.extend(near)
             right = bool(near)
-        items.append(Judged(item.effect, item.members, item.probability, item.named, right, item.support))
+        return Judged(item.effect, item.members, item.probability, item.named, right, item.support)
+
+    items = tuple(judged(item) for item in gap.which)
     held = {id for item in items if item.named for id in item.members}
     kept = known <= held
     exact = bool(known) and kept and all(item.right for item in items if item.named)
@@ -155,7 +161,8 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         truth=truth,
         failure="",
         verdict=gap.verdict,
-        items=tuple(items),
+        items=items,
+        suspected=tuple(judged(item) for item in gap.suspected),
         unknown=gap.unknown.probability,
         exact=exact,
         top=first is not None and bool(known & set(first.members)),

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fogml.gap.blind.scoring.marks import Mark
+from fogml.gap.blind.scoring.marks import Judged, Mark
 from fogml.gap.blind.scoring.statistics import (
     NOTHING,
     Estimate,
@@ -102,9 +102,11 @@ def curve(marks: Sequence[Mark]) -> Any:
     return open_set([m.unknown for m in chosen], [bool(m.truth.unknown) for m in chosen])
 
 
-def calibration(marks: Sequence[Mark], named_only: bool = False) -> Any:
-    """The reliability bins of every listed item, or of those that are named."""
-    items = [item for m in marks for item in (m.named if named_only else m.items)]
+def calibration(
+    marks: Sequence[Mark], items_of: Callable[[Mark], Iterable[Judged]] = lambda m: m.items
+) -> Any:
+    """The reliability bins of every listed item, or of other items of each case."""
+    items = [item for m in marks for item in items_of(m)]
     return reliability([item.probability for item in items], [item.right for item in items])
 
 
@@ -181,7 +183,17 @@ FIGURES: tuple[Figure, ...] = (
     ),
     Figure(
         "calibration_error_named", "expected calibration error, named effects alone",
-        lambda marks: calibration_error(calibration(marks, True)), KINDS, format="number", of_mix=True,
+        lambda marks: calibration_error(calibration(marks, lambda m: m.named)), KINDS, format="number",
+        of_mix=True,
+    ),
+    Figure(
+        "calibration_error_suspected", "expected calibration error, with what is suspected",
+        lambda marks: calibration_error(calibration(marks, lambda m: (*m.items, *m.suspected))), KINDS,
+        format="number", of_mix=True,
+    ),
+    Figure(
+        "suspected_right", "suspected and not named: right",
+        _pooled(lambda m: (item.right for item in m.suspected)), KINDS, of_mix=True,
     ),
     Figure(
         "closed_ratio", "closed / what the true effect, fitted, closes (median)",
