@@ -97,6 +97,9 @@ def headline(found: Diagnosis) -> str:
     named = [title_of(f.effect, names) for f in found.named]
     causes = " + ".join(named)
     match found.verdict:
+        case "no_gap" if found.suspected:
+            causes = " + ".join(cause_words(f, names) for f in found.suspected)
+            return f"No gap for certain; suspected: {causes}"
         case "no_gap":
             return "No gap: the recalibrated twin and the gyro agree within the noise"
         case "explained":

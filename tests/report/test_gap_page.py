@@ -63,6 +63,18 @@ def test_a_gap_without_a_sure_cause_names_the_likeliest() -> None:
     assert effect(likeliest.effect).title in first
 
 
+@pytest.mark.parametrize("verdict", ["unknown", "no_gap"])
+def test_what_is_suspected_is_told_with_its_probability_and_is_no_name(verdict: str) -> None:
+    found = every_diagnosis()[verdict]
+    suspected = replace(every_diagnosis()["explained"].found[0], probability=0.72)
+    first = tiles(Page(gap_page(replace(found, suspected=(suspected,)))))
+    title = effect(suspected.effect).title
+    assert f"Suspected, and not sure enough to be named: {title} (72 %)" in first
+    assert "Missing from the twin" not in first and "Suspected" not in tiles(page(verdict))
+    if verdict == "no_gap":
+        assert f"No gap for certain; suspected: {title}" in first and "agree within the noise" not in first
+
+
 @pytest.mark.parametrize("verdict", VERDICTS)
 def test_every_axis_has_a_unit_and_every_figure_words(verdict: str) -> None:
     read = page(verdict)
