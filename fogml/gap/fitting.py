@@ -181,7 +181,7 @@ class _Problem:
                 names.append(f"{effect.id}.{quantity.name}")
                 low, high = quantity.range(grade)  # type: ignore[arg-type]
                 scale.append(max(0.5 * (high - low) / _Z90, 1e-12))
-                self.limits.append(_usable(quantity, low, high))
+                self.limits.append(usable_range(quantity, low, high))
         self.names, self.scale = tuple(names), np.array(scale)
         self._steps = self._steps_of(self.first)
         self._mean = np.array([c.mean / c.sd for c in constants])
@@ -284,7 +284,7 @@ def _spans(observations: Sequence[Observation]) -> dict[str, float]:
     return {"s": seconds, "Hz": seconds, "degC": high - low, "deg/s": fastest}
 
 
-def _usable(quantity: Quantity, low: float, high: float) -> tuple[float, float]:
+def usable_range(quantity: Quantity, low: float, high: float) -> tuple[float, float]:
     """Where a shape parameter may go: half as far again as its range, within what is physical."""
     if quantity.unit == "deg" and high - low >= 180.0:
         return quantity.limits

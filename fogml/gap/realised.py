@@ -16,7 +16,7 @@ import numpy as np
 from fogml.gap.classes import LEAST_MARGIN, Ranked, Ranking
 from fogml.gap.confidence import named_probability
 from fogml.gap.evidence import Term
-from fogml.gap.fitting import Fit
+from fogml.gap.fitting import Fit, usable_range
 from fogml.gap.found import fit_named
 from fogml.gap.model import Candidate, amplitudes_about, drawn_per_run
 from fogml.gap.preparing import Prepared
@@ -25,6 +25,8 @@ from fogml.gap.shapes import AT_AMPLITUDE, is_angle
 
 SHAPE_ROOM, LARGEST_ROOM = 0.02, 0.1
 """Shares of its range that a shape parameter may miss it by: whatever its standard error, and within that."""
+AT_END = 1e-3
+"""Share of its range within which a shape parameter is at the end of where a fit lets it go."""
 FORM_SHARE = 0.1
 """Share of an effect's gain that its true form may owe to not being the catalogue's."""
 
@@ -73,7 +75,8 @@ def shapes_outside(
 ) -> int:
     """How many shape parameters lie outside of their usual ranges, of any grade; directions never do.
 
-    Near an end chance decides on which side one lies that the runs hardly tell.
+    Near an end chance decides on which side one lies that the runs hardly tell. One that went as far as a
+    fit lets it would go further, and counts twice.
     """
     count = 0
     for quantity in candidate.shape:
@@ -81,7 +84,10 @@ def shapes_outside(
         error = standard_errors.get(f"{candidate.id}.{quantity.name}", 0.0)
         room = (high - low) * min(max(SHAPE_ROOM, error / (high - low)), LARGEST_ROOM)
         value = shape.get(quantity.name, low)
-        count += not is_angle(quantity) and not low - room <= value <= high + room
+        if is_angle(quantity) or low - room <= value <= high + room:
+            continue
+        least, most = usable_range(quantity, low, high)
+        count += 1 + (min(value - least, most - value) <= AT_END * (high - low))
     return count
 
 

@@ -10,6 +10,7 @@ import pytest
 from fogml.gap.basis import build_basis
 from fogml.gap.classes import rank
 from fogml.gap.evidence import Field
+from fogml.gap.fitting import usable_range
 from fogml.gap.found import fit_named
 from fogml.gap.frame import Frame
 from fogml.gap.model import EffectValue
@@ -26,6 +27,8 @@ from fogml.gap.search import Search
 from tests.gap.small_model import KINDS, SmallModel, dense, noise_of, ramps, recorded
 
 MODEL = SmallModel(("mixture", "cube"))
+FREE = replace(KINDS["mixture"], shape=(replace(KINDS["mixture"].shape[0], limits=(-9.0, 9.0)),))
+"""One whose shape may physically leave its usual range."""
 MEANS = {"offset": 0.0, "slope": 0.0}
 
 
@@ -144,7 +147,7 @@ def test_a_shape_outside_of_its_usual_range_makes_a_name_less_probable():
     (effect,) = fit.effects
     far = replace(fit, effects=(replace(effect, shape={"share": 1.5}),))
     (usual,), (outside,) = (realised(p, candidates, search, ranking, f).effects for f in (fit, far))
-    assert (usual.support.outside, outside.support.outside) == (0, 1)
+    assert (usual.support.outside, outside.support.outside) == (0, 2)
     assert shapes_outside(candidates["mixture"], {"share": 1.015}, {}) == 0
     assert outside.probability < usual.probability
 
@@ -156,12 +159,19 @@ def test_a_shape_outside_of_its_usual_range_makes_a_name_less_probable():
 def test_a_shape_that_chance_may_have_put_outside_of_its_range_is_not_outside(share, error, count):
     """Where it is near: what the runs don't tell at all is no excuse for any shape."""
     errors = {"mixture.share": error, "cube.share": 9.0}
-    assert shapes_outside(KINDS["mixture"], {"share": share}, errors) == count
+    assert shapes_outside(FREE, {"share": share}, errors) == count
+
+
+@pytest.mark.parametrize("share, count", [(1.2, 1), (1.2499, 2), (1.25, 2), (-0.25, 2), (-0.2, 1), (1.0, 0)])
+def test_a_shape_that_went_as_far_as_a_fit_lets_it_counts_twice(share, count):
+    (quantity,) = FREE.shape
+    assert usable_range(quantity, *quantity.of_any_grade) == (-0.25, 1.25)
+    assert shapes_outside(FREE, {"share": share}, {}) == count
 
 
 def test_directions_have_no_usual_range():
     assert shapes_outside(KINDS["line"], {"period": 900.0, "phase": 500.0}, {}) == 0
-    assert shapes_outside(KINDS["line"], {"period": 9000.0, "phase": 70.0}, {}) == 1
+    assert shapes_outside(KINDS["line"], {"period": 5000.0, "phase": 70.0}, {}) == 1
 
 
 def test_what_was_found_beside_a_lost_name_is_no_more_certain_than_without_it():

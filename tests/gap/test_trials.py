@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fogml.gap.classes import rank
-from fogml.gap.confidence import MOSTLY_FORM, SURE, Support, named_probability
+from fogml.gap.confidence import MOSTLY_FORM, SURE_BESIDE_UNKNOWN, Support, named_probability
 from fogml.gap.model import EffectValue
 from fogml.gap.preparing import prepare
 from fogml.gap.trials import best_trial
@@ -104,7 +104,7 @@ def test_names_are_given_from_so_much_evidence_on():
     told = [
         named_probability(Support(m, rest=0.3, length=10.0, joint=m)) for m in np.linspace(-2.0, 30.0, 65)
     ]
-    assert all(p >= SURE or p < 0.5 for p in told)
+    assert all(p >= SURE_BESIDE_UNKNOWN or p < 0.5 for p in told)
     assert told[0] < 0.5 < told[-1]
     # What hangs on another form is not the effect's, however much it gains.
     assert named_probability(Support(1e3, MOSTLY_FORM + 0.01, length=10.0, joint=1e3)) < 0.5

@@ -29,7 +29,7 @@ class SupplyRipple(BiasEffect):
     title = "Supply voltage and ripple"
     amplitude = Quantity("amplitude", "deg/h/V", (0.05, 1.0), (1e-3, 2e-2), "k_dc", (-1e3, 1e3), signed=True)
     shape = (
-        Quantity("ripple", "V", (0.0, 0.5), (0.0, 0.5), "a", (0.0, 100.0), default=0.05),
+        Quantity("ripple", "V", (0.04, 0.5), (0.04, 0.5), "a", (0.0, 100.0), default=0.05),
         Quantity("alias_frequency", "Hz", (1e-4, 1e-2), (1e-4, 1e-2), "f", (1e-6, 1e3)),
         Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), "at time 0", (-720.0, 720.0), default=0.0),
     )
