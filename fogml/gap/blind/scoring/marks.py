@@ -8,7 +8,7 @@ structure is what is wrong. A case that failed is a wrong answer in every figure
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -131,7 +131,6 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         Asked of names that would be wrong, where a library effect was left out.
     """
     gap = answer.gap
-    known = {effect.id for effect in truth.known if effect.id}
     if gap is None:
         wrong_end = 0.0 if truth.unknown else 1.0
         return Mark(
@@ -153,10 +152,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         return Judged(item.effect, item.members, item.probability, item.named, right, item.support)
 
     items = tuple(judged(item) for item in gap.which)
-    held = {id for item in items if item.named for id in item.members}
-    kept = known <= held
-    exact = bool(known) and kept and all(item.right for item in items if item.named)
-    first = items[0] if items else None
+    standing = _standing(truth, items)
     return Mark(
         truth=truth,
         failure="",
@@ -164,19 +160,44 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         items=items,
         suspected=tuple(judged(item) for item in gap.suspected),
         unknown=gap.unknown.probability,
-        exact=exact,
-        top=first is not None and bool(known & set(first.members)),
-        top_strict=first is not None and first.effect in known,
-        kept=kept,
+        **asdict(standing),
         overlap=_overlap(truth, gap),
         closed_ratios=_closed_ratios(truth, gap),
-        closed_covered=_closed_covered(truth, gap) if exact and not truth.unknown else (),
+        closed_covered=_closed_covered(truth, gap) if standing.exact and not truth.unknown else (),
         amplitude_covered=_amplitude_covered(truth, gap.which),
         seconds=answer.seconds,
         samples=answer.samples,
         relatives=tuple(relatives),
         code=answer.code,
         log_odds=gap.unknown.log_odds,
+    )
+
+
+def renamed(found: Mark, items: tuple[Judged, ...]) -> Mark:
+    """The same case, had these items been listed, most certain first, and nothing been suspected."""
+    return replace(found, items=items, suspected=(), **asdict(_standing(found.truth, items)))
+
+
+@dataclass(frozen=True)
+class _Standing:
+    """How a list of items stands to the truth; attributes as those of `Mark`."""
+
+    exact: bool
+    top: bool
+    top_strict: bool
+    kept: bool
+
+
+def _standing(truth: Truth, items: tuple[Judged, ...]) -> _Standing:
+    known = {effect.id for effect in truth.known if effect.id}
+    named = [item for item in items if item.named]
+    kept = known <= {id for item in named for id in item.members}
+    first = items[0] if items else None
+    return _Standing(
+        exact=bool(known) and kept and all(item.right for item in named),
+        top=first is not None and bool(known & set(first.members)),
+        top_strict=first is not None and first.effect in known,
+        kept=kept,
     )
 
 

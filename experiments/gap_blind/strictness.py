@@ -1,0 +1,80 @@
+"""What the figures on names would be if a name had to be surer, or less sure, than it has to be.
+
+``python -m experiments.gap_blind.strictness`` writes ``strictness.md`` from the marks of the seed whose
+score is kept. Each row names what is at least so probable, of what was named and what was suspected, and
+drops the rest: the search itself, and so everything else in an answer, is as it was.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+from experiments.gap_blind.per_case import HERE, write_page
+from fogml.gap.blind.folders import DIAGNOSIS
+from fogml.gap.blind.scoring.marks import Mark, renamed
+from fogml.gap.blind.scoring.marks_file import read_marks
+from fogml.gap.blind.scoring.table import BY_KEY
+from fogml.report.blind_words import value_text, wanted_text
+from fogml.report.words import plural
+
+LEAST_PROBABILITIES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95)
+KEYS = (
+    "nothing_named",
+    "unknown_wrong_name",
+    "mixed_false_name",
+    "false_discovery",
+    "one_top",
+    "one_exact",
+    "two_exact",
+    "mixed_known_kept",
+)
+
+
+def main() -> None:
+    """Write the table of the seed whose score is kept."""
+    seed = json.loads((HERE / "score.json").read_text(encoding="utf-8"))["seed"]
+    files = [read_marks(path) for path in sorted(HERE.glob("marks-*.json.gz"))]
+    write_page("strictness", page([m for f in files if f.seed == seed for m in f.methods[DIAGNOSIS]]))
+
+
+def named_from(least: float, marks: Iterable[Mark]) -> list[Mark]:
+    """The cases, had a name been given to all that is at least so probable and to nothing else."""
+    return [found if found.failure else _named_from(least, found) for found in marks]
+
+
+def _named_from(least: float, found: Mark) -> Mark:
+    likely = sorted((*found.items, *found.suspected), key=lambda item: -item.probability)
+    return renamed(found, tuple(replace(item, named=True) for item in likely if item.probability >= least))
+
+
+def page(marks: Sequence[Mark]) -> str:
+    """The table as Markdown."""
+    held = [(f"{least:.0%}", named_from(least, marks)) for least in LEAST_PROBABILITIES]
+    figures = [BY_KEY[key] for key in KEYS]
+    lines = [
+        "# How sure a name has to be",
+        "",
+        f"The diagnosis's answers to {plural(len(marks), 'synthetic case')} of the check on withheld "
+        "effects, had it named all that is at least so probable; and as it does name, with another "
+        "threshold beside an unknown and beside other names (`fogml/gap/confidence.py`). What is likely and "
+        "not named is told as suspected.",
+        "",
+        f"| named from | {' | '.join(figure.words for figure in figures)} |",
+        f"|---|{'---:|' * len(figures)}",
+        f"| wanted | {' | '.join(wanted_text(_wanted(key)) for key in KEYS)} |",
+    ]
+    for words, cases in (*held, ("as it does", marks)):
+        values = [value_text(f.measure(f.chosen(cases)).value, f.format) for f in figures]
+        lines.append(f"| {words} | {' | '.join(values)} |")
+    return "\n".join(lines) + "\n"
+
+
+def _wanted(key: str) -> dict[str, object]:
+    figure = BY_KEY[key]
+    return {"wanted": {"low": figure.low, "high": figure.high}, "format": figure.format}
+
+
+if __name__ == "__main__":
+    main()
