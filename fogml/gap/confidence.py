@@ -2,8 +2,8 @@
 
 Evidence takes the forms of effects and of noise for known. How often a finding is right that has a
 given margin, needs so much of another form and leaves so much beside it was fitted on spent cases of the
-check on withheld effects, 1,699 findings in 2,612 cases of seeds 1000013 and 1000014, with
-``python -m experiments.gap_blind.calibrate DIR ... --beside 0.15``, and rounded; the unknown's on those of
+check on withheld effects, 1,699 findings in 2,612 cases of seeds 1000013 and 1000014, by the regression of
+``experiments.gap_blind.calibrate`` with weight 0.15 beside the mix, and rounded; the unknown's on those of
 the mix alone, 1,322 cases. How sure a name has to be was chosen on the same cases, so that a strong unknown
 is hardly ever given one.
 """
