@@ -90,6 +90,10 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
             for f in found.found
         ]
         terminal.table("Effects found", ["effect", "can't be told from", "probability", "amplitude"], rows)
+    for f in found.suspected:
+        terminal.say(
+            f"Suspected, and not sure enough to be named: {' or '.join(f.members)} ({f.probability:.2f})"
+        )
     if found.unknown.probability >= 0.05:
         terminal.say(f"Unknown: probability {found.unknown.probability:.2f}; {found.unknown.looks_like}")
     rows = [

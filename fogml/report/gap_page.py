@@ -59,7 +59,7 @@ def gap_page(found: Diagnosis) -> str:
         strip=figures_gap.how_far_strip(found.how_far, bool(found.named)) if found.how_far else None,
         warnings=warnings(found, names),
         error_rates=error_sentences(found),
-        causes=gap_tables.causes_table(found.found, names) if found.found else None,
+        causes=gap_tables.causes_table(found, names),
         classes=gap_tables.classes_table(found.found, names),
         how_far=gap_tables.how_far_table(found) if found.how_far else None,
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],

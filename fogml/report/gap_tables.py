@@ -40,17 +40,18 @@ _CONSTANTS = {
 }
 
 
-def causes_table(found: Sequence[Found], names: dict[str, str]) -> Table:
-    """Every effect that was found, the most certain first."""
+def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """Every effect that was found, the most certain first, then what is suspected; None without any."""
     rows = []
-    for f in found:
+    listed = [(f, False) for f in found.found] + [(f, True) for f in found.suspected]
+    for f, is_suspected in listed:
         shape = "; ".join(
             f"{name.replace('_', ' ')} {estimate_words(value)}" for name, value in f.parameters.items()
         )
         others = [title_of(m, names) for m in f.others]
         others += [f"{title_of(m, names)}, which was left out" for m in f.left_out]
         cells = (
-            f"{title_of(f.effect, names)} ({f.effect})",
+            f"{'Suspected: ' if is_suspected else ''}{title_of(f.effect, names)} ({f.effect})",
             probability_words(f.probability),
             with_error(f.amplitude.value, f.amplitude.se),
             unit_words(f.amplitude.unit) or MISSING,
@@ -58,7 +59,9 @@ def causes_table(found: Sequence[Found], names: dict[str, str]) -> Table:
             "; ".join(others) or "nothing: alone in its class",
             _consistency(f),
         )
-        rows.append(Row(cells, "chosen" if f.named else ""))
+        rows.append(Row(cells, "chosen" if f.named and not is_suspected else ""))
+    if not rows:
+        return None
     return Table(
         columns=(
             ("Effect", "", "text"),
@@ -70,8 +73,8 @@ def causes_table(found: Sequence[Found], names: dict[str, str]) -> Table:
             ("On the runs", "", "text"),
         ),
         rows=tuple(rows),
-        caption="Highlighted: named (probability 50 % or more). The probability is that one of its class "
-        "acts; amplitude and shape are of the effect that stands for the class.",
+        caption="Highlighted: named. The probability is that one of its class acts; amplitude and shape are "
+        "of the effect that stands for the class. Suspected: likely, and not sure enough for a name.",
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,13 +13,16 @@ import pytest
 import yaml
 from typer.testing import CliRunner
 
+from fogml.cli.diagnose_job import _print
 from fogml.cli.main import app
+from fogml.cli.terminal import Terminal
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
 from fogml.twin.programme import load_programme
 from fogml.twin.simulate import simulate
 from fogml.twin.twin_file import load_twin
+from tests.report.diagnoses import every_diagnosis
 from tests.report.pages import Page
 
 RAMP = "1 degC/min"
@@ -134,6 +138,16 @@ def test_the_effect_is_named_with_its_size(gap):
     assert amplitude["unit"] == "deg/h"
     assert abs(amplitude["value"] - HYSTERESIS) < 4.0 * amplitude["se"] < 0.2
     assert set(found["parameters"]["half_width"]) == {"value", "se", "unit"}
+
+
+def test_what_is_suspected_is_told_beside_what_was_found(capsys):
+    found = every_diagnosis()["explained"]
+    suspected = replace(found.found[0], effect="moisture", members=("moisture", "ageing"), probability=0.72)
+    for case in (found, replace(found, suspected=(suspected,))):
+        _print(case, Terminal())
+        told = " ".join(capsys.readouterr().out.split())
+        said = "Suspected, and not sure enough to be named: moisture or ageing (0.72)"
+        assert (said in told) == bool(case.suspected)
 
 
 def test_segments_lie_within_their_run(gap, runs):

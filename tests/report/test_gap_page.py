@@ -15,6 +15,7 @@ from fogml.gap.result import HowFar
 from fogml.gap.where_result import Where
 from fogml.report import gap_page
 from fogml.report.gap_page import MOST_RUNS_DRAWN
+from fogml.report.gap_tables import causes_table
 from fogml.report.gap_words import probability_words, unit_words, with_error
 from fogml.twin.registry import effect, effects
 from tests.report.diagnoses import diagnosis, every_diagnosis, hysteresis, series
@@ -73,6 +74,19 @@ def test_what_is_suspected_is_told_with_its_probability_and_is_no_name(verdict: 
     assert "Missing from the twin" not in first and "Suspected" not in tiles(page(verdict))
     if verdict == "no_gap":
         assert f"No gap for certain; suspected: {title}" in first and "agree within the noise" not in first
+
+
+def test_the_table_of_causes_marks_what_is_suspected_and_highlights_names_alone() -> None:
+    found = every_diagnosis()["explained"]
+    named = found.found[0]
+    suspected = replace(named, effect="moisture", members=("moisture",), probability=0.72)
+    table = causes_table(replace(found, suspected=(suspected,)), {})
+    assert table is not None
+    assert [(row.cells[0].startswith("Suspected: "), *row.cells[1:2], row.mark) for row in table.rows] == [
+        (False, probability_words(named.probability), "chosen"),
+        (True, "72 %", ""),
+    ]
+    assert causes_table(replace(found, found=()), {}) is None
 
 
 @pytest.mark.parametrize("verdict", VERDICTS)
