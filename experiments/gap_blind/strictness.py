@@ -10,12 +10,13 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 from experiments.gap_blind.per_case import HERE, write_page
 from fogml.gap.blind.folders import DIAGNOSIS
 from fogml.gap.blind.scoring.marks import Mark, renamed
 from fogml.gap.blind.scoring.marks_file import read_marks
-from fogml.gap.blind.scoring.table import BY_KEY
+from fogml.gap.blind.scoring.table import rows
 from fogml.report.blind_words import value_text, wanted_text
 from fogml.report.words import plural
 
@@ -34,9 +35,14 @@ KEYS = (
 
 def main() -> None:
     """Write the table of the seed whose score is kept."""
+    write_page("strictness", page(kept_marks()))
+
+
+def kept_marks() -> list[Mark]:
+    """How the diagnosis's answers were judged, of every part of the seed whose score is kept."""
     seed = json.loads((HERE / "score.json").read_text(encoding="utf-8"))["seed"]
     files = [read_marks(path) for path in sorted(HERE.glob("marks-*.json.gz"))]
-    write_page("strictness", page([m for f in files if f.seed == seed for m in f.methods[DIAGNOSIS]]))
+    return [found for file in files if file.seed == seed for found in file.methods[DIAGNOSIS]]
 
 
 def named_from(least: float, marks: Iterable[Mark]) -> list[Mark]:
@@ -51,8 +57,9 @@ def _named_from(least: float, found: Mark) -> Mark:
 
 def page(marks: Sequence[Mark]) -> str:
     """The table as Markdown."""
-    held = [(f"{least:.0%}", named_from(least, marks)) for least in LEAST_PROBABILITIES]
-    figures = [BY_KEY[key] for key in KEYS]
+    tables = {f"{least:.0%}": _figures(named_from(least, marks)) for least in LEAST_PROBABILITIES}
+    tables["as it does"] = _figures(marks)
+    wanted = tables["as it does"]
     lines = [
         "# How sure a name has to be",
         "",
@@ -61,19 +68,20 @@ def page(marks: Sequence[Mark]) -> str:
         "threshold beside an unknown and beside other names (`fogml/gap/confidence.py`). What is likely and "
         "not named is told as suspected.",
         "",
-        f"| named from | {' | '.join(figure.words for figure in figures)} |",
-        f"|---|{'---:|' * len(figures)}",
-        f"| wanted | {' | '.join(wanted_text(_wanted(key)) for key in KEYS)} |",
+        f"| named from | {' | '.join(row['words'] for row in wanted)} |",
+        f"|---|{'---:|' * len(wanted)}",
+        f"| wanted | {' | '.join(map(wanted_text, wanted))} |",
     ]
-    for words, cases in (*held, ("as it does", marks)):
-        values = [value_text(f.measure(f.chosen(cases)).value, f.format) for f in figures]
+    for words, figures in tables.items():
+        values = [value_text(row["value"], row["format"]) for row in figures]
         lines.append(f"| {words} | {' | '.join(values)} |")
     return "\n".join(lines) + "\n"
 
 
-def _wanted(key: str) -> dict[str, object]:
-    figure = BY_KEY[key]
-    return {"wanted": {"low": figure.low, "high": figure.high}, "format": figure.format}
+def _figures(marks: Sequence[Mark]) -> list[dict[str, Any]]:
+    """The score's rows of the figures on names."""
+    table = {row["key"]: row for row in rows(marks)}
+    return [table[key] for key in KEYS]
 
 
 if __name__ == "__main__":

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 
 import pytest
 
 from experiments.gap_blind import strictness
-from fogml.gap.blind.folders import DIAGNOSIS
 from fogml.gap.blind.scoring.marks import Judged, Mark, mark, renamed
-from fogml.gap.blind.scoring.marks_file import read_marks
 from fogml.gap.blind.scoring.table import rows
 from fogml.gap.blind.truth import Kind
 from tests.gap.blind.test_marks import answer, truth
@@ -52,9 +49,7 @@ def test_a_failed_case_stays_a_failure() -> None:
 
 def test_kept_marks_stand_as_they_were_judged() -> None:
     """Judged anew by the names they have, every kept case comes out as it was scored."""
-    seed = json.loads((strictness.HERE / "score.json").read_text(encoding="utf-8"))["seed"]
-    kept = [read_marks(path) for path in sorted(strictness.HERE.glob("marks-*.json.gz"))]
-    marks = [one for part in kept if part.seed == seed for one in part.methods[DIAGNOSIS]]
+    marks = strictness.kept_marks()
     again = [one if one.failure else renamed(one, one.items) for one in marks]
     assert again == [replace(one, suspected=()) if not one.failure else one for one in marks]
 
