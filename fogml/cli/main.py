@@ -89,7 +89,9 @@ class LazyGroup(TyperGroup):
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")
         except KeyboardInterrupt:
-            typer.echo("fogml: interrupted; nothing was written", err=True)
+            # Jobs of many units keep those that were finished, and go on from there.
+            told = "what is finished is kept, nothing is half written; run the same command again"
+            typer.echo(f"fogml: interrupted: {told}", err=True)
             raise typer.Exit(INTERRUPTED) from None
 
 

@@ -85,6 +85,7 @@ def test_an_interrupt_leaves_nothing(run_files, tmp_path):
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert "Traceback" not in errors
+    assert "interrupted: what is finished is kept, nothing is half written" in errors
     assert not (tmp_path / "out").exists()
     assert not list(tmp_path.glob(".partial-*"))
 
