@@ -56,15 +56,15 @@ class OpenSet(NamedTuple):
     """Area under the curve; share of cases without an unknown over the threshold that 95 % of them reach."""
 
 
-def shown(effects: Sequence[Row], figure: Figure) -> Share | None:
-    """Cases in which the data show every effect that counts; in which the answer has them all.
+def shown(effects: Sequence[Row], figure: Figure, nats: float = SHOWN_NATS) -> Share | None:
+    """Cases in which the data show every effect that counts with so many nats; in which the answer has all.
 
     None where there is no such case.
     """
     counted = list(_cases([r for r in effects if r["known"] == figure.known], figure).values())
     if not counted:
         return None
-    allowed = np.mean([all(row["gain"] >= SHOWN_NATS for row in rows) for rows in counted])
+    allowed = np.mean([all(row["gain"] >= nats for row in rows) for rows in counted])
     has = [all(r["named"] and not (figure.alone and r["wrong_beside"]) for r in rows) for rows in counted]
     return Share(len(counted), float(allowed), float(np.mean(has)))
 

@@ -1,7 +1,7 @@
 """Every wanted figure of the final seed in one table: reached, allowed by the data, reached by baselines.
 
 ``python -m experiments.gap_blind.results`` writes ``results.md`` from ``score.json`` and what
-``limits.py`` and ``forms.py`` measured of the same seed.
+``limits.py``, ``forms.py`` and ``one_or_unknown.py`` measured of the same seed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from experiments.gap_blind.one_or_unknown import sentence
 from experiments.gap_blind.per_case import HERE, of_seed, write_page
 from experiments.gap_blind.reach import (
     MISSED_FORMS,
@@ -37,8 +38,10 @@ Row = Mapping[str, Any]
 def main() -> None:
     """Write the table of the seed whose score is kept."""
     values = json.loads((HERE / "score.json").read_text(encoding="utf-8"))
-    limits, forms = (of_seed(name, values["seed"]) for name in ("limits", "forms"))
-    write_page("results", _page(values, limits, [row for case in forms for row in case]))
+    measured = ("limits", "forms", "one_or_unknown")
+    limits, forms, alone = (of_seed(name, values["seed"]) for name in measured)
+    page = _page(values, limits, [row for case in forms for row in case], [row for row in alone if row])
+    write_page("results", page)
 
 
 def allowed(cases: Sequence[Row]) -> dict[str, float]:
@@ -73,7 +76,9 @@ def _effects_and_wrong(cases: Sequence[Row]) -> tuple[list[dict[str, Any]], list
     return effects, [case["wrong"] for case in cases if case["wrong"] is not None]
 
 
-def _page(values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]]) -> str:
+def _page(
+    values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]], alone: Sequence[Row] = ()
+) -> str:
     tables = {m: {row["key"]: row for row in held["rows"]} for m, held in values["methods"].items()}
     within = allowed(cases)
     if ORACLE in tables:
@@ -97,6 +102,7 @@ def _page(values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]]) ->
         *(_line(row, within.get(row["key"]), rivals) for row in wanted),
         "",
         _forms_unknown(cases, forms),
+        *(["", sentence(alone)] if alone else []),
     ]
     return "\n".join(lines) + "\n"
 

@@ -38,9 +38,14 @@ def main() -> None:
     write_page("strictness", page(kept_marks()))
 
 
+def kept_seed() -> int:
+    """The seed whose score is kept."""
+    return int(json.loads((HERE / "score.json").read_text(encoding="utf-8"))["seed"])
+
+
 def kept_marks() -> list[Mark]:
     """How the diagnosis's answers were judged, of every part of the seed whose score is kept."""
-    seed = json.loads((HERE / "score.json").read_text(encoding="utf-8"))["seed"]
+    seed = kept_seed()
     files = [read_marks(path) for path in sorted(HERE.glob("marks-*.json.gz"))]
     return [found for file in files if file.seed == seed for found in file.methods[DIAGNOSIS]]
 
