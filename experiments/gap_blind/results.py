@@ -1,16 +1,16 @@
 """Every wanted figure of the final seed in one table: reached, allowed by the data, reached by baselines.
 
 ``python -m experiments.gap_blind.results`` writes ``results.md`` from ``score.json`` and what
-``limits.py``, ``forms.py`` and ``one_or_unknown.py`` measured of the same seed.
+``limits.py``, ``forms.py``, ``one_or_unknown.py`` and ``beside_unknown.py`` measured of the same seed.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from experiments.gap_blind.one_or_unknown import sentence
+from experiments.gap_blind import beside_unknown, one_or_unknown
 from experiments.gap_blind.per_case import HERE, of_seed, write_page
 from experiments.gap_blind.reach import (
     MISSED_FORMS,
@@ -27,6 +27,7 @@ from experiments.gap_blind.reach import (
 from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.words import MISSING, plural
 
+MEASURED = ("limits", "forms", "one_or_unknown", "beside_unknown")
 DIAGNOSIS, ORACLE = "diagnosis", "oracle"
 NO_RIVALS = (DIAGNOSIS, ORACLE, "abstain", "gp-discrepancy")
 """Methods that are no rival in naming: what is judged, what knows the truth, and what names nothing."""
@@ -38,10 +39,12 @@ Row = Mapping[str, Any]
 def main() -> None:
     """Write the table of the seed whose score is kept."""
     values = json.loads((HERE / "score.json").read_text(encoding="utf-8"))
-    measured = ("limits", "forms", "one_or_unknown")
-    limits, forms, alone = (of_seed(name, values["seed"]) for name in measured)
-    page = _page(values, limits, [row for case in forms for row in case], [row for row in alone if row])
-    write_page("results", page)
+    limits, forms, alone, beside = (of_seed(name, values["seed"]) for name in MEASURED)
+    told = (
+        one_or_unknown.sentence([row for row in alone if row]),
+        beside_unknown.sentence([row for case in beside for row in case], limits),
+    )
+    write_page("results", _page(values, limits, [row for case in forms for row in case], told))
 
 
 def allowed(cases: Sequence[Row]) -> dict[str, float]:
@@ -77,7 +80,7 @@ def _effects_and_wrong(cases: Sequence[Row]) -> tuple[list[dict[str, Any]], list
 
 
 def _page(
-    values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]], alone: Sequence[Row] = ()
+    values: Row, cases: Sequence[Row], forms: Sequence[dict[str, Any]], told: Iterable[str] = ()
 ) -> str:
     tables = {m: {row["key"]: row for row in held["rows"]} for m, held in values["methods"].items()}
     within = allowed(cases)
@@ -102,7 +105,7 @@ def _page(
         *(_line(row, within.get(row["key"]), rivals) for row in wanted),
         "",
         _forms_unknown(cases, forms),
-        *(["", sentence(alone)] if alone else []),
+        *(line for sentence in told for line in ("", sentence)),
     ]
     return "\n".join(lines) + "\n"
 
