@@ -10,7 +10,7 @@ whose effect has its true form and an amplitude about as large as it is, beside 
 errors of ordinary sensors, under the true noise. From `SHOWN_NATS` on one may name it, as in `limits`.
 
 ``python -m experiments.gap_blind.beside_unknown DIR/PART`` writes ``beside_unknown-PART.json`` beside
-itself, and ``beside_unknown.md`` of every part of the seed that was measured.
+itself, and ``beside_unknown.md`` of every part of the seed that `limits` measured as well.
 """
 
 from __future__ import annotations
@@ -24,11 +24,9 @@ import numpy as np
 
 from experiments.gap_blind.limits import GAIN_EDGES
 from experiments.gap_blind.per_case import measure_cases, of_seed, true_frame, write_page
-from experiments.gap_blind.reach import SHOWN_NATS, Figure, shown
-from experiments.gap_blind.strictness import kept_marks, kept_seed, named_from
+from experiments.gap_blind.reach import SHOWN_NATS
 from fogml.gap.basis import build_basis
 from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.scoring.table import BY_KEY
 from fogml.gap.blind.truth import read_contributions, read_truth
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.events import event_groups
@@ -36,19 +34,18 @@ from fogml.gap.evidence import Field, Term, log_sum_exp
 from fogml.gap.near_library import near_library
 from fogml.gap.priors import LENGTH_WEIGHTS
 from fogml.gap.twin_model import TwinModel
+from fogml.report.words import MISSING
 from fogml.twin.twin_file import load_twin
 
-KIND, KEY = "unknown_and_known", "mixed_known_kept"
-BOTH = Figure("", (KIND,), 0.0, alone=False)
-LEAST = 0.5
-"""Probability from which a name would be given at the earliest."""
+KIND = "unknown_and_known"
 Row = dict[str, Any]
 
 
 def main() -> None:
     """Measure every case, write the page."""
-    found = measure_cases("beside_unknown", _measured, __doc__, "a suite, or a part of one")
-    write_page("beside_unknown", _page([row for own in found for row in own], of_seed("limits", kept_seed())))
+    seed, found = measure_cases("beside_unknown", _measured, __doc__, "an answered suite, or a part of one")
+    rows = [row for own in found for row in own]
+    write_page("beside_unknown", _page(rows, of_seed("limits", seed)))
 
 
 def _measured(folder: BlindFolder, name: str) -> list[Row]:
@@ -84,30 +81,31 @@ def _with_unknown(field: Field, terms: Sequence[Term]) -> float:
 
 def sentence(rows: Sequence[Row], limits: Sequence[Row]) -> str:
     """What of known effects beside unknown ones is within reach, with the unknown's form and without."""
-    true_forms = shown([row | {"mix": True} for case in limits for row in case["effects"]], BOTH)
-    marks, figure = kept_marks(), BY_KEY[KEY]
-    answers = (marks, named_from(LEAST, marks))
-    kept, at_most = (figure.measure(figure.chosen(held)).value for held in answers)
-    share = np.mean([row["gain"] >= SHOWN_NATS for row in rows])
-    assert true_forms is not None and kept is not None and at_most is not None
+    both = _both(rows, limits)
+    if not both:
+        return ""
+    true, blind = (np.mean([row[which] >= SHOWN_NATS for row in both]) for which in (0, 1))
+    kept = np.mean([row[2] for row in both])
     return (
-        f"Of {len(rows)} known effects beside an unknown one, {true_forms.allowed:.1%} add {SHOWN_NATS:g} "
-        f"nats or more beside the unknown's true form, {share:.1%} beside what an unknown may be; {kept:.1%} "
-        f"are kept, {at_most:.1%} if every name of {LEAST:.0%} were given (`beside_unknown.md`)."
+        f"Of {len(both)} known effects beside an unknown one, {true:.1%} add {SHOWN_NATS:g} nats or more "
+        f"beside the unknown's true form, {blind:.1%} beside what an unknown may be; {kept:.1%} are kept "
+        "(`beside_unknown.md`)."
     )
 
 
+def _both(rows: Sequence[Row], limits: Sequence[Row]) -> list[tuple[float, float, bool]]:
+    """What each effect adds beside the true unknown and beside what may act, and whether it was named."""
+    held = {(r["case"], r["effect"]): r for case in limits for r in case["effects"] if r["kind"] == KIND}
+    found = [(held.get((row["case"], row["effect"])), row["gain"]) for row in rows]
+    return [(row["gain"], gain, row["named"]) for row, gain in found if row is not None]
+
+
 def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
-    held = {
-        (row["case"], row["effect"]): row
-        for case in limits
-        for row in case["effects"]
-        if row["kind"] == KIND and row["known"]
-    }
+    both = _both(rows, limits)
     lines = [
         "# A known effect beside an unknown one",
         "",
-        f"Synthetic cases of the second reality with a known effect and an unknown one, {len(rows)} in all. "
+        f"Synthetic cases of the second reality with a known effect and an unknown one, {len(both)} in all. "
         "What the known effect's true form adds to the evidence of the runs: beside the true form of the "
         "unknown, as one has it who knows everything (`limits.md`), and beside the diagnosis's dictionary of "
         "the unknown, as one has it who knows the effect's true form alone.",
@@ -118,15 +116,13 @@ def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
         "of them kept |",
         "|---|---:|---:|---:|---:|",
     ]
-    true = [(found["gain"], found["named"]) for found in held.values()]
-    blind = [(row["gain"], held[row["case"], row["effect"]]["named"]) for row in rows]
     for low, high in pairwise(GAIN_EDGES):
         label = f"under {high:g}" if low == -np.inf else f"{low:g} to {high:g}"
         label = f"over {low:g}" if high == np.inf else label
         cells = []
-        for found in (true, blind):
-            named = [kept for gain, kept in found if low <= gain < high]
-            cells += [str(len(named)), f"{np.mean(named):.0%}" if named else "–"]
+        for which in (0, 1):
+            kept = [row[2] for row in both if low <= row[which] < high]
+            cells += [str(len(kept)), f"{np.mean(kept):.0%}" if kept else MISSING]
         lines.append(f"| {label} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"
 

@@ -72,7 +72,7 @@ GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
 
 def main() -> None:
     """Measure every case that the diagnosis answered; write the tables."""
-    found = measure_cases("limits", _measured, __doc__, "an answered suite, or a part of one")
+    found = measure_cases("limits", _measured, __doc__, "an answered suite, or a part of one").cases
     effects = [row | {"mix": case["asked"]["mix"]} for case in found for row in case["effects"]]
     wrong = [case["wrong"] for case in found if case["wrong"] is not None]
     write_page("limits", _page(effects, wrong, [case["asked"] for case in found]))

@@ -32,10 +32,11 @@ import numpy as np
 from experiments.gap_blind.catalogue_fit import CatalogueFit
 from experiments.gap_blind.per_case import HERE, measure_cases, of_seed, true_frame, write_page
 from experiments.gap_blind.reach import SHOWN_NATS, STRONG, UNKNOWNS, Figure, shown
-from experiments.gap_blind.strictness import LEAST_PROBABILITIES, kept_marks, kept_seed, named_from
+from experiments.gap_blind.strictness import LEAST_PROBABILITIES, marks_of, named_from
 from experiments.gap_blind.trade import FIRST_WANTED, WRONG_WANTED, Row, best_trade, missed
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import relatives_of
+from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.scoring.table import BY_KEY
 from fogml.gap.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.classes import SAME_CLASS_NATS
@@ -55,11 +56,11 @@ TWO = Figure("", ("two",), 0.0)
 
 def main() -> None:
     """Measure every case, write the page."""
-    found = measure_cases("one_or_unknown", _measured, __doc__, "a suite, or a part of one")
-    rows = [row for row in found if row is not None]
+    seed, found = measure_cases("one_or_unknown", _measured, __doc__, "a suite, or a part of one")
+    rows, marks = [row for row in found if row is not None], marks_of(seed)
     with whole_file(HERE / "one_or_unknown.svg") as partial:
-        partial.write_text(_figure(rows) + "\n", encoding="utf-8")
-    write_page("one_or_unknown", _page(rows, of_seed("limits", kept_seed())))
+        partial.write_text(_figure(rows, marks) + "\n", encoding="utf-8")
+    write_page("one_or_unknown", _page(rows, of_seed("limits", seed), marks))
 
 
 def _measured(folder: BlindFolder, name: str) -> Row | None:
@@ -100,9 +101,10 @@ def sets(fit: CatalogueFit, truth: Truth, relative: Callable[[str], bool] | None
     }
 
 
-def _diagnosis() -> dict[str, tuple[float, float]]:
+def _diagnosis(marks: Sequence[Mark]) -> dict[str, tuple[float, float]]:
     """Wrong names and first names of the diagnosis at several thresholds of a name, and as it is."""
-    marks = kept_marks()
+    if not marks:
+        return {}
     tables = {f"{least:.0%}": named_from(least, marks) for least in LEAST_PROBABILITIES}
 
     def value(key: str, held: Sequence[Any]) -> float:
@@ -129,7 +131,7 @@ def sentence(rows: Sequence[Row]) -> str:
     )
 
 
-def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
+def _page(rows: Sequence[Row], limits: Sequence[Row], marks: Sequence[Mark]) -> str:
     ones = sum(row["kind"] == "one" for row in rows)
     lines = [
         "# One effect of the catalogue, or something unknown",
@@ -147,7 +149,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
         "",
         *_by_second(rows, limits),
         "",
-        *_beside_diagnosis(rows),
+        *_beside_diagnosis(rows, marks),
         "",
         *_missed(rows),
     ]
@@ -175,7 +177,7 @@ def _by_second(rows: Sequence[Row], limits: Sequence[Row]) -> Iterable[str]:
         yield f"| {_words(second)} | {g:g} | {named:.1%} | {wrong:.1%} | {reach} |"
 
 
-def _beside_diagnosis(rows: Sequence[Row]) -> Iterable[str]:
+def _beside_diagnosis(rows: Sequence[Row], marks: Sequence[Mark]) -> Iterable[str]:
     yield "## The diagnosis beside it"
     yield ""
     yield (
@@ -186,7 +188,7 @@ def _beside_diagnosis(rows: Sequence[Row]) -> Iterable[str]:
     yield f"| the diagnosis names from | wrong names | it names | {' | '.join(map(_oracle, DRAWN))} |"
     yield f"|---|---:|---:|{'---:|' * len(DRAWN)}"
     best = [best_trade(rows, second)[1] for second in DRAWN]
-    for words, (wrong, first) in _diagnosis().items():
+    for words, (wrong, first) in _diagnosis(marks).items():
         theirs = " | ".join(f"{held.first_at(wrong):.1%}" for held in best)
         yield f"| {words} | {wrong:.1%} | {first:.1%} | {theirs} |"
 
@@ -214,7 +216,7 @@ def _oracle(second: float) -> str:
     )
 
 
-def _figure(rows: Sequence[Row]) -> str:
+def _figure(rows: Sequence[Row], marks: Sequence[Mark]) -> str:
     curves = []
     for second, colour, dash, words in zip(DRAWN, SERIES, ("", "6 3"), ("one or two names", "never two")):
         _, held = best_trade(rows, second)
@@ -222,9 +224,10 @@ def _figure(rows: Sequence[Row]) -> str:
         curves.append(
             Curve(100 * held.wrong[near], 100 * held.first[near], colour, dash, label=f"oracle, {words}")
         )
-    points = sorted(value for words, value in _diagnosis().items() if words != "as it does")
-    wrong, first = (100.0 * np.array([point[i] for point in points]) for i in (0, 1))
-    curves.append(Curve(wrong, first, SERIES[2], "1 2", label="diagnosis, by threshold", dots=True))
+    points = sorted(value for words, value in _diagnosis(marks).items() if words != "as it does")
+    if points:
+        wrong, first = (100.0 * np.array([point[i] for point in points]) for i in (0, 1))
+        curves.append(Curve(wrong, first, SERIES[2], "1 2", label="diagnosis, by threshold", dots=True))
     wanted = (np.array([100.0 * WRONG_WANTED]), np.array([100.0 * FIRST_WANTED]))
     curves.append(Curve(*wanted, SERIES[6], label="wanted", dots=True))
     return str(

@@ -6,7 +6,7 @@ import argparse
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from joblib import Parallel, delayed
 
@@ -22,9 +22,16 @@ from fogml.runs.reading import read_run
 HERE = Path(__file__).parent
 
 
+class Measured(NamedTuple):
+    """What was measured of each case of a seed, of every part that was."""
+
+    seed: int
+    cases: list[Any]
+
+
 def measure_cases(
     name: str, measured: Callable[[BlindFolder, str], Any], words: str | None, suite: str
-) -> list[Any]:
+) -> Measured:
     """What `measured` finds of each case of a suite, and what was found of other parts of its seed before.
 
     A part's findings are kept beside the experiments as ``name-FOLDER.json``.
@@ -49,7 +56,7 @@ def measure_cases(
     found = list(Parallel(n_jobs=given.workers)(delayed(measured)(folder, case) for case in names))
     seed = read_truth(folder.truth / f"{names[0]}.json").seed
     _keep(name, folder.path.resolve().name, {"seed": seed, "cases": found})
-    return of_seed(name, seed)
+    return Measured(seed, of_seed(name, seed))
 
 
 def _keep(name: str, part: str, content: Any) -> None:

@@ -35,7 +35,7 @@ KEYS = (
 
 def main() -> None:
     """Write the table of the seed whose score is kept."""
-    write_page("strictness", page(kept_marks()))
+    write_page("strictness", page(marks_of(kept_seed())))
 
 
 def kept_seed() -> int:
@@ -43,9 +43,8 @@ def kept_seed() -> int:
     return int(json.loads((HERE / "score.json").read_text(encoding="utf-8"))["seed"])
 
 
-def kept_marks() -> list[Mark]:
-    """How the diagnosis's answers were judged, of every part of the seed whose score is kept."""
-    seed = kept_seed()
+def marks_of(seed: int) -> list[Mark]:
+    """How the diagnosis's answers were judged, of every part of a seed that is kept; none of others."""
     files = [read_marks(path) for path in sorted(HERE.glob("marks-*.json.gz"))]
     return [found for file in files if file.seed == seed for found in file.methods[DIAGNOSIS]]
 

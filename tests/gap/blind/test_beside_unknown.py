@@ -9,7 +9,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
 
-from experiments.gap_blind import beside_unknown, per_case
+from experiments.gap_blind import beside_unknown, per_case, strictness
 from fogml.gap.basis import build_basis
 from fogml.gap.evidence import Field, Term
 from fogml.gap.group import Group
@@ -52,7 +52,7 @@ def test_the_gain_is_that_of_normal_densities(frame) -> None:
 
 
 def test_the_kept_page_is_of_the_kept_measurements() -> None:
-    seed = beside_unknown.kept_seed()
+    seed = strictness.kept_seed()
     rows = [row for case in per_case.of_seed("beside_unknown", seed) for row in case]
     page = (per_case.HERE / "beside_unknown.md").read_text(encoding="utf-8")
     told = beside_unknown.sentence(rows, per_case.of_seed("limits", seed))

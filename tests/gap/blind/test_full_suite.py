@@ -106,7 +106,8 @@ def test_what_is_measured_of_a_part_joins_the_other_parts_of_its_seed(
     for part, seed, first in (("mix", 3, 1), ("one", 3, 2001), ("old", 4, 1)):
         make_cases(tmp_path / part, 1, seed, sample_s=30.0, workers=1, kinds=["nothing"], first=first)
         monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / part), "--workers", "1"])
-        found = per_case.measure_cases("limits", lambda folder, case: [case], "", "")
+        found = per_case.measure_cases("limits", lambda folder, case: [case], "", "").cases
     assert found == [["0001"]]
     monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / "one"), "--workers", "1"])
-    assert per_case.measure_cases("limits", lambda folder, case: [case], "", "") == [["0001"], ["2001"]]
+    last = per_case.measure_cases("limits", lambda folder, case: [case], "", "")
+    assert last.cases == [["0001"], ["2001"]]

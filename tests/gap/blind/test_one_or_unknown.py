@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from experiments.gap_blind import one_or_unknown, per_case
+from experiments.gap_blind import one_or_unknown, per_case, strictness
 from experiments.gap_blind.catalogue_fit import CatalogueFit, Pair
 from experiments.gap_blind.trade import COUNTED_AS_NAMED, best_trade, missed, trade
 from fogml.gap.candidate_columns import candidate_columns
@@ -151,7 +151,7 @@ def test_a_name_counts_where_it_is_right_or_wrong(kind, id, singles, pair, count
 
 
 def test_the_kept_page_is_of_the_kept_measurements() -> None:
-    seed = one_or_unknown.kept_seed()
+    seed = strictness.kept_seed()
     rows = [found for found in per_case.of_seed("one_or_unknown", seed) if found is not None]
     page = (per_case.HERE / "one_or_unknown.md").read_text(encoding="utf-8")
     assert one_or_unknown.sentence(rows) in page

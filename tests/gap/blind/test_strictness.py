@@ -49,7 +49,7 @@ def test_a_failed_case_stays_a_failure() -> None:
 
 def test_kept_marks_stand_as_they_were_judged() -> None:
     """Judged anew by the names they have, every kept case comes out as it was scored."""
-    marks = strictness.kept_marks()
+    marks = strictness.marks_of(strictness.kept_seed())
     again = [one if one.failure else renamed(one, one.items) for one in marks]
     assert again == [replace(one, suspected=()) if not one.failure else one for one in marks]
 
