@@ -103,8 +103,6 @@ def sets(fit: CatalogueFit, truth: Truth, relative: Callable[[str], bool] | None
 
 def _diagnosis(marks: Sequence[Mark]) -> dict[str, tuple[float, float]]:
     """Wrong names and first names of the diagnosis at several thresholds of a name, and as it is."""
-    if not marks:
-        return {}
     tables = {f"{least:.0%}": named_from(least, marks) for least in LEAST_PROBABILITIES}
 
     def value(key: str, held: Sequence[Any]) -> float:
@@ -119,6 +117,8 @@ def _diagnosis(marks: Sequence[Mark]) -> dict[str, tuple[float, float]]:
 
 def sentence(rows: Sequence[Row]) -> str:
     """What one reaches who has the catalogue's forms and no noise, of the two wanted figures together."""
+    if len({row["kind"] == "one" for row in rows}) < 2:
+        return "Only cases of both kinds, single effects and unknowns, say how far the two are told apart."
     best = [best_trade(rows, second)[1] for second in DRAWN]
     named, named_alone = (held.first_at(WRONG_WANTED) for held in best)
     wrong, wrong_alone = (held.wrong_at(FIRST_WANTED) for held in best)
@@ -149,8 +149,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row], marks: Sequence[Mark]) -> 
         "",
         *_by_second(rows, limits),
         "",
-        *_beside_diagnosis(rows, marks),
-        "",
+        *([*_beside_diagnosis(rows, marks), ""] if marks else []),
         *_missed(rows),
     ]
     return "\n".join(lines) + "\n"
@@ -221,11 +220,11 @@ def _figure(rows: Sequence[Row], marks: Sequence[Mark]) -> str:
     for second, colour, dash, words in zip(DRAWN, SERIES, ("", "6 3"), ("one or two names", "never two")):
         _, held = best_trade(rows, second)
         near = (held.wrong <= MOST_SHOWN) & (held.first >= LEAST_SHOWN)
-        curves.append(
-            Curve(100 * held.wrong[near], 100 * held.first[near], colour, dash, label=f"oracle, {words}")
-        )
-    points = sorted(value for words, value in _diagnosis(marks).items() if words != "as it does")
-    if points:
+        if near.any():
+            shares = 100 * held.wrong[near], 100 * held.first[near]
+            curves.append(Curve(*shares, colour, dash, label=f"oracle, {words}"))
+    if marks:
+        points = sorted(value for words, value in _diagnosis(marks).items() if words != "as it does")
         wrong, first = (100.0 * np.array([point[i] for point in points]) for i in (0, 1))
         curves.append(Curve(wrong, first, SERIES[2], "1 2", label="diagnosis, by threshold", dots=True))
     wanted = (np.array([100.0 * WRONG_WANTED]), np.array([100.0 * FIRST_WANTED]))

@@ -159,3 +159,10 @@ def test_the_kept_page_is_of_the_kept_measurements() -> None:
     values = json.loads((per_case.HERE / "score.json").read_text(encoding="utf-8"))
     counted = {held["key"]: held["n"] for held in values["methods"]["diagnosis"]["rows"]}
     assert (ones, len(rows) - ones) == (counted["one_top"], counted["unknown_wrong_name"])
+
+
+@pytest.mark.parametrize("kept", [[], ROWS[:4], ROWS[4:]])
+def test_cases_of_one_kind_alone_are_told_to_say_nothing(kept) -> None:
+    page = one_or_unknown._page(kept, [], [])
+    assert "Only cases of both kinds" in page and "The diagnosis beside it" not in page
+    assert "wanted" in one_or_unknown._figure(kept, [])
