@@ -17,17 +17,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from experiments.gap_blind.limits import GAIN_EDGES
-from experiments.gap_blind.per_case import measure_cases, of_seed, true_frame, write_page
+from experiments.gap_blind.limits import gain_bins
+from experiments.gap_blind.per_case import measure_cases, of_seed, true_forms, true_frame, write_page
 from experiments.gap_blind.reach import SHOWN_NATS
 from fogml.gap.basis import build_basis
 from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.truth import read_contributions, read_truth
+from fogml.gap.blind.truth import read_truth
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field, Term, log_sum_exp
@@ -58,14 +57,12 @@ def _measured(folder: BlindFolder, name: str) -> list[Row]:
     near = near_library(frame.observations, model.candidates(), frame.values, model.grade)
     groups = (*unknown_groups(frame.observations), *near, *event_groups(frame))
     field = Field(build_basis(frame, {}, groups, model.grade))
-    given = read_contributions(folder.truth / f"{name}.npz")
     rows = []
-    for i, effect in enumerate(truth.effects):
+    for effect, white in zip(truth.effects, true_forms(folder, truth, frame).T):
         if effect not in truth.known:
             continue
-        white = frame.white([o.averaged(given[o.run.name, i])[:, None] for o in frame.observations])
         # An amplitude about as large as it is.
-        form = Term(field.append(white), 1.0)
+        form = Term(field.append(white[:, None]), 1.0)
         gain = _with_unknown(field, [form]) - _with_unknown(field, [])
         rows.append({"case": name, "effect": effect.name, "gain": round(gain, 4)})
     return rows
@@ -116,9 +113,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
         "of them kept |",
         "|---|---:|---:|---:|---:|",
     ]
-    for low, high in pairwise(GAIN_EDGES):
-        label = f"under {high:g}" if low == -np.inf else f"{low:g} to {high:g}"
-        label = f"over {low:g}" if high == np.inf else label
+    for label, low, high in gain_bins():
         cells = []
         for which in (0, 1):
             kept = [row[2] for row in both if low <= row[which] < high]

@@ -68,20 +68,19 @@ class CatalogueFit:
         self._gram, self._fits = columns.T @ columns, columns.T @ signal
         self.energy = 0.5 * float(signal @ signal)
         self._gains = [self._gain(k, self._gram, self._fits) for k in range(len(self._nodes))]
+        ranked = sorted(range(len(self._nodes)), key=self._gains.__getitem__)
+        self._best = {self._nodes[k].candidate: k for k in ranked}
 
     def singles(self) -> dict[str, float]:
         """What each candidate leaves alone [nats]."""
-        left: dict[str, float] = {}
-        for node, gain in zip(self._nodes, self._gains):
-            left[node.candidate] = min(self.energy - gain, left.get(node.candidate, math.inf))
-        return left
+        return {id: self.energy - self._gains[k] for id, k in self._best.items()}
 
     def pair(self) -> Pair | None:
         """The two candidates that leave the least together; None where there are no two."""
         best: Pair | None = None
         singles = self.singles()
         for id in sorted(singles, key=singles.__getitem__)[:FIRSTS]:
-            k = self._best(id, self._gains)
+            k = self._best[id]
             for _ in range(2):
                 # The second one beside the first, then the first one beside that.
                 beside = self._beside(k)
@@ -97,10 +96,6 @@ class CatalogueFit:
                     best = Pair((self._nodes[k].candidate, self._nodes[j].candidate), left)
                 k = j
         return best
-
-    def _best(self, id: str, gains: list[float]) -> int:
-        own = [k for k, node in enumerate(self._nodes) if node.candidate == id]
-        return max(own, key=gains.__getitem__)
 
     def _beside(self, k: int) -> tuple[FloatArray, FloatArray]:
         """Inner products of everything beside a node's columns."""

@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from experiments.gap_blind.per_case import measure_cases, true_frame, write_page
+from experiments.gap_blind.per_case import measure_cases, true_forms, true_frame, write_page
 from fogml.gap.blind.folders import BlindFolder
-from fogml.gap.blind.truth import read_contributions, read_truth
+from fogml.gap.blind.truth import read_truth
 from fogml.gap.candidate_columns import candidate_columns
 from fogml.gap.screening import Screening
 from fogml.gap.twin_model import TwinModel
@@ -53,14 +53,13 @@ def _measured(folder: BlindFolder, name: str) -> list[Row]:
     ]
     if not counted:
         return []
-    given = read_contributions(folder.truth / f"{name}.npz")
     frame = true_frame(folder, truth, model)
+    true_form = frame.without_constants(true_forms(folder, truth, frame))
     screening = Screening(frame, [])
     rows = []
     for i in counted:
         effect = truth.effects[i]
-        stacked = frame.white([o.averaged(given[o.run.name, i])[:, None] for o in frame.observations])
-        true = frame.without_constants(stacked[:, 0])
+        true = true_form[:, i]
         least = whole = float(true @ true)
         for _, columns in candidate_columns(candidates[effect.id], frame, model.grade, screening):
             own = frame.without_constants(columns)

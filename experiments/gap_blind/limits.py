@@ -17,18 +17,19 @@ beside itself, and ``limits.md`` of every part of the seed that was measured.
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
 
-from experiments.gap_blind.per_case import measure_cases, true_frame, write_page
+from experiments.gap_blind.per_case import measure_cases, true_forms, true_frame, write_page
 from experiments.gap_blind.reach import (
     SHOWN_NATS,
     STRONG,
     UNKNOWNS,
     Figure,
     Row,
+    effects_and_wrong,
     false_names,
     open_set_reach,
     shown,
@@ -73,9 +74,7 @@ GROUPS = ("a wrong name", "an effect missed, nothing wrong named")
 def main() -> None:
     """Measure every case that the diagnosis answered; write the tables."""
     found = measure_cases("limits", _measured, __doc__, "an answered suite, or a part of one").cases
-    effects = [row | {"mix": case["asked"]["mix"]} for case in found for row in case["effects"]]
-    wrong = [case["wrong"] for case in found if case["wrong"] is not None]
-    write_page("limits", _page(effects, wrong, [case["asked"] for case in found]))
+    write_page("limits", _page(*effects_and_wrong(found), [case["asked"] for case in found]))
 
 
 def _measured(folder: BlindFolder, name: str) -> Row:
@@ -113,13 +112,8 @@ def _measured(folder: BlindFolder, name: str) -> Row:
 
 def _gains(folder: BlindFolder, truth: Truth) -> list[float]:
     """Evidence that each effect's true form adds beside the others [nats]."""
-    given = read_contributions(folder.truth / f"{truth.case}.npz")
     frame = true_frame(folder, truth, TwinModel(load_twin("nominal")))
-    rows = [
-        np.column_stack([o.averaged(given[o.run.name, i]) for i in range(len(truth.effects))])
-        for o in frame.observations
-    ]
-    forms = frame.white(rows)
+    forms = true_forms(folder, truth, frame)
     whole = _log_evidence(frame, forms)
     return [whole - _log_evidence(frame, np.delete(forms, i, axis=1)) for i in range(forms.shape[1])]
 
@@ -166,10 +160,8 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
         f"| gain in nats | effects | named | {' | '.join(KINDS)} |",
         "|---|---:|---:|" + "---:|" * len(KINDS),
     ]
-    for low, high in pairwise(GAIN_EDGES):
+    for label, low, high in gain_bins():
         inside = [row for row in effects if low <= row["gain"] < high]
-        label = f"under {high:g}" if low == -np.inf else f"{low:g} to {high:g}"
-        label = f"over {low:g}" if high == np.inf else label
         cells = [_share([row for row in inside if row["kind"] == kind]) for kind in KINDS]
         lines.append(f"| {label} | {len(inside)} | {_share(inside)} | {' | '.join(cells)} |")
     lines += [
@@ -227,6 +219,13 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
             f"{np.mean(nats < TELLING_NATS):.0%} | {np.mean(nats < SURE_NATS):.0%} |"
         )
     return "\n".join(lines) + "\n"
+
+
+def gain_bins() -> Iterator[tuple[str, float, float]]:
+    """Words for each range of a gain, and its ends [nats]."""
+    for low, high in pairwise(GAIN_EDGES):
+        words = f"under {high:g}" if low == -np.inf else f"{low:g} to {high:g}"
+        yield f"over {low:g}" if high == np.inf else words, low, high
 
 
 def _share(rows: Sequence[Row]) -> str:

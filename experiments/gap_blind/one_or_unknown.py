@@ -24,21 +24,19 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from experiments.gap_blind.catalogue_fit import CatalogueFit
-from experiments.gap_blind.per_case import HERE, measure_cases, of_seed, true_frame, write_page
-from experiments.gap_blind.reach import SHOWN_NATS, STRONG, UNKNOWNS, Figure, shown
-from experiments.gap_blind.strictness import LEAST_PROBABILITIES, marks_of, named_from
+from experiments.gap_blind.per_case import HERE, measure_cases, of_seed, true_forms, true_frame, write_page
+from experiments.gap_blind.reach import SHOWN_NATS, STRONG, UNKNOWNS, Figure, effects_and_wrong, shown
+from experiments.gap_blind.strictness import AS_IT_DOES, by_threshold, marks_of
 from experiments.gap_blind.trade import FIRST_WANTED, WRONG_WANTED, Row, best_trade, missed
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import relatives_of
-from fogml.gap.blind.scoring.marks import Mark
-from fogml.gap.blind.scoring.table import BY_KEY
-from fogml.gap.blind.truth import Truth, read_contributions, read_truth
+from fogml.gap.blind.truth import Truth, read_truth
 from fogml.gap.classes import SAME_CLASS_NATS
 from fogml.gap.twin_model import TwinModel
 from fogml.outputs import whole_file
@@ -52,15 +50,18 @@ SECOND_NATS = (SHOWN_NATS, 12.0, 16.0, 24.0, 40.0, math.inf)
 DRAWN = (SHOWN_NATS, math.inf)
 MOST_SHOWN, LEAST_SHOWN = 0.15, 0.85
 TWO = Figure("", ("two",), 0.0)
+Tables = Mapping[str, Mapping[str, Mapping[str, Any]]]
+"""What `by_threshold` gives; empty where the diagnosis's answers are not kept."""
 
 
 def main() -> None:
     """Measure every case, write the page."""
     seed, found = measure_cases("one_or_unknown", _measured, __doc__, "a suite, or a part of one")
     rows, marks = [row for row in found if row is not None], marks_of(seed)
+    diagnosis = by_threshold(marks) if marks else {}
     with whole_file(HERE / "one_or_unknown.svg") as partial:
-        partial.write_text(_figure(rows, marks) + "\n", encoding="utf-8")
-    write_page("one_or_unknown", _page(rows, of_seed("limits", seed), marks))
+        partial.write_text(_figure(rows, diagnosis) + "\n", encoding="utf-8")
+    write_page("one_or_unknown", _page(rows, of_seed("limits", seed), diagnosis))
 
 
 def _measured(folder: BlindFolder, name: str) -> Row | None:
@@ -70,10 +71,9 @@ def _measured(folder: BlindFolder, name: str) -> Row | None:
         return None
     (effect,) = truth.effects
     model = TwinModel(load_twin("nominal"), case_files(folder.cases / name).without)
-    given = read_contributions(folder.truth / f"{name}.npz")
     frame = true_frame(folder, truth, model)
-    stacked = frame.white([o.averaged(given[o.run.name, 0])[:, None] for o in frame.observations])
-    fit = CatalogueFit(frame, frame.without_constants(stacked[:, 0]), model.candidates(), model.grade)
+    signal = frame.without_constants(true_forms(folder, truth, frame)[:, 0])
+    fit = CatalogueFit(frame, signal, model.candidates(), model.grade)
     row = {"case": name, "kind": truth.kind, "effect": effect.name, "whole": round(fit.energy, 4)}
     return row | sets(fit, truth, relatives_of(folder, truth))
 
@@ -101,20 +101,6 @@ def sets(fit: CatalogueFit, truth: Truth, relative: Callable[[str], bool] | None
     }
 
 
-def _diagnosis(marks: Sequence[Mark]) -> dict[str, tuple[float, float]]:
-    """Wrong names and first names of the diagnosis at several thresholds of a name, and as it is."""
-    tables = {f"{least:.0%}": named_from(least, marks) for least in LEAST_PROBABILITIES}
-
-    def value(key: str, held: Sequence[Any]) -> float:
-        figure = BY_KEY[key]
-        return float(figure.measure(figure.chosen(held)).value or 0.0)
-
-    return {
-        words: (value("unknown_wrong_name", held), value("one_top", held))
-        for words, held in (tables | {"as it does": marks}).items()
-    }
-
-
 def sentence(rows: Sequence[Row]) -> str:
     """What one reaches who has the catalogue's forms and no noise, of the two wanted figures together."""
     if len({row["kind"] == "one" for row in rows}) < 2:
@@ -131,7 +117,7 @@ def sentence(rows: Sequence[Row]) -> str:
     )
 
 
-def _page(rows: Sequence[Row], limits: Sequence[Row], marks: Sequence[Mark]) -> str:
+def _page(rows: Sequence[Row], limits: Sequence[Row], diagnosis: Tables) -> str:
     ones = sum(row["kind"] == "one" for row in rows)
     lines = [
         "# One effect of the catalogue, or something unknown",
@@ -149,7 +135,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row], marks: Sequence[Mark]) -> 
         "",
         *_by_second(rows, limits),
         "",
-        *([*_beside_diagnosis(rows, marks), ""] if marks else []),
+        *([*_beside_diagnosis(rows, diagnosis), ""] if diagnosis else []),
         *_missed(rows),
     ]
     return "\n".join(lines) + "\n"
@@ -165,9 +151,9 @@ def _by_second(rows: Sequence[Row], limits: Sequence[Row]) -> Iterable[str]:
         f"those at {FIRST_WANTED:.0%} of effects named."
     )
     yield ""
-    yield "| second effect from | g | single effects named | wrong names | two effects within reach |"
+    yield "| second effect | g | single effects named | wrong names | two effects within reach |"
     yield "|---|---:|---:|---:|---:|"
-    effects = [row | {"mix": case["asked"]["mix"]} for case in limits for row in case["effects"]]
+    effects, _ = effects_and_wrong(limits)
     for second in SECOND_NATS:
         g, held = best_trade(rows, second)
         two = shown(effects, TWO, second) if math.isfinite(second) else None
@@ -176,7 +162,7 @@ def _by_second(rows: Sequence[Row], limits: Sequence[Row]) -> Iterable[str]:
         yield f"| {_words(second)} | {g:g} | {named:.1%} | {wrong:.1%} | {reach} |"
 
 
-def _beside_diagnosis(rows: Sequence[Row], marks: Sequence[Mark]) -> Iterable[str]:
+def _beside_diagnosis(rows: Sequence[Row], diagnosis: Tables) -> Iterable[str]:
     yield "## The diagnosis beside it"
     yield ""
     yield (
@@ -187,7 +173,8 @@ def _beside_diagnosis(rows: Sequence[Row], marks: Sequence[Mark]) -> Iterable[st
     yield f"| the diagnosis names from | wrong names | it names | {' | '.join(map(_oracle, DRAWN))} |"
     yield f"|---|---:|---:|{'---:|' * len(DRAWN)}"
     best = [best_trade(rows, second)[1] for second in DRAWN]
-    for words, (wrong, first) in _diagnosis(marks).items():
+    for words, figures in diagnosis.items():
+        wrong, first = _point(figures)
         theirs = " | ".join(f"{held.first_at(wrong):.1%}" for held in best)
         yield f"| {words} | {wrong:.1%} | {first:.1%} | {theirs} |"
 
@@ -204,18 +191,19 @@ def _missed(rows: Sequence[Row]) -> Iterable[str]:
 
 
 def _words(second: float) -> str:
-    return f"{second:g} nats" if math.isfinite(second) else "never"
+    return f"from {second:g} nats" if math.isfinite(second) else "never"
 
 
 def _oracle(second: float) -> str:
-    return (
-        f"oracle, a second effect from {_words(second)}"
-        if math.isfinite(second)
-        else "oracle, never a second"
-    )
+    return f"oracle, second effect {_words(second)}"
 
 
-def _figure(rows: Sequence[Row], marks: Sequence[Mark]) -> str:
+def _point(figures: Mapping[str, Mapping[str, Any]]) -> tuple[float, float]:
+    """Wrong names for unknowns, and single effects that the diagnosis names first."""
+    return figures["unknown_wrong_name"]["value"], figures["one_top"]["value"]
+
+
+def _figure(rows: Sequence[Row], diagnosis: Tables) -> str:
     curves = []
     for second, colour, dash, words in zip(DRAWN, SERIES, ("", "6 3"), ("one or two names", "never two")):
         _, held = best_trade(rows, second)
@@ -223,8 +211,8 @@ def _figure(rows: Sequence[Row], marks: Sequence[Mark]) -> str:
         if near.any():
             shares = 100 * held.wrong[near], 100 * held.first[near]
             curves.append(Curve(*shares, colour, dash, label=f"oracle, {words}"))
-    if marks:
-        points = sorted(value for words, value in _diagnosis(marks).items() if words != "as it does")
+    if diagnosis:
+        points = sorted(_point(figures) for words, figures in diagnosis.items() if words != AS_IT_DOES)
         wrong, first = (100.0 * np.array([point[i] for point in points]) for i in (0, 1))
         curves.append(Curve(wrong, first, SERIES[2], "1 2", label="diagnosis, by threshold", dots=True))
     wanted = (np.array([100.0 * WRONG_WANTED]), np.array([100.0 * FIRST_WANTED]))

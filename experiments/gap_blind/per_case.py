@@ -8,10 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from joblib import Parallel, delayed
 
 from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.truth import Truth, read_truth
+from fogml.gap.blind.truth import FloatArray, Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
 from fogml.gap.run_whitener import RunWhitener
@@ -81,3 +82,12 @@ def true_frame(folder: BlindFolder, truth: Truth, model: TwinModel) -> Frame:
     runs = [observe(read_run(path), model) for path in case_files(folder.cases / truth.case).fit]
     whiteners = [RunWhitener(truth.noise_model, o, truth.nominal) for o in runs]
     return Frame(runs, whiteners, model.constants, truth.nominal)
+
+
+def true_forms(folder: BlindFolder, truth: Truth, frame: Frame) -> FloatArray:
+    """What each effect of a case truly makes, whitened, shape (n, effects)."""
+    given = read_contributions(folder.truth / f"{truth.case}.npz")
+    count = range(len(truth.effects))
+    return frame.white(
+        [np.column_stack([o.averaged(given[o.run.name, i]) for i in count]) for o in frame.observations]
+    )

@@ -7,7 +7,7 @@ under 8 nats: a choice of 36 costs 4, its size and shape about as much.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -117,6 +117,13 @@ def open_set_reach(effects: Sequence[Row], asked: Sequence[Row], above: float) -
     hidden = float(np.mean([row["gain"] < SHOWN_NATS for row in unknown.values()]))
     allowed = (1.0 - 0.5 * hidden, max(0.0, 1.0 - 0.05 / max(hidden, 0.05)))
     return OpenSet(len(unknown), hidden, allowed, (found.auroc.value or 0.0, found.fpr95.value or 0.0))
+
+
+def effects_and_wrong(cases: Iterable[Mapping[str, Any]]) -> tuple[list[Row], list[Row]]:
+    """Every effect of what ``limits.py`` measured, and every wrong answer."""
+    held = list(cases)
+    effects = [row | {"mix": case["asked"]["mix"]} for case in held for row in case["effects"]]
+    return effects, [case["wrong"] for case in held if case["wrong"] is not None]
 
 
 def _cases(effects: Sequence[Row], figure: Figure) -> dict[str, list[Row]]:

@@ -18,6 +18,7 @@ from experiments.gap_blind.reach import (
     STRONG,
     UNKNOWNS,
     Figure,
+    effects_and_wrong,
     false_names,
     left_by_right_forms,
     open_set_reach,
@@ -40,10 +41,8 @@ def main() -> None:
     """Write the table of the seed whose score is kept."""
     values = json.loads((HERE / "score.json").read_text(encoding="utf-8"))
     limits, forms, alone, beside = (of_seed(name, values["seed"]) for name in MEASURED)
-    told = (
-        one_or_unknown.sentence([row for row in alone if row]),
-        beside_unknown.sentence([row for case in beside for row in case], limits),
-    )
+    told = [one_or_unknown.sentence([row for row in alone if row])] if alone else []
+    told += [beside_unknown.sentence([row for case in beside for row in case], limits)] if beside else []
     write_page("results", _page(values, limits, [row for case in forms for row in case], told))
 
 
@@ -55,7 +54,7 @@ def allowed(cases: Sequence[Row]) -> dict[str, float]:
     cases
         What ``limits.py`` measured.
     """
-    effects, wrong = _effects_and_wrong(cases)
+    effects, wrong = effects_and_wrong(cases)
     asked = [case["asked"] for case in cases]
     known = [row for row in effects if row["known"]]
     both = Figure("", ("unknown_and_known",), 0.0, alone=False)
@@ -72,11 +71,6 @@ def allowed(cases: Sequence[Row]) -> dict[str, float]:
     if (open_set := open_set_reach(effects, asked, 0.0)) is not None:
         found |= dict(zip(("auroc", "fpr95"), open_set.allowed))
     return found
-
-
-def _effects_and_wrong(cases: Sequence[Row]) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
-    effects = [row | {"mix": case["asked"]["mix"]} for case in cases for row in case["effects"]]
-    return effects, [case["wrong"] for case in cases if case["wrong"] is not None]
 
 
 def _page(
@@ -113,7 +107,7 @@ def _page(
 def _forms_unknown(cases: Sequence[Row], forms: Sequence[dict[str, Any]]) -> str:
     """What wrong names for an unknown come to for one who does not know the true forms either."""
     left = left_by_right_forms(forms)
-    found = wrongly_named(*_effects_and_wrong(cases), UNKNOWN, left)
+    found = wrongly_named(*effects_and_wrong(cases), UNKNOWN, left)
     if found is None:
         return ""
     further = found.reached - found.allowed

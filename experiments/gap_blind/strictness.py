@@ -21,6 +21,7 @@ from fogml.report.blind_words import value_text, wanted_text
 from fogml.report.words import plural
 
 LEAST_PROBABILITIES = (0.5, 0.6, 0.7, 0.8, 0.85, 0.9, 0.95)
+AS_IT_DOES = "as it does"
 KEYS = (
     "nothing_named",
     "unknown_wrong_name",
@@ -59,11 +60,16 @@ def _named_from(least: float, found: Mark) -> Mark:
     return renamed(found, tuple(replace(item, named=True) for item in likely if item.probability >= least))
 
 
+def by_threshold(marks: Sequence[Mark]) -> dict[str, dict[str, dict[str, Any]]]:
+    """The score's rows of the figures on names, by their keys, for each threshold and `AS_IT_DOES`."""
+    tables = {f"{least:.0%}": _figures(named_from(least, marks)) for least in LEAST_PROBABILITIES}
+    return tables | {AS_IT_DOES: _figures(marks)}
+
+
 def page(marks: Sequence[Mark]) -> str:
     """The table as Markdown."""
-    tables = {f"{least:.0%}": _figures(named_from(least, marks)) for least in LEAST_PROBABILITIES}
-    tables["as it does"] = _figures(marks)
-    wanted = tables["as it does"]
+    tables = {words: list(figures.values()) for words, figures in by_threshold(marks).items()}
+    wanted = tables[AS_IT_DOES]
     lines = [
         "# How sure a name has to be",
         "",
@@ -82,10 +88,9 @@ def page(marks: Sequence[Mark]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _figures(marks: Sequence[Mark]) -> list[dict[str, Any]]:
-    """The score's rows of the figures on names."""
+def _figures(marks: Sequence[Mark]) -> dict[str, dict[str, Any]]:
     table = {row["key"]: row for row in rows(marks)}
-    return [table[key] for key in KEYS]
+    return {key: table[key] for key in KEYS}
 
 
 if __name__ == "__main__":

@@ -163,6 +163,6 @@ def test_the_kept_page_is_of_the_kept_measurements() -> None:
 
 @pytest.mark.parametrize("kept", [[], ROWS[:4], ROWS[4:]])
 def test_cases_of_one_kind_alone_are_told_to_say_nothing(kept) -> None:
-    page = one_or_unknown._page(kept, [], [])
+    page = one_or_unknown._page(kept, [], {})
     assert "Only cases of both kinds" in page and "The diagnosis beside it" not in page
-    assert "wanted" in one_or_unknown._figure(kept, [])
+    assert "wanted" in one_or_unknown._figure(kept, {})
