@@ -24,7 +24,8 @@ def assumptions(p: Prepared, basis: Basis) -> tuple[str, ...]:
         "Noise is Gaussian: white noise, flicker and a random walk. It was fitted on "
         f"{p.noise.source}; for the search its slow terms are taken {SAFE_SIDE:g} standard errors larger.",
         f"An effect's true form may differ from the catalogue's by {SLACK:.0%} of its size; where a "
-        "temperature that it needs was not recorded, that holds other thermal orders as well.",
+        "temperature that it needs was not recorded, that holds other thermal orders as well. One that goes "
+        "with T may follow the temperature in the middle of the winding, which no sensor sits on.",
         "Amplitudes are taken to lie within the card's ranges, or a decade or so above.",
         f"An amplitude's standard error holds {FORM_ERROR:.0%} of it for the form of the effect. The "
         f"interval of what is closed holds {FORM_LEFT:.0%} of that for it, an uncertain floor, and what "

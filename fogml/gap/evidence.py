@@ -20,6 +20,7 @@ from scipy.linalg import cho_solve, solve_triangular
 from scipy.special import log_ndtr
 
 from fogml.gap.basis import Basis, NodeColumns
+from fogml.gap.felt_within import within_columns
 from fogml.gap.group_gains import group_gains
 from fogml.gap.priors import LENGTHS
 from fogml.gap.slack import slack_columns
@@ -64,6 +65,7 @@ class Field:
         self.gram: FloatArray = gram - half.T @ half
         self._blocks_of_rows: list[tuple[FloatArray, FloatArray]] = [(basis.rows, half)]
         self._slacks: dict[int, tuple[int, ...]] = {}
+        self._withins: dict[int, tuple[int, ...]] = {}
         self._conditioned: dict[tuple[Term, ...], Conditioned] = {}
         width = max((len(n.columns) for n in basis.nodes), default=1)
         self.rank = width
@@ -89,6 +91,12 @@ class Field:
         if node not in self._slacks:
             self._slacks[node] = self.append(slack_columns(self.basis, node))
         return self._slacks[node]
+
+    def within(self, node: int) -> tuple[int, ...]:
+        """The column of a node's effect felt deeper than it is measured, if any; see `within_columns`."""
+        if node not in self._withins:
+            self._withins[node] = self.append(within_columns(self.basis, node))
+        return self._withins[node]
 
     def append(self, columns: FloatArray) -> tuple[int, ...]:
         """Add whitened columns, shape (n, k); gives the indices that terms name them by."""

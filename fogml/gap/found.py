@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from fogml.gap.classes import Ranked, Ranking
     from fogml.gap.preparing import Prepared
 
-FORM_ERROR = 0.06
+FORM_ERROR = 0.04
 """What an amplitude may differ by because no form is known exactly, of its size."""
 FULL_TURN_DEG = 360.0
 

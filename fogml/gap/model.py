@@ -144,6 +144,20 @@ class OtherOrders(Protocol):
 
 
 @runtime_checkable
+class FeltWithin(Protocol):
+    """A `ModelOnRun` that knows that a sensor sits elsewhere than what its temperature acts on."""
+
+    def felt_within(
+        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
+    ) -> FloatArray | None:
+        """What a response changes by where it is felt deeper within the gyro than it is measured.
+
+        One standard deviation [deg/h per unit of the amplitude], shape (n,); None where it is the same there.
+        The same candidate has it on every run, or on none.
+        """
+
+
+@runtime_checkable
 class Foreseeable(Protocol):
     """A `ModelOnRun` that knows which responses stay as they are at other constants."""
 

@@ -144,7 +144,8 @@ def unrealised(
         brought = 0.0
         if length > 0.0:
             term = Term(field.append(response / length), chosen.length)
-            brought = field.condition([*beside, term]).log_evidence - nothing
+            whole = [*beside, term, *search.parts.within(chosen)]
+            brought = field.condition(whole).log_evidence - nothing
         lost[effect.id] = max((1.0 - FORM_SHARE) * credited - brought, 0.0)
     return lost
 

@@ -19,7 +19,8 @@ import numpy as np
 from fogml.gap.evidence import Conditioned, Field, Term, by_candidate, log_sum_exp
 from fogml.gap.explanation import Chosen, Explanation, Rest
 from fogml.gap.forms import Forms
-from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS, SLACK, SLACK_FROM
+from fogml.gap.priors import LENGTH_WEIGHTS, LENGTHS
+from fogml.gap.terms import Terms
 from fogml.gap.unlike import Unlike
 from fogml.runs.run import FloatArray
 
@@ -71,6 +72,11 @@ class Search:
     @cached_property
     def _empty(self) -> float:
         return self.field_.condition([]).log_evidence
+
+    @cached_property
+    def parts(self) -> Terms:
+        """What an explanation's parts are made of."""
+        return Terms(self.field_)
 
     @cached_property
     def _unlike(self) -> Unlike:
@@ -144,14 +150,14 @@ class Search:
             averaged = 0.0
             for i, chosen in enumerate(effects):
                 others = effects[:i] + effects[i + 1 :]
-                held = self.field_.condition(self._terms(others, group))
+                held = self.field_.condition(self.parts.of(others, group))
                 effects[i] = self.best_node(chosen.candidate, held)
                 own = held.node_gains(self.places[chosen.candidate])[self.places[chosen.candidate]]
                 averaged += log_sum_exp(own) - float(own.max()) + self._weight(effects[i], held)
             group, averaged_rest = self._best_group(effects, rest, last=turn == rounds - 1)
         likely, exact = self._of_either_form(effects, group)
         if rest == "unknown" and group is not None:
-            averaged_rest += self._second(self._terms(effects, group, exact=exact))
+            averaged_rest += self._second(self.parts.of(effects, group, exact=exact))
         evidence = likely - self._empty + averaged + averaged_rest
         prior = self._log_prior(effects, rest)
         return Explanation(tuple(effects), rest, group, evidence, evidence + prior, exact)
@@ -160,7 +166,7 @@ class Search:
         self, effects: Sequence[Chosen], group: tuple[str, float] | None
     ) -> tuple[float, bool]:
         """Evidence with room for other forms and without, averaged, and whether it is more without."""
-        loose, bare = (self._terms(effects, group, exact=exact) for exact in (False, True))
+        loose, bare = (self.parts.of(effects, group, exact=exact) for exact in (False, True))
         with_room = self.field_.condition(loose).log_evidence
         if len(bare) == len(loose):
             return with_room, False
@@ -204,7 +210,7 @@ class Search:
         fit = small if rest == "form" else ~small
         if rest == "nothing" or not names or not fit.any():
             return None, 0.0
-        gains, weights = self._weighed(self._terms(effects, None), fit, rest == "unknown" and last)
+        gains, weights = self._weighed(self.parts.of(effects, None), fit, rest == "unknown" and last)
         if rest == "form":
             weights += self._forms.log_weights([(c.node, _form_room([c])) for c in effects])[:, fit]
         gains = gains + weights
@@ -241,26 +247,26 @@ class Search:
         near = weighed.max(axis=1) > weighed.max() - MATTERS
         for i in np.flatnonzero(near & (gains.max(axis=1) > MATTERS)).tolist():
             group = (names[i], float(lengths[int(np.argmax(weighed[i]))]))
-            held = self.field_.condition([*terms, self._term(*group)])
+            held = self.field_.condition([*terms, self.parts.of_group(*group)])
             shares[i] = self._unlike.log_share(held, *group)
         return shares
 
     def form_share(self, found: Explanation) -> float:
         """Share of what the effects of an explanation gain that needs other forms than the catalogue's."""
-        bare = self._terms(found.effects, None, exact=True)
+        bare = self.parts.of(found.effects, None, exact=True)
         group = found.group if found.rest == "form" else None
-        whole = self._terms(found.effects, group, exact=found.exact)
+        whole = self.parts.of(found.effects, group, exact=found.exact)
         gain = self.field_.condition(whole).log_evidence - self._empty
         return 1.0 - (self.field_.condition(bare).log_evidence - self._empty) / max(gain, 1e-9)
 
     def terms(self, found: Explanation) -> list[Term]:
         """An explanation's terms."""
-        return self._terms(found.effects, found.group, exact=found.exact)
+        return self.parts.of(found.effects, found.group, exact=found.exact)
 
     def beside(self, found: Explanation, id: str) -> list[Term]:
         """The terms of an explanation without one of its effects."""
         others = [c for c in found.effects if c.candidate != id]
-        return self._terms(others, found.group, exact=found.exact)
+        return self.parts.of(others, found.group, exact=found.exact)
 
     def estimates(self, found: Explanation) -> dict[str, FloatArray]:
         """What each effect of an explanation, and its group, most probably makes, whitened, shape (n,)."""
@@ -279,9 +285,9 @@ class Search:
 
     def _coefficients(self, found: Explanation) -> dict[str, tuple[list[int], FloatArray]]:
         """Columns of an explanation's effects and of its group, with their most probable coefficients."""
-        parts = {c.candidate: self._terms([c], None, exact=found.exact) for c in found.effects}
+        parts = {c.candidate: self.parts.of([c], None, exact=found.exact) for c in found.effects}
         if found.group is not None:
-            parts[found.group[0]] = [self._term(*found.group)]
+            parts[found.group[0]] = [self.parts.of_group(*found.group)]
         if not parts:
             return {}
         mean, _ = self.field_.condition([t for terms in parts.values() for t in terms]).coefficients()
@@ -291,24 +297,6 @@ class Search:
             held[name] = (places, mean[first : first + len(places)])
             first += len(places)
         return held
-
-    def _terms(
-        self, effects: Iterable[Chosen], group: tuple[str, float] | None, *, exact: bool = False
-    ) -> list[Term]:
-        """Terms of effects and a group; with what forms may differ by unless they are `exact`."""
-        nodes = self.field_.basis.nodes
-        terms = []
-        for c in effects:
-            terms.append(Term(nodes[c.node].columns, c.length))
-            if c.size >= SLACK_FROM and not exact:
-                terms.append(Term(self.field_.slack(c.node), SLACK * c.size))
-        if group is not None:
-            terms.append(self._term(*group))
-        return terms
-
-    def _term(self, name: str, length: float) -> Term:
-        """The columns of a group of the unknown."""
-        return Term(tuple(int(c) for c in self.field_.basis.groups[name]), length)
 
 
 def _form_room(effects: Sequence[Chosen]) -> float:

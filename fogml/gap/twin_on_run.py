@@ -160,6 +160,27 @@ class TwinOnRun:
             return []
         return [self._responded(declared, shape, constants, inputs) for inputs in self._others]
 
+    def felt_within(
+        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
+    ) -> FloatArray | None:
+        """What a response changes by where T is that of the winding's middle, linear between its faces.
+
+        Shape (n,) [deg/h per unit]; None for what does not go with T, and for errors of sensors and logger.
+        """
+        declared = effect(id)
+        if isinstance(declared, NoiseEffect) or AT_AMPLITUDE in shape or "T" not in declared.needs:
+            return None
+        if declared.stage in ("sensor", "logger"):
+            return None
+        here, within = (self._responded(declared, shape, constants, x) for x in (self._full, self._within))
+        return within - here
+
+    @cached_property
+    def _within(self) -> Inputs:
+        """Inputs whose T is that of the middle between the faces of the winding."""
+        middle = self._full.temperature("T") + 0.5 * self._full.gradient
+        return replace(self._full, temperatures={**self._full.temperatures, "T": middle}, cache={})
+
     def depends_on_constants(self, id: str, shape: Mapping[str, float]) -> bool:
         """Whether a response is another one at other constants: where it goes with output or slopes."""
         return AT_AMPLITUDE in shape or self._meets_output(effect(id))

@@ -89,7 +89,7 @@ def test_gains_of_a_group_are_those_of_the_dense_formula():
     groups = [*event_groups(frame), *near_library(frame.observations, model.candidates(), {}, "tactical")]
     search = Search(Field(build_basis(frame, model.candidates(), groups, "tactical")))
     found = search.run()
-    held = search.field_.condition(search._terms(max(found, key=lambda e: len(e.ids)).effects, None))
+    held = search.field_.condition(search.parts.of(max(found, key=lambda e: len(e.ids)).effects, None))
     for name, places in search.field_.basis.groups.items():
         gram = held.field.gram[np.ix_(places, places)] - held.half[:, places].T @ held.half[:, places]
         fit = held.field.gram[places, 0] - held.half[:, places].T @ held.half[:, 0]

@@ -104,7 +104,7 @@ def test_room_for_a_form_goes_with_what_an_effect_makes_not_with_its_coefficient
     search = searched((("mixture", 1.0, (("share", 1.0),)),), added=cancelling)
     chosen = search.best_node("mixture", search.field_.condition([]))
     assert chosen.size <= chosen.length
-    (room,) = [t for t in search._terms([chosen], None) if t.columns == search.field_.slack(chosen.node)]
+    (room,) = [t for t in search.parts.of([chosen], None) if t.columns == search.field_.slack(chosen.node)]
     assert room.length == pytest.approx(SLACK * chosen.size)
 
 
