@@ -54,6 +54,11 @@ class Basis:
     nodes: tuple[NodeColumns, ...]
     within_constants: tuple[str, ...]
 
+    def beside_own(self, node: NodeColumns, columns: FloatArray) -> FloatArray:
+        """Whitened columns, shape (n, k), less what a node's own columns can make of them."""
+        own = self.rows[:, list(node.columns)]
+        return np.asarray(columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0])
+
 
 def build_basis(
     frame: Frame,

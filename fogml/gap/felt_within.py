@@ -24,14 +24,14 @@ def within_columns(basis: Basis, node: int) -> FloatArray:
     Beside the node's own columns, for an amplitude with a whitened length of 1.
     """
     chosen, frame = basis.nodes[node], basis.frame
-    found = []
+    parts = []
     for o in frame.observations:
-        if not isinstance(o.model, FeltWithin):
-            return np.zeros((len(basis.rows), 0))
-        change = o.model.felt_within(chosen.candidate, chosen.node.draws[0], frame.values)
+        change = (
+            o.model.felt_within(chosen.candidate, chosen.node.draws[0], frame.values)
+            if isinstance(o.model, FeltWithin)
+            else None
+        )
         if change is None:
             return np.zeros((len(basis.rows), 0))
-        found.append(o.averaged(change)[:, None])
-    column = frame.white(found)
-    own = basis.rows[:, list(chosen.columns)]
-    return np.asarray(chosen.size * (column - own @ np.linalg.lstsq(own, column, rcond=None)[0]))
+        parts.append(o.averaged(change)[:, None])
+    return chosen.size * basis.beside_own(chosen, frame.white(parts))

@@ -16,6 +16,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.model import Candidate, EffectValue
 from fogml.gap.rehearsal import Rehearsed, Stage
+from fogml.gap.shapes import usual_shape
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
@@ -146,7 +147,7 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
 def stated_or_usual(on: Stage, declared: Candidate) -> EffectValue:
     """An effect as the twin states it, else at the usual size and shape of its grade."""
     held, grade = on.model.twin.settings.get(declared.id), on.model.grade
-    shape = {q.name: q.typical(grade) for q in declared.shape}
+    shape = usual_shape(declared, grade)
     if held is None:
         return EffectValue(declared.id, declared.amplitude.typical(grade), shape)
     return EffectValue(declared.id, held.amplitude, {name: held.shape[name] for name in shape})

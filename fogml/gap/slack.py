@@ -55,8 +55,7 @@ def slack_columns(basis: Basis, node: int) -> FloatArray:
     ]
     neighbours = basis.rows[:, [c for columns in others for c in columns]]
     columns = np.concatenate([frame.white(stacked), neighbours], axis=1)
-    own = basis.rows[:, list(chosen.columns)]
-    columns = columns - own @ np.linalg.lstsq(own, columns, rcond=None)[0]
+    columns = basis.beside_own(chosen, columns)
     axes = main_axes(frame.beside(columns), 1e-2)[:, :MOST_COLUMNS]
     return np.asarray(columns @ axes)
 

@@ -18,12 +18,12 @@ class Terms:
 
     Parameters
     ----------
-    field_
+    field
         Inner products of everything.
     """
 
-    def __init__(self, field_: Field) -> None:
-        self._field = field_
+    def __init__(self, field: Field) -> None:
+        self._field = field
 
     def of(
         self, effects: Iterable[Chosen], group: tuple[str, float] | None, *, exact: bool = False

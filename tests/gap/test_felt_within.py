@@ -13,6 +13,7 @@ from fogml.gap.evidence import Field, Term
 from fogml.gap.felt_within import within_columns
 from fogml.gap.priors import SLACK_FROM
 from fogml.gap.search import Search
+from fogml.gap.shapes import usual_shape
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.twin.effect import NoiseEffect
@@ -135,7 +136,7 @@ def chamber() -> Run:
     "id", ["thermal_hysteresis", "bias_polynomial", "shupe_mohr", "coil_expansion", "moisture"]
 )
 def test_of_the_twin_it_is_the_response_to_the_middle_of_the_winding(chamber, id):
-    model, shape = TwinModel(TWIN), {q.name: q.typical("tactical") for q in effect(id).shape}
+    model, shape = TwinModel(TWIN), usual_shape(effect(id), TWIN.grade)
     columns = chamber.columns
     middle = chamber.with_columns(T=columns["T"] + 0.5 * (columns["T_out"] - columns["T_in"]))
     here, there = (model.on(run).response(id, shape, VALUES) for run in (chamber, middle))
@@ -151,6 +152,5 @@ def test_of_the_twin_sensors_the_logger_and_noise_have_none(chamber):
     on = TwinModel(TWIN).on(chamber)
     for id in TwinModel(TWIN).candidates():
         declared = effect(id)
-        shape = {q.name: q.typical("tactical") for q in declared.shape}
         if isinstance(declared, NoiseEffect) or declared.stage in ("sensor", "logger"):
-            assert on.felt_within(id, shape, VALUES) is None
+            assert on.felt_within(id, usual_shape(declared, TWIN.grade), VALUES) is None

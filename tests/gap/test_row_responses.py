@@ -11,7 +11,7 @@ from fogml.gap.assumptions import assumptions
 from fogml.gap.model import Decimating
 from fogml.gap.observation import Observation, observe
 from fogml.gap.row_responses import blocks_of_all, parts_of_blocks
-from fogml.gap.shapes import AT_AMPLITUDE, is_angle
+from fogml.gap.shapes import AT_AMPLITUDE, is_angle, usual_shape
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.twin.programme import load_programme
@@ -62,7 +62,7 @@ def averaged(o: Observation, id, shape):
 def usual(id) -> dict[str, float]:
     candidate = MODEL.candidates()[id]
     at = {AT_AMPLITUDE: 10.0} if getattr(candidate, "amplitudes", ()) else {}
-    return {q.name: q.typical("tactical") for q in candidate.shape} | at
+    return usual_shape(candidate, "tactical") | at
 
 
 def shapes_of(candidate, rng) -> list[dict[str, float]]:

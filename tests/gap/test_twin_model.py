@@ -10,7 +10,7 @@ from fogml.gap.fitting import fit_model
 from fogml.gap.model import Candidate, EffectValue, NoisePrior
 from fogml.gap.observation import observe
 from fogml.gap.run_whitener import RunWhitener
-from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.shapes import AT_AMPLITUDE, usual_shape
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -227,4 +227,4 @@ def _every_node() -> tuple[str, ...]:
 
 
 def _usual(id: str) -> dict[str, float]:
-    return {q.name: q.typical("tactical") for q in effect(id).shape}
+    return usual_shape(effect(id), TWIN.grade)
