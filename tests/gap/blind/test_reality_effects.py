@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zlib
 from dataclasses import asdict
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from fogml.gap.blind.case import recorded_run
 from fogml.gap.blind.plan import Plan
 from fogml.gap.blind.reality import nominal
 from fogml.gap.blind.reality.catalogue import INVENTED, KNOWN, WRONG_STRUCTURE, known_names
+from fogml.gap.blind.reality.effects.coil import SlipEvents
 from fogml.gap.blind.reality.form import Form
 from fogml.gap.blind.reality.noise import record_length
 from fogml.gap.blind.reality.reckoning import Reckoning
@@ -200,3 +202,18 @@ def test_recurrences_are_those_of_a_loop() -> None:
     ramp = np.linspace(0.0, 499.0, 500)
     settled = lag(1.0, ramp, 20.0)
     assert settled == pytest.approx(ramp - 20.0 * (1.0 - np.exp(-ramp / 20.0)), abs=1e-9)
+
+
+@pytest.mark.parametrize("excess_degc_min", [0.01, 1.0])
+def test_slips_add_up_to_what_is_travelled_and_each_is_one_that_could_be_seen(excess_degc_min: float) -> None:
+    """However little the rate exceeds the threshold, slips are rarer then, not smaller."""
+    count, sample_s, threshold = 200_000, 10.0, 4.0
+    world = SimpleNamespace(sample_s=sample_s, rates={"T_in": np.full(count, threshold + excess_degc_min)})
+    shape = {"threshold": threshold, "time_constant": 1e12}
+    sums = SlipEvents().response(world, shape, np.random.default_rng(5))  # type: ignore[arg-type]
+    slips = np.diff(sums, prepend=0.0)
+    travelled = count * sample_s / 60.0 * excess_degc_min
+    assert sums[-1] == pytest.approx(travelled, rel=0.05)
+    assert slips[slips > 1e-12].min() > 1e-3
+    seldom = 4.0 * sample_s / 60.0 * excess_degc_min
+    assert np.mean(slips > 1e-12) == pytest.approx(1.0 - np.exp(-seldom), rel=0.05)

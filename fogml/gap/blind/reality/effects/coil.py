@@ -155,13 +155,15 @@ class SlipEvents(Additive):
         return {"threshold": rng.uniform(3.0, 5.0), "time_constant": rng.uniform(1800.0, 36000.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """Relaxing sum of slips, one sample's at a time, gamma distributed in height."""
+        """Relaxing sum of slips: as many as chance has it, gamma distributed in height."""
         rate = world.rates["T_in"]
         excess = np.sign(rate) * np.maximum(np.abs(rate) - shape["threshold"], 0.0)
-        # Four slips per degC of mean height 1/4 keep the mean of the catalogue's form.
+        # Four slips per degC of mean height 1/4 keep the mean of the catalogue's form. They are counted: of a
+        # process without a smallest slip a short excess would show 1e-60 of what a longer one does.
         travelled = excess * world.sample_s / 60.0
-        slips = rng.gamma(np.maximum(4.0 * np.abs(travelled), 1e-12), 0.25) * np.sign(travelled)
-        slips[travelled == 0.0] = 0.0
+        count = rng.poisson(4.0 * np.abs(travelled))
+        heights = rng.gamma(np.maximum(4.0 * count, 1.0), 1.0 / 16.0)
+        slips = np.where(count > 0, heights, 0.0) * np.sign(travelled)
         decay = np.full(len(slips), world.sample_s / shape["time_constant"])
         return recurrence(decay, slips, 0.0)
 
