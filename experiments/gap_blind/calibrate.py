@@ -1,22 +1,25 @@
 """Constants of `fogml.gap.confidence` from suites that the diagnosis has answered.
 
 ``python -m experiments.gap_blind.calibrate PATH ...`` prints logistic constants of named effects over the
-features of their evidence, and of the unknown over its log odds and the number of names. A path is a suite
-with its answers, or a file of marks as ``fogml blind score`` writes it, which holds all that is needed.
+features of their evidence, where all that acts is known and beside an unknown, and of the unknown over its
+log odds and the number of names. A path is a suite with its answers, or a file of marks as ``fogml blind
+score`` writes it, which holds all that is needed.
 Suites are those to develop on, and final ones that are spent: figures were taken from them, and
 ``config.yaml`` keeps another seed for the next ones.
 
 Probabilities are to hold in the mix. Cases drawn by their kind or strength beside it tell how evidence
-grows, but not how often there is an effect or an unknown at all: ``--beside`` lets them weigh less.
+grows, but not how often there is an effect or an unknown at all: ``--beside`` lets them weigh less. The mix
+has few findings beside an unknown, and their weight is one by itself: ``--beside-unknown``.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import yaml
 from sklearn.linear_model import LogisticRegression
 
@@ -40,16 +43,21 @@ def main() -> None:
     parser.add_argument("path", nargs="+", type=Path, help="answered suites, or files of their marks")
     parser.add_argument("--answers", default=DIAGNOSIS, help="name of the answers")
     parser.add_argument("--beside", type=float, default=1.0, help="weight of cases beside the mix, from 0")
+    parser.add_argument(
+        "--beside-unknown", type=float, default=1.0, help="the same of findings beside an unknown"
+    )
     args = parser.parse_args()
-    named: list[Row] = []
-    unknown: list[Row] = []
+    rows: dict[str, list[Row]] = {"NAMED": [], "NAMED_BESIDE_UNKNOWN": [], "UNKNOWN": []}
+    beside = {"NAMED": args.beside, "NAMED_BESIDE_UNKNOWN": args.beside_unknown, "UNKNOWN": args.beside}
     for path in args.path:
         for one in marks_of(path, args.answers):
             if not may_be_learned_from(one.truth.seed):
                 raise InputError(f"{path}: made from a seed that is kept for final figures")
-            _add(path, one, 1.0 if one.truth.mix else args.beside, named, unknown)
-    for name, rows in (("NAMED", named), ("UNKNOWN", unknown)):
-        print(f"{name} = ({', '.join(f'{c:.2f}' for c in _fitted(rows))})   from {len(rows)} findings")
+            for name, features, right in _findings(path, one):
+                rows[name].append((features, right, 1.0 if one.truth.mix else beside[name]))
+    for name, found in rows.items():
+        if found:
+            print(f"{name} = ({', '.join(f'{c:.2f}' for c in _fitted(found))})   from {len(found)} findings")
 
 
 def marks_of(path: Path, answers: str) -> Iterable[Mark]:
@@ -80,7 +88,8 @@ def may_be_learned_from(seed: int) -> bool:
     return not is_final(seed) or seed in spent
 
 
-def _add(path: Path, one: Mark, weight: float, named: list[Row], unknown: list[Row]) -> None:
+def _findings(path: Path, one: Mark) -> Iterator[tuple[str, tuple[float, ...], bool]]:
+    """Which constants each finding of a case tells of, its features, and whether it is right."""
     if one.failure:
         return
     for item in (*one.items, *one.suspected):
@@ -88,18 +97,22 @@ def _add(path: Path, one: Mark, weight: float, named: list[Row], unknown: list[R
             raise InputError(f"{path}: case {one.truth.case} has names without support; answer it anew")
         # At no margin the best explanation does without it, and it is not named whatever the constants are.
         if item.support.margin > 0.0:
-            named.append((item.support.features, item.right, weight))
+            name = "NAMED_BESIDE_UNKNOWN" if item.support.beside_unknown else "NAMED"
+            yield name, item.support.features, item.right
     if one.truth.kind != "wrong_thermal" and one.log_odds is not None:
         features = unknown_features(one.log_odds, len(one.named))
-        unknown.append((features, one.truth.kind.startswith("unknown"), weight))
+        yield "UNKNOWN", features, one.truth.kind.startswith("unknown")
 
 
 def _fitted(rows: list[Row]) -> list[float]:
+    """Logistic constants with a ridge, that of features scaled to what they vary by."""
     if len({right for _, right, _ in rows}) < 2:
         raise InputError("there are not both right and wrong findings; give more cases")
     features, right, weights = zip(*rows)
-    fit = LogisticRegression(C=1.0, max_iter=2000).fit(features, right, sample_weight=weights)
-    return [float(fit.intercept_[0]), *map(float, fit.coef_[0])]
+    scale = np.std(features, axis=0)
+    scale[scale == 0.0] = 1.0
+    fit = LogisticRegression(C=1.0, max_iter=2000).fit(features / scale, right, sample_weight=weights)
+    return [float(fit.intercept_[0]), *map(float, fit.coef_[0] / scale)]
 
 
 if __name__ == "__main__":

@@ -14,7 +14,6 @@ from fogml.gap.evidence import log_sum_exp
 from fogml.gap.explanation import Chosen, Explanation
 from fogml.gap.result import NAMED
 from fogml.gap.search import Search
-from fogml.gap.surprise import surprise
 from fogml.gap.unknown_noise import UnevenNoise, uneven_noise
 
 SAME_CLASS_NATS = 3.0
@@ -223,24 +222,16 @@ def _ranked(
         margin = min(margin, log_sum_exp(with_it) - log_sum_exp(without))
     unknown = [e.log_posterior for e in explanations if e.unknown is not None and not e.ids & together]
     joint = max(margin, held.log_posterior - max(unknown)) if unknown else margin
-    length, rest = _lengths(search, held, chosen.candidate)
-    support = Support(margin, search.form_share(held), rest, length, joint=joint)
-    support = replace(support, surprise=_surprise(search, held, members))
-    return Ranked(chosen, members, named_probability(support), support)
-
-
-def _lengths(search: Search, held: Explanation, id: str) -> tuple[float, float]:
-    """Whitened length of what an effect of an explanation most probably makes, and the unknown's over it."""
+    # What each part of the explanation most probably makes.
     lengths = search.lengths(held)
-    own = lengths[id]
-    unknown = lengths[held.unknown[0]] if held.unknown is not None else 0.0
-    return own, unknown / own if own > 0.0 else 0.0
-
-
-def _surprise(search: Search, held: Explanation, members: Sequence[str]) -> float:
-    """How much better the best explanation without a class does than it would if `held` were true."""
-    others = [e for e in search.tried if not e.ids & set(members)]
-    if not others:
-        return 0.0
-    other = max(others, key=lambda e: e.log_posterior)
-    return surprise(search.field_, search.terms(held), search.terms(other))
+    own = lengths[chosen.candidate]
+    beside = lengths[held.unknown[0]] if held.unknown is not None else 0.0
+    support = Support(
+        margin,
+        search.form_share(held),
+        rest=beside / own if own > 0.0 else 0.0,
+        length=own,
+        joint=joint,
+        others=max((lengths[id] for id in held.ids if id != chosen.candidate), default=0.0),
+    )
+    return Ranked(chosen, members, named_probability(support), support)

@@ -34,9 +34,10 @@ SLOW_S, MEDIUM_S, FAST_S = 7200.0, 2400.0, 900.0
 KNOTS, WAVES = 9, 40
 PEAKS = 25
 """Places over the temperatures at which a peak of the response to its rate may lie."""
-PRICES = {"gradient": 3.0}
-"""Of kinds that the catalogue is full of [nats]: sensors and heat flow between nodes make such differences,
-and one of those effects in another form is likelier there than a cause that nobody knows."""
+PRICES = {"gradient": 3.0, "scale_factor": 3.0, "temperature": 3.0, "drives": 2.0}
+"""Of kinds that the catalogue is full of [nats]: one of its effects in another form is likelier there than a
+cause that nobody knows. Sensors and heat flow between nodes make differences, whatever acts on the scale
+factor goes with the rate and some temperature."""
 MIXED = ("start", "time", "temperature", "temperature_rate", "direction", "past", "gradient", "table_rate")
 """Groups that may act together."""
 

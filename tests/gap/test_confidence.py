@@ -11,10 +11,9 @@ from hypothesis import strategies as st
 
 from experiments.gap_blind.calibrate import Row, _fitted
 from fogml.gap.confidence import (
+    LEAST_NAMED_MARGIN,
     MOSTLY_FORM,
-    OTHERS,
     SURE,
-    SURE_BESIDE,
     SURE_BESIDE_UNKNOWN,
     UNKNOWN,
     UNSURE,
@@ -29,11 +28,11 @@ supports = st.builds(
     Support,
     margin=st.floats(-5.0, 200.0),
     form_share=st.floats(0.0, 1.0),
-    rest=st.floats(0.0, 50.0),
+    rest=st.one_of(st.just(0.0), st.floats(1e-3, 50.0)),
     length=st.floats(0.0, 200.0),
     outside=st.integers(0, 4),
     joint=st.floats(-5.0, 200.0),
-    surprise=st.floats(-5.0, 200.0),
+    others=st.floats(0.0, 200.0),
 )
 
 
@@ -49,10 +48,10 @@ def test_more_evidence_is_never_less_probable(support: Support, more: float) -> 
 @given(supports, st.floats(0.0, 5.0))
 def test_what_is_left_beside_a_name_never_makes_it_more_probable(support: Support, more: float) -> None:
     for worse in (
-        replace(support, rest=support.rest + more),
+        replace(support, rest=support.rest + more if support.beside_unknown else 0.0),
         replace(support, form_share=min(support.form_share + more, 1.0)),
         replace(support, outside=support.outside + 1),
-        replace(support, surprise=support.surprise + more),
+        replace(support, others=support.others + more),
     ):
         assert named_probability(worse) <= named_probability(support)
 
@@ -60,9 +59,10 @@ def test_what_is_left_beside_a_name_never_makes_it_more_probable(support: Suppor
 @given(supports)
 def test_a_name_is_given_only_where_it_is_sure(support: Support) -> None:
     found, honest = named_probability(support), likely(support)
-    assert found <= honest and (found <= UNSURE or found == honest >= SURE_BESIDE)
-    if support.joint - support.margin < OTHERS:
-        assert found <= UNSURE or found >= (SURE_BESIDE_UNKNOWN if support.rest > 0.0 else SURE)
+    assert found <= honest and (found <= UNSURE or found == honest)
+    assert found <= UNSURE or found >= (SURE_BESIDE_UNKNOWN if support.rest > 0.0 else SURE)
+    if support.margin < LEAST_NAMED_MARGIN:
+        assert found <= UNSURE
     if support.form_share > MOSTLY_FORM:
         assert honest <= UNSURE
 

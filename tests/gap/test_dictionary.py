@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.gap.dictionary import unknown_groups
+from fogml.gap.dictionary import PRICES, unknown_groups
 from fogml.gap.observation import observe
 from fogml.twin.memory import Memory
 from tests.gap.small_model import SmallModel, ramps
@@ -92,3 +92,10 @@ def test_groups_are_only_there_where_their_cause_moves():
     turning = observe(run.with_columns(rate=rate), SmallModel())
     table = next(g for g in unknown_groups([turning]) if g.name == "table_rate")
     assert left_share(table, [np.abs(rate) ** 1.5]) < 0.02
+
+
+def test_every_price_is_of_a_kind_that_runs_can_show_and_no_other_kind_has_one():
+    run = ramps("d", count=900, step=10.0, turns=2)
+    told = {"T_case": run.temperature("T") + 1.0, "humidity": 50.0 + 10.0 * np.sin(run.time / 3000.0)}
+    o = observe(run.with_columns(rate=np.sin(run.time / 500.0), **told), SmallModel())
+    assert {g.name: g.price for g in unknown_groups([o]) if g.price} == PRICES

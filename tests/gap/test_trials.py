@@ -112,8 +112,8 @@ def test_names_are_given_from_so_much_evidence_on():
 
 @pytest.mark.parametrize(
     "less",
-    [{"margin": 3.0}, {"form_share": 0.1}, {"rest": 1.0}, {"outside": 1}, {"joint": 3.0}, {"surprise": 3.0}],
+    [{"margin": 3.0}, {"form_share": 0.1}, {"rest": 1.0}, {"outside": 1}, {"joint": 3.0}, {"others": 30.0}],
 )
 def test_as_many_nats_with_another_form_or_beside_more_say_less(less):
-    support = Support(margin=3.5, length=10.0, joint=6.0, surprise=1.0)
+    support = Support(margin=3.5, length=10.0, joint=6.0, others=10.0)
     assert named_probability(replace(support, **less)) < named_probability(support)

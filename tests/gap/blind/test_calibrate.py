@@ -34,7 +34,7 @@ def a_file(path: Path, marks: list[Mark], seed: int = 1) -> Path:
 
 
 def test_a_file_of_marks_holds_what_supports_a_name(tmp_path: Path) -> None:
-    stated = {"form_share": 0.1, "rest": 0.3, "length": 12.5, "outside": 1, "joint": 9.5, "surprise": 2.5}
+    stated = {"form_share": 0.1, "rest": 0.3, "length": 12.5, "outside": 1, "joint": 9.5, "others": 2.5}
     found = a_mark(1, "one", "a", [listed("a", 7.25, **stated), listed("b", 1.0)], log_odds=-3.5)
     (again,) = read_marks(a_file(tmp_path / "marks.json.gz", [found])).methods["diagnosis"]
     assert [item.support for item in again.items] == [
@@ -66,7 +66,8 @@ def test_the_share_of_right_names_comes_back_from_a_file(
     named, unknown = capsys.readouterr().out.splitlines()
     assert named.endswith("from 400 findings") and unknown.endswith("from 400 findings")
     constants = [float(c) for c in named.split("(")[1].split(")")[0].split(",")]
-    assert constants[0] + 2.0 * constants[1] == pytest.approx(np.log(3.0), abs=0.02)
+    odds_of_one = constants[0] + float(np.dot(constants[1:], Support(2.0, length=5.0).features))
+    assert odds_of_one == pytest.approx(np.log(3.0), abs=0.02)
     odds = [float(c) for c in unknown.split("(")[1].split(")")[0].split(",")]
     assert odds[1] * LARGEST_LOG_ODDS > 2.0
 

@@ -42,7 +42,7 @@ class Listed(_Answered):
     length: float = 0.0
     outside: int = 0
     joint: float = 0.0
-    surprise: float = 0.0
+    others: float = 0.0
 
     @property
     def support(self) -> Support | None:
