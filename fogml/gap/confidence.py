@@ -4,8 +4,10 @@ Evidence takes the forms of effects and of noise for known. How often a finding 
 given margin, needs so much of another form and stands beside so much else was fitted on spent cases of the
 check on withheld effects, the findings in 6,180 cases of seeds 1000015 and 1000016, by the regression of
 ``experiments.gap_blind.calibrate`` with weight 0.15 beside the mix, and 0.5 for findings beside an unknown,
-and rounded; the unknown's on cases of the mix of seeds 1000013 and 1000014 alone. How sure a name has to be
-was chosen on the same cases, so that a strong unknown is hardly ever given one.
+slopes kept from the wrong sign, and rounded. The marks of these seeds lack `Support.others`: it was taken
+from the lengths that the answers list. The unknown's constants were fitted on cases of the mix of seeds
+1000013 and 1000014 alone. How sure a name has to be was chosen on the same cases, so that a strong unknown
+is hardly ever given one.
 """
 
 from __future__ import annotations
