@@ -177,9 +177,9 @@ VERDICT = """## Verdict
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
 - **Not closed:** the rest, up to {most:.0f} times the floor. Something is named in {named} of {all}
-  diagnoses; on the leg held out it closes half of the gap or more in {better} of these, and makes it larger in {harm}.
-  On x, where the loop is widest, the unknown is at {least_unknown:.2f} or more in all {widest} diagnoses,
-  whatever else is named.
+  diagnoses; on the leg held out it closes half of the gap or more in {better} of these, and makes it
+  larger in {harm}. On x, where the loop is widest, the unknown is at {least_unknown:.2f} or more in all
+  {widest} diagnoses, whatever else is named.
 - **A name is not to be believed here:** its probability, {certain:.2f} at most, is of the fit runs: one leg
   down and one up, in which temperature, its rate and time go together, and a transition whose place and width
   are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after` beside
