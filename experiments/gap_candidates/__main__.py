@@ -16,6 +16,7 @@ from experiments.results import write_results
 from fogml import __version__
 from fogml.gap import diagnose
 from fogml.gap.result import Diagnosis
+from fogml.report.words import listed
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.registry import effect
 
@@ -108,11 +109,17 @@ def page(rows: list[dict[str, Any]]) -> str:
         "|---|---:|---:|---|---|---|---:|---:|---:|---:|---|---|---|---:|---|",
     ]
     lines += [_line(r) for r in sorted(shown, key=lambda r: (r["stage"], r["effect"]))]
-    listed = "\n".join(
+    concealed = "\n".join(
         f"- `{r['effect']}`: share {r['share']:.4f}, "
         + ("in `undetectable`" if r["undetectable"] else "**not in `undetectable`**")
         + (f", **named: {', '.join(r['named'])}**" if r["named"] else "")
         for r in hidden
+    )
+    still = [f"`{r['effect']}`" for r in shown if r["undetectable"]]
+    untold = (
+        f"No candidate, as nothing that tells it from others is recorded: {listed(still)}.\n\n"
+        if still
+        else ""
     )
     return f"""# Every candidate effect alone at d′ = {CONFIG["d_prime"]:g}
 
@@ -147,9 +154,9 @@ catalogue does not hold what is left out, and no such doubt is raised.
 
 {chr(10).join(lines)}
 
-## Effects that do not show beside the constants
+{untold}## Effects that do not show beside the constants
 
-{listed or "none"}
+{concealed or "none"}
 """
 
 
