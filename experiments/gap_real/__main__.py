@@ -102,25 +102,14 @@ def facts(rows: list[dict[str, Any]]) -> dict[str, Any]:
     wide = [r for r in rows if r["noise"] == next(iter(PRIORS))]
     last = [r for r in wide if r["held_out"] == LEGS[-1]]
     told = "from {before:.0f} to {recalibrated:.0f} deg/h on {axis}"
-    named = [r for r in rows if r["named"]]
     widest = [r for r in rows if r["axis"] == "x"]
-    parts = {
-        words: [r for r in named if r["noise"] == label] for words, label in zip(("wide", "near"), PRIORS)
-    }
     return {
         "widest": len(widest),
         "least_unknown": math.floor(100 * min(r["unknown"] for r in widest)) / 100,
         "closed": ", ".join(told.format(**row) for row in last),
         "walk": max(r["walk"] for r in wide),
         "most": max(r["after"] / r["floor"] for r in rows),
-        "named": len(named),
-        "all": len(rows),
-        "near_all": len(rows) - len(wide),
-        "better": _closed_half(named),
-        **{f"{label}_named": len(of) for label, of in parts.items()},
-        **{f"{label}_better": _closed_half(of) for label, of in parts.items()},
-        "harm": len([r for r in named if r["after"] > r["recalibrated"]]),
-        "certain": max((n["probability"] for r in named for n in r["named"]), default=0.0),
+        "summary": summary(rows).replace("\n", "\n  "),
     }
 
 
@@ -176,18 +165,17 @@ VERDICT = """## Verdict
 
 - **Closed:** what a polynomial in T can close. With the last leg held out, recalibration alone takes the gap
   {closed}.
-- **Not closed:** the rest, up to {most:.0f} times the floor. Something is named in {named} of {all}
-  diagnoses; on the leg held out it closes half of the gap or more in {better} of these, and makes it
-  larger in {harm}. On x, where the loop is widest, the unknown is at {least_unknown:.2f} or more in all
-  {widest} diagnoses, whatever else is named.
-- **A name is not to be believed here:** its probability, {certain:.2f} at most, is of the fit runs: one leg
-  down and one up, in which temperature, its rate and time go together, and a transition whose place and width
-  are free bends a polynomial wherever that helps. That an unknown is likely as well, and `after` beside
-  `recalibrated`, are what tells; nothing on the two legs could.
+- **Not closed:** the rest, up to {most:.0f} times the floor.
+  {summary}
+  On x, where the loop is widest, the unknown is at {least_unknown:.2f} or more in all {widest} diagnoses,
+  whatever else is named.
+- **A name is not to be believed here:** its probability is of the fit runs: one leg down and one up, in which
+  temperature, its rate and time go together, and a transition whose place and width are free bends a
+  polynomial wherever that helps. That an unknown is likely as well, and `after` beside `recalibrated`, are
+  what tells; nothing on the two legs could.
 - **The floor is generous:** without a static run the noise comes from the same legs, and slow misfit passes
-  for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y.
-  With B and K pulled to a data sheet's, something is named in {near_named} of {near_all} diagnoses, and half
-  of the gap or more is closed in {near_better} of these; without, in {wide_named} and {wide_better}.
+  for random walk: K up to {walk:.0f} deg/h/sqrt(h), which no data sheet has, and with it `no gap` on y;
+  with B and K pulled to a data sheet's there is none.
 - **Leg `down` held out:** nobody recorded what the unit had been through before it, so that relaxation and
   hysteresis start from rest there.
 

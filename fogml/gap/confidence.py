@@ -6,8 +6,8 @@ check on withheld effects, the findings in 6,180 cases of seeds 1000015 and 1000
 ``experiments.gap_blind.calibrate`` with weight 0.15 beside the mix, and 0.5 for findings beside an unknown,
 slopes kept from the wrong sign, and rounded. The marks of these seeds lack `Support.others`: it was taken
 from the lengths that the answers list. The unknown's constants were fitted on cases of the mix of seeds
-1000013 and 1000014 alone. How sure a name has to be was chosen on the same cases, so that a strong unknown
-is hardly ever given one.
+1000013 and 1000014 alone. How sure a name has to be was chosen on the cases that the names were fitted on,
+so that a strong unknown is hardly ever given one.
 """
 
 from __future__ import annotations
