@@ -16,7 +16,6 @@ from experiments.results import write_results
 from fogml import __version__
 from fogml.gap import diagnose
 from fogml.gap.result import Diagnosis
-from fogml.report.words import listed
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.registry import effect
 
@@ -47,6 +46,7 @@ def judged(bench: Bench, case: Case) -> dict[str, Any]:
         "probability": max((f.probability for f in found.named if id in f.members), default=0.0),
         "unknown": found.unknown.probability,
         "undetectable": id in found.undetectable,
+        "assumed": [words for words in found.assumed if words.startswith(f"{id} ")],
     }
     row |= _closed(bench, case, found)
     row["ok"] = _right(row) if shown else row["undetectable"] and not row["named"]
@@ -109,18 +109,13 @@ def page(rows: list[dict[str, Any]]) -> str:
         "|---|---:|---:|---|---|---|---:|---:|---:|---:|---|---|---|---:|---|",
     ]
     lines += [_line(r) for r in sorted(shown, key=lambda r: (r["stage"], r["effect"]))]
-    concealed = "\n".join(
+    listed = "\n".join(
         f"- `{r['effect']}`: share {r['share']:.4f}, "
         + ("in `undetectable`" if r["undetectable"] else "**not in `undetectable`**")
         + (f", **named: {', '.join(r['named'])}**" if r["named"] else "")
         for r in hidden
     )
-    still = [f"`{r['effect']}`" for r in shown if r["undetectable"]]
-    untold = (
-        f"No candidate, as nothing that tells it from others is recorded: {listed(still)}.\n\n"
-        if still
-        else ""
-    )
+    said = "\n".join(f"- {words}" for r in shown for words in r["assumed"])
     return f"""# Every candidate effect alone at d′ = {CONFIG["d_prime"]:g}
 
 Data: **synthetic**, the twin's own effects (for a reality that is not the twin see `experiments/gap_blind`):
@@ -154,9 +149,13 @@ catalogue does not hold what is left out, and no such doubt is raised.
 
 {chr(10).join(lines)}
 
-{untold}## Effects that do not show beside the constants
+What the diagnoses say they assumed of these:
 
-{concealed or "none"}
+{said or "nothing"}
+
+## Effects that do not show beside the constants
+
+{listed or "none"}
 """
 
 
