@@ -1,0 +1,1 @@
+"""Real files and ordinary units: what comes out of them."""
