@@ -80,7 +80,7 @@ def unchanged(*paths: Path) -> Iterator[None]:
         for path, was in zip(paths, before, strict=True):
             if _state(path) != was:
                 raise InputError(
-                    f"{path.name}: changed while it was read; wait until it is written, then run the command again"
+                    f"{path.name}: changed while it was read; run the command again once it is written"
                 )
 
     try:
