@@ -33,6 +33,15 @@ def misalignment(
             help="Fit a constant over the tilts for a fixture tilted across (where the data show one).",
         ),
     ] = None,
+    state_angles: Annotated[
+        str | None,
+        typer.Option(
+            "--state-angles",
+            metavar="DEG,...",
+            help="Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
+            "(0,180,270,90), where FILE has no column state_angle [deg].",
+        ),
+    ] = None,
     out: options.Out = None,
     seed: options.Seed = None,
     config: options.Config = None,
@@ -41,13 +50,21 @@ def misalignment(
 ) -> None:
     """Scale factor and input-axis misalignment, decoupled over four mounting states.
 
+    In state 2 the gyro is turned clockwise in its mounting plane, seen from +z, by 180 deg, for state 3 by 90
+    deg more, for state 4 by 180 deg more; other turns are stated. Turns the data contradict are an error.
     With --out, writes misalignment.json, misalignment.html and config.yaml.
     """
     from fogml.cli.lab_misalignment_job import MisalignmentSettings, misalignment_and_write
 
     settings = MisalignmentSettings.gather(
         config,
-        {"file": file, "cross_tilt": cross_tilt, "out": str(out) if out else None, "seed": seed},
+        {
+            "file": file,
+            "cross_tilt": cross_tilt,
+            "state_angles": state_angles,
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
     )
     misalignment_and_write(settings, Terminal(as_json, quiet))
 

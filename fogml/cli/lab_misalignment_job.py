@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import Any, ClassVar
 
+from pydantic import field_validator
+
 from fogml.cli.lab_outputs import say_where, tell
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.lab.misalignment_input import read_measurements
@@ -19,7 +21,13 @@ class MisalignmentSettings(Settings):
     path_keys: ClassVar[tuple[str, ...]] = ("file",)
     file: str | None = None
     cross_tilt: bool | None = None
+    state_angles: list[float] | None = None
     out: str | None = None
+
+    @field_validator("state_angles", mode="before")
+    @classmethod
+    def _angles_from_text(cls, value: Any) -> Any:
+        return number_list(value, "0,180,270,90") if isinstance(value, str) else value
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:
@@ -30,7 +38,8 @@ def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -
 
     def make() -> dict[str, Any]:
         with terminal.work(f"reading {file}"):
-            return finite_json(misalignment_json(read_measurements(file), settings.cross_tilt))
+            measured = read_measurements(file, settings.state_angles)
+            return finite_json(misalignment_json(measured, settings.cross_tilt))
 
     def page(values: dict[str, Any]) -> str:
         from fogml.report import misalignment_page

@@ -8,7 +8,7 @@ from pydantic import field_validator
 
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
@@ -44,7 +44,7 @@ class NorthSettings(Settings):
     @field_validator("order", mode="before")
     @classmethod
     def _order_from_text(cls, value: Any) -> Any:
-        return _numbers(value, "0,90,180,270") if isinstance(value, str) else value
+        return number_list(value, "0,90,180,270") if isinstance(value, str) else value
 
     @field_validator("transients", mode="before")
     @classmethod
@@ -52,17 +52,10 @@ class NorthSettings(Settings):
         """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
         if not isinstance(value, list):
             return value
-        pairs = [_numbers(item, "0.2,600") if isinstance(item, str) else item for item in value]
+        pairs = [number_list(item, "0.2,600") if isinstance(item, str) else item for item in value]
         if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
             raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
         return pairs
-
-
-def _numbers(text: str, example: str) -> list[float]:
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ValueError(f"'{text}' is no list of numbers; write e.g. {example}") from None
 
 
 def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:

@@ -112,6 +112,20 @@ def named_values(texts: list[Any]) -> dict[str, Any]:
     return values
 
 
+def number_list(text: str, example: str) -> list[float]:
+    """Numbers of a text with commas.
+
+    Raises
+    ------
+    ValueError
+        With an example, if one is no number.
+    """
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"'{text}' is no list of numbers; write e.g. {example}") from None
+
+
 def number_or_text(value: Any) -> Any:
     """A value that YAML read, and ``1e-4``, which it takes for text, as a number."""
     try:

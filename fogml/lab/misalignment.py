@@ -3,8 +3,10 @@
 The input axis is a = (sin dx, sin dy, cos d) in gyro coordinates, the table's axis u = (sin t, 0, cos t) at
 tilt t. For each state and tilt the output slope s over the table rate is a least-squares line; over the tilts
 s = c_c cos t + c_s sin t. With a zero error e of the fixture c_c = K (a_z cos e + a_x sin e) and
-c_s = K (a_x cos e - a_z sin e), so that hypot(c_c, c_s) is free of e and atan2(c_s, c_c) = psi_x - e. State 2
-is turned by 180 deg in its plane, states 3 and 4 do the same for y.
+c_s = K (a_x cos e - a_z sin e), so that hypot(c_c, c_s) is free of e and atan2(c_s, c_c) = psi_x - e. The
+states are turns of the gyro in its mounting plane: in state 2, by 180 deg, a_x becomes -a_x, in states 3 and
+4 it becomes -a_y and a_y (:mod:`fogml.lab.misalignment_states`). All eight coefficients give K, a and e by
+least squares.
 
 Source: the patent on decoupled testing of scale factor and input-axis misalignment (Fang et al., Beihang
 University), with a constant column over the tilts for a fixture that is tilted across, and covariances.
@@ -12,7 +14,7 @@ University), with a constant column over the tilts for a fixture that is tilted 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,9 +30,9 @@ from fogml.lab.misalignment_errors import (
     errors_of,
     slope_noise,
 )
+from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, check_order, sense_of, solve
 from fogml.runs.run import FloatArray
 
-STATES = (1, 2, 3, 4)
 _CROSS_TILT_TEST = 0.01
 
 
@@ -52,6 +54,9 @@ class TableMeasurements:
         Of the output.
     source
         File or run, for messages.
+    state_angles_deg
+        Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z, that is against
+        the reference axis [deg].
     """
 
     state: FloatArray
@@ -60,6 +65,7 @@ class TableMeasurements:
     output: FloatArray
     unit: str
     source: str = "measurements"
+    state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,9 @@ class Misalignment:
     rate_noise, tilt_noise
         Standard deviation of one slope [output per deg/s] as the lines over the rates tell it, and as
         the fits over the tilts do; None where nothing is left over.
+    order_p
+        Probability that the states disagree as much as they do under the stated order of their turns by
+        chance; None where no noise is known.
     notes
         What to mind.
     """
@@ -110,6 +119,7 @@ class Misalignment:
     states: tuple[StateFit, ...]
     rate_noise: float | None
     tilt_noise: float | None
+    order_p: float | None
     notes: tuple[str, ...] = ()
 
 
@@ -126,9 +136,11 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
     Raises
     ------
     InputError
-        If a state is missing, or a state's tilts do not tell sine from cosine.
+        If a state is missing, a state's tilts do not tell sine from cosine, or the data contradict the
+        order of the states' turns.
     """
     check_states(measured)
+    angles_deg = tuple(float(angle) for angle in measured.state_angles_deg)
     slopes = {state: _slopes(measured, state) for state in STATES}
     for state in STATES:
         _check_tilts(measured.source, state, slopes[state].tilts, bool(cross_tilt))
@@ -136,13 +148,15 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         cross_tilt = _shows_cross_tilt(slopes)
     fits = tuple(_fit(state, slopes[state], cross_tilt) for state in STATES)
     c = np.array([fit.coefficients[:2] for fit in fits])
-    values = _solve(c)
     rate_noise, tilt_noise, variances, dof, notes = slope_noise(slopes, fits)
+    order_p, doubts = check_order(c, _weights(fits, variances), angles_deg, dof, measured.source)
+    alike = _weights(fits, None)
+    values, gradient = solve(c, alike, angles_deg)
     se, region = None, None
     intervals: dict[str, tuple[float, float]] = {}
     covariance = None
     if variances is not None:
-        covariance = covariance_of(_solve, c, fits, variances)
+        covariance = covariance_of(gradient, fits, variances)
         se, intervals, region = errors_of(values, covariance, dof)
     across, more = _cross_tilt_angle(fits, values, covariance) if cross_tilt else (None, ())
     return Misalignment(
@@ -160,7 +174,8 @@ def decouple(measured: TableMeasurements, cross_tilt: bool | None = None) -> Mis
         states=fits,
         rate_noise=rate_noise,
         tilt_noise=tilt_noise,
-        notes=(*notes, *more, *_reversed(values)),
+        order_p=order_p,
+        notes=(*doubts, *notes, *more, *_reversed(values), sense_of(angles_deg)),
     )
 
 
@@ -266,23 +281,18 @@ def _shows_cross_tilt(slopes: Mapping[int, Slopes]) -> bool:
     return bool(stats.f.sf(ratio, len(wide), dof) < _CROSS_TILT_TEST)
 
 
-def _solve(c: FloatArray) -> FloatArray:
-    """K, dx, dy, d, e_x, e_y from c of shape (..., 4, 2); angles in deg, shape (..., 6)."""
-    radius, angle = np.hypot(c[..., 0], c[..., 1]), np.arctan2(c[..., 1], c[..., 0])
-    # Half differences and sums of angles on the circle, free of the cut at 180 deg.
-    psi = np.stack([_half(angle[..., i] - angle[..., i + 1]) for i in (0, 2)], axis=-1)
-    error = np.stack([-(angle[..., i] - psi[..., i // 2]) for i in (0, 2)], axis=-1)
-    error = np.angle(np.exp(1j * error))
-    mean = np.stack([radius[..., i] + radius[..., i + 1] for i in (0, 2)], axis=-1) / 2.0
-    x, y = (mean * np.sin(psi))[..., 0], (mean * np.sin(psi))[..., 1]
-    z = (mean * np.cos(psi)).mean(axis=-1)
-    k = np.sqrt(x**2 + y**2 + z**2)
-    angles = [np.arcsin(x / k), np.arcsin(y / k), np.arctan2(np.hypot(x, y), z), error[..., 0], error[..., 1]]
-    return np.stack([k, *np.degrees(angles)], axis=-1)
+def _weights(fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...] | None) -> FloatArray:
+    """Square roots of the information on each state's c_c and c_s, shape (4, 2, 2).
 
-
-def _half(angle: FloatArray) -> FloatArray:
-    return np.asarray(np.angle(np.exp(1j * angle)) / 2.0)
+    Without variances that of round-off.
+    """
+    roots = []
+    floor = (ROUND_OFF * max(float(np.abs(fit.slopes).max()) for fit in fits)) ** 2
+    for i, fit in enumerate(fits):
+        solver = np.linalg.pinv(fit.design)[:2]
+        noise = floor if variances is None else np.maximum(variances[i], floor)
+        roots.append(np.linalg.cholesky(np.linalg.inv((solver * noise) @ solver.T)).T)
+    return np.array(roots)
 
 
 def _cross_tilt_angle(
@@ -302,4 +312,7 @@ def _cross_tilt_angle(
 def _reversed(values: FloatArray) -> tuple[str, ...]:
     if values[3] <= 90.0:
         return ()
-    return ("the input axis points down: the angle to the reference axis is above 90 deg",)
+    return (
+        "the input axis points down, or the output's sign is reversed: the angle to the reference axis is "
+        "above 90 deg",
+    )

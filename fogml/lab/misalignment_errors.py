@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -120,24 +120,14 @@ def _with_tilt_errors(fits: tuple[StateFit, ...], by_rates: float) -> tuple[Floa
 
 
 def covariance_of(
-    solve: Callable[[FloatArray], FloatArray],
-    c: FloatArray,
-    fits: tuple[StateFit, ...],
-    variances: tuple[FloatArray, ...],
+    gradient: FloatArray, fits: tuple[StateFit, ...], variances: tuple[FloatArray, ...]
 ) -> FloatArray:
-    """Covariance of what `solve` makes of c, shape (4, 2), by central differences."""
-    jacobian = np.empty((6, 8))
-    step = 1e-6 * float(np.abs(c).max())
-    for i in range(8):
-        moved = np.zeros(8)
-        moved[i] = step
-        up, down = solve(c + moved.reshape(4, 2)), solve(c - moved.reshape(4, 2))
-        jacobian[:, i] = (up - down) / (2.0 * step)
-    blocks = np.zeros((8, 8))
+    """Covariance of values with a gradient by the states' coefficients, shape (v, 4, 2): shape (v, v)."""
+    covariance = np.zeros((len(gradient), len(gradient)))
     for i, (fit, variance) in enumerate(zip(fits, variances, strict=True)):
-        solver = np.linalg.pinv(fit.design)[:2]
-        blocks[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] = (solver * variance) @ solver.T
-    return np.asarray(jacobian @ blocks @ jacobian.T)
+        by_slopes = gradient[:, i] @ np.linalg.pinv(fit.design)[:2]
+        covariance += (by_slopes * variance) @ by_slopes.T
+    return covariance
 
 
 def errors_of(

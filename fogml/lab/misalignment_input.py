@@ -3,19 +3,23 @@
 Columns: ``state`` (1 to 4), ``tilt [deg]``, ``rate [deg/s]``, ``output`` with its unit (or ``gyro``), and
 ``segment`` (before, turn, after) with one row per average. Without ``segment`` rests and turns are found from
 the rate; with ``time`` the rows are samples, and the samples about each change of the rate are cut.
+``state_angle [deg]`` is how far the gyro is turned in its mounting plane in the state of the row, clockwise
+as seen from +z; without it states 1 to 4 are at 0, 180, 270 and 90 deg.
 """
 
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.lab.misalignment import STATES, TableMeasurements
+from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows, from_marks, from_rates, from_samples
+from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, stated
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.csv_dialect import csv_dialect
 from fogml.runs.raw_table import RawTable
@@ -24,11 +28,20 @@ from fogml.runs.run import FloatArray
 
 SEGMENTS = ("before", "turn", "after")
 _NEEDED = ("state", "tilt", "rate")
-_TILT_UNITS = {"deg": 1.0, "rad": 180.0 / np.pi}
+_ANGLE_UNITS = {"deg": 1.0, "rad": 180.0 / np.pi}
+_SAME_ANGLE_DEG = 1e-6
 
 
-def read_measurements(path: str | Path) -> TableMeasurements:
+def read_measurements(path: str | Path, state_angles_deg: Sequence[float] | None = None) -> TableMeasurements:
     """What the turns in a file gave.
+
+    Parameters
+    ----------
+    path
+        The file.
+    state_angles_deg
+        Turn of states 1 to 4 in the mounting plane, clockwise as seen from +z [deg], where the file has no
+        column of it; if None, that of the source document.
 
     Raises
     ------
@@ -38,7 +51,7 @@ def read_measurements(path: str | Path) -> TableMeasurements:
     path = Path(path)
     table = read_table(path)
     cells = _cells(table)
-    rows = _rows(table, cells)
+    rows = _rows(table, cells, state_angles_deg)
     if "segment" in cells:
         return from_marks(rows, _segments(path, table, cells["segment"]))
     if "time" in cells:
@@ -82,7 +95,48 @@ def _column(table: RawTable, cells: dict[str, str], name: str) -> FloatArray:
     return values
 
 
-def _rows(table: RawTable, cells: dict[str, str]) -> Rows:
+def _angle(table: RawTable, cells: dict[str, str], name: str) -> FloatArray:
+    """A column of angles [deg]."""
+    unit = parse_header(cells[name])[1]
+    if unit not in _ANGLE_UNITS:
+        found = f"has unit '{unit}'" if unit else "states no unit"
+        raise InputError(f"{table.file}: column '{name}' {found}; write '{name} [deg]' or '{name} [rad]'")
+    return _ANGLE_UNITS[unit] * _column(table, cells, name)
+
+
+def _state_angles(
+    table: RawTable, cells: dict[str, str], state: FloatArray, given: Sequence[float] | None
+) -> tuple[float, ...]:
+    """Turn of states 1 to 4 [deg]: the file's own, else the given ones, else the source document's."""
+    if given is not None and (len(given) != len(STATES) or not np.isfinite(given).all()):
+        raise InputError(
+            f"state angles {stated(given)}: four angles were expected, one for each of the states 1 to 4"
+        )
+    if "state_angle" not in cells:
+        return tuple(DOCUMENT_ANGLES_DEG if given is None else given)
+    angles = _angle(table, cells, "state_angle")
+    found = []
+    for number, default in zip(STATES, DOCUMENT_ANGLES_DEG):
+        own = np.flatnonzero(state == number)
+        # A state that is not there is missed where all four are needed.
+        first = float(angles[own[0]]) if len(own) else default
+        other = own[np.abs(angles[own] - first) > _SAME_ANGLE_DEG]
+        if len(other):
+            row = int(other[0])
+            raise InputError(
+                f"{table.file}, column 'state_angle', {table.row_name(row)}: {angles[row]:g} deg "
+                f"in state {number}, {first:g} deg in a row before; a state is one turn of the gyro"
+            )
+        found.append(first)
+    if given is not None and np.max(np.abs(np.subtract(found, given))) > _SAME_ANGLE_DEG:
+        raise InputError(
+            f"{table.file}, column 'state_angle': states 1 to 4 at {stated(found)} deg, and "
+            f"{stated(given)} deg were given; leave one of the two out"
+        )
+    return tuple(found)
+
+
+def _rows(table: RawTable, cells: dict[str, str], state_angles_deg: Sequence[float] | None) -> Rows:
     state = _column(table, cells, "state")
     wrong = ~np.isin(state, STATES)
     if wrong.any():
@@ -91,10 +145,6 @@ def _rows(table: RawTable, cells: dict[str, str]) -> Rows:
             f"{table.file}, column 'state', {table.row_name(row)}: {state[row]:g} is no mounting state; "
             "states are 1, 2, 3 and 4"
         )
-    tilt_unit = parse_header(cells["tilt"])[1]
-    if tilt_unit not in _TILT_UNITS:
-        stated = f"has unit '{tilt_unit}'" if tilt_unit else "states no unit"
-        raise InputError(f"{table.file}: column 'tilt' {stated}; write 'tilt [deg]' or 'tilt [rad]'")
     rate_factor, _ = conversion("rate", parse_header(cells["rate"])[1], table.file)
     name = "output" if "output" in cells else "gyro"
     unit = parse_header(cells[name])[1]
@@ -106,9 +156,10 @@ def _rows(table: RawTable, cells: dict[str, str]) -> Rows:
         source=table.file,
         unit=unit,
         state=state,
-        tilt_deg=_TILT_UNITS[tilt_unit] * _column(table, cells, "tilt"),
+        tilt_deg=_angle(table, cells, "tilt"),
         rate_deg_s=rate_factor * _column(table, cells, "rate"),
         output=_column(table, cells, name),
+        state_angles_deg=_state_angles(table, cells, state, state_angles_deg),
         row_name=table.row_name,
     )
 

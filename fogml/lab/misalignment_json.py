@@ -56,6 +56,8 @@ def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = Non
         "cross_tilt": found.cross_tilt,
         "cross_tilt_deg": found.cross_tilt_deg,
         "slope_noise": {"by_rates": found.rate_noise, "by_tilts": found.tilt_noise, "unit": per_rate},
+        "state_angles_deg": list(measured.state_angles_deg),
+        "order_p": found.order_p,
         "turns": len(measured.output),
         "rates_deg_s": np.unique(np.round(measured.rate_deg_s, 6)).tolist(),
         "states": [

@@ -8,6 +8,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements, decouple, fit_state
+from fogml.lab.misalignment_states import STATES
 
 _SAME_TILT_DEG = 0.05
 
@@ -29,9 +30,10 @@ class Method:
 def compare_methods(measured: TableMeasurements, cross_tilt: bool | None = None) -> tuple[Method, ...]:
     """The classical test, single state and four states on the same measurements.
 
-    The classical test takes state 1 upright for K (cos d taken as 1) and states 1 and 3 lying at 90 deg for
-    the misalignment (sin d taken as d); it sees the fixture's zero error as misalignment. One state alone
-    gives R = K sqrt(1 - a_y^2) for K and, with the fixture's zero error in it, one angle.
+    The classical test takes state 1 upright for K (cos d taken as 1) and the first state of each axis lying
+    at 90 deg for the misalignment (sin d taken as d), where the states are quarter turns; it sees the
+    fixture's zero error as misalignment. One state alone gives R = K sqrt(1 - a_y^2) for K and, with the
+    fixture's zero error in it, one angle.
 
     Raises
     ------
@@ -41,13 +43,15 @@ def compare_methods(measured: TableMeasurements, cross_tilt: bool | None = None)
     four = decouple(measured, cross_tilt)
     alone = fit_state(measured, 1, four.cross_tilt)
     cosine, sine = alone.coefficients[:2]
+    angle = float(np.degrees(np.arctan2(sine, cosine)))
+    along_x, along_y = _quarter_turn(measured, 1)
     return (
         _classical(measured),
         Method(
             "single state",
             float(np.hypot(cosine, sine)),
-            float(np.degrees(np.arctan2(sine, cosine))),
-            None,
+            along_x * angle if along_x else None,
+            along_y * angle if along_y else None,
             "state 1 over its tilts; what lies across its tilt plane stays unseen",
         ),
         Method(
@@ -65,9 +69,24 @@ def _classical(measured: TableMeasurements) -> Method:
     k = _slope_at(measured, 1, 0.0)
     if k is None:
         return Method("classical test", None, None, None, f"{why}; no tilt 0 in state 1")
-    lying = [_slope_at(measured, state, 90.0) for state in (1, 3)]
-    x, y = (None if slope is None else float(np.degrees(slope / k)) for slope in lying)
+    found: list[float | None] = [None, None]
+    for state in reversed(STATES):
+        slope = _slope_at(measured, state, 90.0)
+        for axis, sign in enumerate(_quarter_turn(measured, state)):
+            if sign and slope is not None:
+                found[axis] = float(np.degrees(sign * slope / k))
+    x, y = found
     return Method("classical test", k, x, y, why if x is not None else f"{why}; no tilt 90 deg in state 1")
+
+
+def _quarter_turn(measured: TableMeasurements, state: int) -> tuple[int, int]:
+    """Signs of a_x and a_y along the fixture's x axis in a state; both 0 where it is no quarter turn."""
+    turn = np.radians(measured.state_angles_deg[state - 1])
+    along = np.array([np.cos(turn), np.sin(turn)])
+    whole = np.round(along)
+    if np.abs(along - whole).max() > np.radians(_SAME_TILT_DEG):
+        return 0, 0
+    return int(whole[0]), int(whole[1])
 
 
 def _slope_at(measured: TableMeasurements, state: int, tilt_deg: float) -> float | None:

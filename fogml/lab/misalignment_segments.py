@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.lab.misalignment import TableMeasurements
+from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG
 from fogml.runs.raw_table import numbered_row
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.transitions import transition_mask
@@ -20,7 +21,10 @@ IndexArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of a file, each array of shape (n,): averages or samples, in the order recorded."""
+    """Rows of a file, each array of shape (n,): averages or samples, in the order recorded.
+
+    ``state_angles_deg`` is the turn of states 1 to 4, clockwise as seen from +z.
+    """
 
     source: str
     unit: str
@@ -28,6 +32,7 @@ class Rows:
     tilt_deg: FloatArray
     rate_deg_s: FloatArray
     output: FloatArray
+    state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
     row_name: Callable[[int], str] = numbered_row
 
 
@@ -86,7 +91,8 @@ def from_marks(rows: Rows, segment: NDArray[np.str_]) -> TableMeasurements:
             np.asarray(total[turned] / count[turned]) for total, count in zip(sums, counts)
         )
         state, tilt, rate = unique[turned].T
-        return TableMeasurements(state, tilt, rate, during - (before + after) / 2.0, rows.unit, rows.source)
+        output = during - (before + after) / 2.0
+        return TableMeasurements(state, tilt, rate, output, rows.unit, rows.source, rows.state_angles_deg)
     changes = turn[1:] != turn[:-1]
     # A rest's rate, where it states one, is its turn's and no setting of its own.
     changes |= turn[1:] & turn[:-1] & (np.diff(rows.rate_deg_s) != 0.0)
@@ -221,4 +227,5 @@ def _measured(rows: Rows, chunks: _Chunks) -> TableMeasurements:
         chunks.mean[turns] - level,
         rows.unit,
         rows.source,
+        rows.state_angles_deg,
     )

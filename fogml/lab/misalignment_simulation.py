@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.lab.misalignment import STATES, TableMeasurements
+from fogml.lab.misalignment import TableMeasurements
 from fogml.lab.misalignment_segments import Rows
+from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES
 from fogml.runs.facts import EARTH_RATE_DEG_H
 from fogml.runs.run import FloatArray
-
-_HALF_TURN = {1: 0.0, 2: 180.0, 3: 90.0, 4: 270.0}
-"""Turn of the gyro in its mounting plane in each state [deg], so that a_x of state 3 is a_y."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +43,8 @@ class TableUnit:
     bias: float = 0.0
     drift_per_s: float = 0.0
 
-    def input_axis(self, state: int) -> FloatArray:
-        """The input axis in fixture coordinates in one state, shape (3,).
+    def input_axis(self, turn_deg: float) -> FloatArray:
+        """The input axis in fixture coordinates, turned clockwise as seen from +z, shape (3,).
 
         Raises
         ------
@@ -58,7 +56,7 @@ class TableUnit:
             raise InputError(
                 "the two components of the misalignment are no direction: their squares exceed 1"
             )
-        turn = np.radians(_HALF_TURN[state])
+        turn = np.radians(turn_deg)
         cosine, sine = np.cos(turn), np.sin(turn)
         z = np.sqrt(1.0 - x * x - y * y)
         return np.array([x * cosine + y * sine, -x * sine + y * cosine, z])
@@ -82,6 +80,7 @@ def measurements(
     *,
     noise: float = 0.0,
     tilt_noise_deg: float = 0.0,
+    state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG,
     seed: int = 0,
     output_unit: str = "V",
 ) -> TableMeasurements:
@@ -92,10 +91,10 @@ def measurements(
     )
     settings = tilt_noise_deg * random.standard_normal((len(STATES), len(tilts_deg)))
     set_tilt = tilt + np.repeat(settings.ravel(), len(rates_deg_s))
-    axes = np.array([unit.input_axis(int(s)) for s in STATES])[state.astype(int) - 1]
+    axes = np.array([unit.input_axis(turn) for turn in state_angles_deg])[state.astype(int) - 1]
     output = unit.K * rate * np.sum(axes * unit.table_axis(set_tilt), axis=-1)
     output += noise * random.standard_normal(len(output))
-    return TableMeasurements(state, tilt, rate, output, output_unit, "synthetic")
+    return TableMeasurements(state, tilt, rate, output, output_unit, "synthetic", tuple(state_angles_deg))
 
 
 def samples(
@@ -109,6 +108,7 @@ def samples(
     acceleration_deg_s2: float = 20.0,
     sample_s: float = 0.1,
     noise: float = 0.0,
+    state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG,
     seed: int = 0,
     output_unit: str = "V",
 ) -> tuple[Rows, FloatArray]:
@@ -129,7 +129,7 @@ def samples(
     time = np.asarray(sample_s * np.arange(len(rate)), dtype=np.float64)
     state = np.repeat(np.repeat(np.array(STATES, dtype=float), len(tilts_deg)), len(one_tilt))
     tilt = np.repeat(np.tile(np.asarray(tilts_deg, dtype=float), len(STATES)), len(one_tilt))
-    axis = np.array([unit.input_axis(int(s)) for s in STATES])[state.astype(int) - 1]
+    axis = np.array([unit.input_axis(turn) for turn in state_angles_deg])[state.astype(int) - 1]
     along = np.sum(axis * unit.table_axis(tilt), axis=-1)
     angle = np.radians(np.cumsum(rate) * sample_s)
     earth = EARTH_RATE_DEG_H / 3600.0
@@ -138,7 +138,7 @@ def samples(
     turning = earth * np.cos(latitude) * across * np.cos(angle)
     output = unit.K * (along * (rate + earth * np.sin(latitude)) + turning)
     output += unit.bias + unit.drift_per_s * time + noise * random.standard_normal(len(time))
-    return Rows("synthetic", output_unit, state, tilt, rate, output), time
+    return Rows("synthetic", output_unit, state, tilt, rate, output, tuple(state_angles_deg)), time
 
 
 def _sequence_rates(

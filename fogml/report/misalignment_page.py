@@ -124,7 +124,7 @@ def _methods(values: Mapping[str, Any]) -> Table:
 
 def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     tilts = sorted({tilt for state in values["states"] for tilt in state["tilts_deg"]})
-    noise = values["slope_noise"]
+    noise, order_p = values["slope_noise"], values["order_p"]
     across = "fitted" if values["cross_tilt"] else "none fitted"
     if values["cross_tilt_deg"] is not None:
         across += f", {number(values['cross_tilt_deg'])} deg"
@@ -132,6 +132,8 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("turns", plural(values["turns"], "turn")),
         ("rates", f"{listed([stated(r) for r in values['rates_deg_s']], 12)} deg/s"),
         ("tilts", f"{listed([stated(t) for t in tilts], 12)} deg"),
+        ("states", f"turned by {listed([stated(a) for a in values['state_angles_deg']], 4)} deg, clockwise"),
+        ("states disagree by chance", "not known" if order_p is None else f"probability {number(order_p)}"),
         ("tilt across", across),
         ("noise of a slope, by the rates", f"{number(noise['by_rates'])} {values['unit']}"),
         ("noise of a slope, by the tilts", f"{number(noise['by_tilts'])} {values['unit']}"),

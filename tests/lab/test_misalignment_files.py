@@ -119,6 +119,39 @@ def test_faults_are_named(tmp_path: Path, change, message: str) -> None:
     assert "table.csv" in str(caught.value)
 
 
+def turned_file(tmp_path: Path, angles: tuple[float, ...], unit: str | None) -> Path:
+    turns = measurements(UNIT, TILTS, RATES, state_angles_deg=angles)
+    rows = []
+    for state, tilt, rate, output in zip(turns.state, turns.tilt_deg, turns.rate_deg_s, turns.output):
+        angle = angles[int(state) - 1]
+        told = f"{np.radians(angle) if unit == 'rad' else angle:.12g}," if unit else ""
+        for mark, value in (("before", 0.2), ("turn", 0.2 + output), ("after", 0.2)):
+            rows.append(f"{told}{state:g},{tilt:g},{rate:g},{mark},{value:.15g}")
+    return written(tmp_path, rows, (f"state_angle [{unit}]," if unit else "") + HEADER)
+
+
+@pytest.mark.parametrize("unit", ["deg", "rad"])
+def test_turns_of_the_states_from_a_column(tmp_path: Path, unit: str) -> None:
+    found = decouple(read_measurements(turned_file(tmp_path, (0.0, 90.0, 180.0, 270.0), unit)))
+    assert (found.delta_x_deg, found.delta_y_deg) == pytest.approx((5.0, 3.0), abs=1e-8)
+
+
+def test_turns_of_the_states_given_and_faults(tmp_path: Path) -> None:
+    angles = (0.0, 90.0, 180.0, 270.0)
+    bare = turned_file(tmp_path, angles, None)
+    assert decouple(read_measurements(bare, angles)).delta_y_deg == pytest.approx(3.0, abs=1e-8)
+    with pytest.raises(InputError, match=r"table\.csv: the turns contradict"):
+        decouple(read_measurements(bare))
+    with pytest.raises(InputError, match="four angles"):
+        read_measurements(bare, (0.0, 90.0))
+    own = turned_file(tmp_path, angles, "deg")
+    with pytest.raises(InputError, match="leave one of the two out"):
+        read_measurements(own, (0.0, 180.0, 270.0, 90.0))
+    own.write_text(own.read_text().replace("90,2,30,10,turn", "91,2,30,10,turn"))
+    with pytest.raises(InputError, match=r"column 'state_angle', line .*91 deg in state 2, 90 deg"):
+        read_measurements(own)
+
+
 def test_a_turn_without_a_rest_is_named(tmp_path: Path) -> None:
     rows = lines(rate_on_rests=False)
     del rows[2:4]
