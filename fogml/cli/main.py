@@ -15,6 +15,7 @@ from typer.core import TyperGroup
 
 from fogml import __version__
 from fogml.errors import FogmlError
+from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
 
 COMMANDS = {
@@ -97,7 +98,7 @@ class LazyGroup(TyperGroup):
 
 def fail(message: str) -> None:
     """Print one message on stderr and end with exit status 2."""
-    typer.echo(f"fogml: {message}", err=True)
+    typer.echo(f"fogml: {terminal_text(message)}", err=True)
     raise typer.Exit(BAD_INPUT) from None
 
 

@@ -11,6 +11,8 @@ from typing import Any, Protocol
 
 import typer
 
+from fogml.escaping import terminal_text, visible
+
 _LINE_EVERY_S = 10.0
 """Where stderr is no terminal, a line on long work this often."""
 
@@ -46,12 +48,12 @@ class Terminal:
     def note(self, text: str) -> None:
         """A line on stderr."""
         if not self.quiet:
-            typer.echo(text, err=True)
+            typer.echo(terminal_text(text), err=True)
 
     def say(self, text: str) -> None:
         """A line on stdout for people."""
         if not (self.quiet or self.as_json):
-            typer.echo(text)
+            typer.echo(terminal_text(text))
 
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
@@ -66,12 +68,12 @@ class Terminal:
         from rich.console import Console
         from rich.table import Table
 
-        table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        table = Table(title=terminal_text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
         for number, name in enumerate(header):
             # Words break anywhere rather than be cut: a figure is never lost.
             table.add_column(name, justify="right" if number else "left", overflow="fold")
         for row in rows:
-            table.add_row(*row)
+            table.add_row(*map(terminal_text, row))
         Console(highlight=False, markup=False).print(table)
 
     @contextmanager
@@ -125,7 +127,7 @@ class _Lines:
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
             text = f"{what}: {self._done / self._total:.0%}, about {left:.0f} s left"
-        typer.echo(text, err=True)
+        typer.echo(terminal_text(text), err=True)
 
 
 @contextmanager
@@ -149,19 +151,19 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
         TimeRemainingColumn(),
     ]
     with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
-        task = progress.add_task(what, total=total)
+        task = progress.add_task(visible(what), total=total)
 
         class Bar:
             def advance(self, amount: float = 1.0, doing: str | None = None) -> None:
                 progress.advance(task, amount)
                 if doing is not None:
-                    progress.update(task, description=doing)
+                    progress.update(task, description=visible(doing))
 
             def doing(self, what: str) -> None:
-                progress.update(task, description=what)
+                progress.update(task, description=visible(what))
 
             def reached(self, done: float, total: float, doing: str) -> None:
-                progress.update(task, completed=done, total=total, description=doing)
+                progress.update(task, completed=done, total=total, description=visible(doing))
 
         yield Bar()
 

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.export.c_float import array
+from fogml.escaping import CCode
+from fogml.export.c_float import array, box_comment, sensor_identifier
 from fogml.export.fixed_scales import (
     OUTPUT_BITS,
     VALUE_BITS,
@@ -106,7 +107,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
 def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
     shift = _HELD_BITS - bits + _SIGNAL_SHIFT
     factors = [
-        f"temperatures[FOGML_{name.upper()}] * INT64_C({round(coefficient * 2.0**shift)})"
+        f"temperatures[{sensor_identifier(name)}] * INT64_C({round(coefficient * 2.0**shift)})"
         for name, coefficient in parts
     ]
     return f"(int32_t)clipped(scaled({' + '.join(factors)}, {_SIGNAL_SHIFT}), INT64_C(1) << 29)"
@@ -217,7 +218,7 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
             f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
             f"#define COLUMNS {len(plan.steps)} /* features */",
             "",
-            f"/* The trained box, by atom: {', '.join(atom.text for atom in plan.atoms)}. */",
+            box_comment(plan),
         ]
         for name, values, note in (
             ("LOW", limits.low, "values below are levelled off"),
@@ -247,7 +248,9 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
         ]
     if plan.form == "joint":
         lines += _scale_constants(plan, scales)
-    return lines + (_network_constants(plan, scales, stored) if plan.centres else [])
+    if plan.centres:
+        lines += _network_constants(plan, scales, stored)
+    return [CCode(line) for line in lines]
 
 
 def _scale_constants(plan: Plan, scales: Scales) -> list[str]:

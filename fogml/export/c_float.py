@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fogml.errors import InputError
+from fogml.escaping import CCode, c_text
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
@@ -20,16 +22,21 @@ EXP_ERROR = {"float64": 4e-16, "float32": 2e-7}
 
 
 def literal(value: float, dtype: str) -> str:
-    """A number as a C literal that reads back as the same float64 or float32."""
-    if dtype == "float32":
-        text = repr(float(np.float32(value))) if np.float32(value) == 0 else str(np.float32(value))
-        return f"{text if _is_floating(text) else text + '.0'}f"
-    text = repr(float(value))
-    return text if _is_floating(text) else f"{text}.0"
+    """A number as a C literal that reads back as the same float64 or float32.
 
-
-def _is_floating(text: str) -> bool:
-    return any(mark in text for mark in ".en")
+    Raises
+    ------
+    InputError
+        If it is not finite, or too large for the type.
+    """
+    single = dtype == "float32"
+    if not abs(value) <= float(np.finfo(dtype).max):
+        raise InputError(
+            f"export: a number of the model is {value:g}, which {dtype} does not hold; "
+            + ("use float64" if single and np.isfinite(value) else "train it again")
+        )
+    text = str(np.float32(value)) if single else repr(float(value))
+    return (text if any(mark in text for mark in ".e") else f"{text}.0") + ("f" if single else "")
 
 
 def array(name: str, values: ArrayLike, dtype: str, size: str, kind: str, note: str = "") -> list[str]:
@@ -111,12 +118,26 @@ def _signal(signal: Signal, plan: Plan, number: Any) -> str:
     """A combination of temperatures, worked out in the library's order."""
     pieces = []
     for index, (name, coefficient) in enumerate(signal.parts):
-        place = f"temperatures[FOGML_{name.upper()}]"
+        place = f"temperatures[{sensor_identifier(name)}]"
         size = abs(coefficient)
         scaled = place if size == 1.0 else f"{number(size)} * {place}"
         sign = ("-" if coefficient < 0 else "") if index == 0 else (" - " if coefficient < 0 else " + ")
         pieces.append(sign + scaled)
     return "".join(pieces)
+
+
+def sensor_identifier(name: str) -> str:
+    """The identifier of a temperature's place in the array of temperatures.
+
+    Raises
+    ------
+    ValueError
+        If the name is not a word of ASCII; those that features can name all are.
+    """
+    identifier = f"FOGML_{name.upper()}"
+    if not (identifier.isascii() and identifier.isidentifier()):
+        raise ValueError(f"temperature {name!r} makes no identifier of C")
+    return identifier
 
 
 def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
@@ -175,7 +196,7 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         lines.append(f"#define DEAD_BAND {band} /* rates up to this count as standing still [degC/min] */")
     if plan.atoms:
         limits = plan.limits
-        lines += ["", f"/* The trained box, by atom: {', '.join(atom.text for atom in plan.atoms)}. */"]
+        lines += ["", box_comment(plan)]
         for name, values, note in (
             ("LOW", limits.low, "values below are levelled off"),
             ("HIGH", limits.high, "values above are levelled off"),
@@ -184,7 +205,12 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
             ("OUTER", limits.outer, "values above are flagged"),
         ):
             lines += array(name, values, dtype, "[ATOMS]", real, note)
-    return [*lines, "", *_model_constants(plan, dtype, real)]
+    return [CCode(line) for line in (*lines, "", *_model_constants(plan, dtype, real))]
+
+
+def box_comment(plan: Plan) -> str:
+    """The line above the trained box."""
+    return f"/* The trained box, by atom: {c_text(', '.join(atom.text for atom in plan.atoms))}. */"
 
 
 def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import shutil
-import subprocess
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -13,13 +12,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.escaping import terminal_text
 from fogml.export.c_source import DRIVER, SOURCE, CSource
+from fogml.limited import Finished, LimitExceededError, Limits, run_limited
 
 FloatArray = NDArray[np.float64]
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion")
 CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
-_TIMEOUT_S = 300.0
+COMPILING = Limits(cpu_s=120, wall_s=300.0, memory_bytes=4 << 30, output_bytes=256 << 20)
+"""What a compiler may take: a hundred times what the largest network needs."""
+RUNNING = Limits(cpu_s=120, wall_s=300.0, memory_bytes=1 << 30, output_bytes=1 << 30)
+"""What generated C may take on points and a history: under an emulator or sanitizers too."""
 
 
 def host_compiler() -> str:
@@ -50,11 +54,13 @@ class CProgram:
         Where to compile.
     compiler, flags, runner
         Compiler, its options, and what to run the program under, e.g. an emulator.
+    running
+        What the program may take.
 
     Raises
     ------
     InputError
-        If the compiler refuses the source.
+        If the compiler refuses the source, or takes more than it may.
     """
 
     def __init__(
@@ -64,15 +70,14 @@ class CProgram:
         compiler: str | None = None,
         flags: Sequence[str] = FLAGS,
         runner: Sequence[str] = (),
+        running: Limits = RUNNING,
     ) -> None:
-        self._source = source
+        self._running = running
         for name, text in {**source.files, DRIVER: source.driver}.items():
             (folder / name).write_text(text, encoding="utf-8")
         program = folder / "driver"
         words = [compiler or host_compiler(), *flags, str(folder / DRIVER), "-o", str(program)]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=_TIMEOUT_S)
-        if done.returncode != 0:
-            raise InputError(f"export: {words[0]} refuses the generated C: {done.stderr.strip()[:500]}")
+        _compile(words)
         self._words = [*runner, str(program)]
         types = {"double": "f8", "float": "f4", "int64_t": "i8", "int32_t": "i4", "int16_t": "i2"}
         self._types = {
@@ -82,14 +87,17 @@ class CProgram:
         self.places = max(1, len(source.plan.sensors))
 
     def _run(self, mode: str, data: bytes) -> bytes:
-        done = subprocess.run([*self._words, mode], input=data, capture_output=True, timeout=_TIMEOUT_S)
-        if done.returncode != 0:
-            raise InputError(f"export: the generated C failed: {done.stderr.decode(errors='replace')[:500]}")
-        return done.stdout
+        done = self._done(mode, data)
+        if done.status != 0:
+            raise InputError(f"export: the generated C failed ({done.status}): {_told(done)}")
+        return done.output
+
+    def _done(self, mode: str, data: bytes = b"") -> Finished:
+        return _limited([*self._words, mode], self._running, "the generated C", data)
 
     def self_test(self) -> int:
         """What ``fogml_self_test`` returns."""
-        return subprocess.run([*self._words, "self-test"], timeout=_TIMEOUT_S).returncode
+        return self._done("self-test").status
 
     def steps(self, time: Any, temperatures: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
         """Outputs and flags of `fogml_step`, all in the numbers that the code takes."""
@@ -136,18 +144,14 @@ def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
     for label, more in (("lean", ["-DFOGML_NO_SELF_TEST"]), ("whole", [])):
         target = folder / f"{label}.o"
         words = [compiler, *CORTEX_M4, *FLAGS, "-Os", *more, "-c", str(folder / SOURCE), "-o", str(target)]
-        done = subprocess.run(words, capture_output=True, text=True, timeout=_TIMEOUT_S)
-        if done.returncode != 0:
-            raise InputError(f"export: {compiler} refuses the generated C: {done.stderr.strip()[:500]}")
-        told = subprocess.run([size, str(target)], capture_output=True, text=True, check=True).stdout
-        figures[label] = [int(word) for word in told.splitlines()[1].split()[:3]]
+        _compile(words)
+        figures[label] = _sizes(size, target)
     probe = folder / "state.c"
     probe.write_text('#include "fogml_model.h"\nfogml_state state;\n', encoding="utf-8")
     words = [compiler, *CORTEX_M4, "-std=c99", "-fno-common", "-c", str(probe), "-o", str(folder / "state.o")]
-    subprocess.run(words, check=True, capture_output=True, timeout=_TIMEOUT_S)
-    told = subprocess.run([size, str(folder / "state.o")], capture_output=True, text=True, check=True).stdout
-    ram = sum(int(word) for word in told.splitlines()[1].split()[1:3])
-    version = subprocess.run([compiler, "-dumpfullversion"], capture_output=True, text=True).stdout.strip()
+    _compile(words)
+    ram = sum(_sizes(size, folder / "state.o")[1:])
+    version = _compile([compiler, "-dumpfullversion"]).strip()
     lean, whole = figures["lean"], figures["whole"]
     return {
         "compiler": f"arm-none-eabi-gcc {version}",
@@ -157,3 +161,29 @@ def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
         "self_test_flash_bytes": whole[0] + whole[1] - lean[0] - lean[1],
         "self_test_ram_bytes": whole[2] - lean[2],
     }
+
+
+def _compile(words: Sequence[str]) -> str:
+    """Run a compiler or another tool of its kind; what it writes."""
+    done = _limited(words, COMPILING, words[0])
+    if done.status != 0:
+        raise InputError(f"export: {words[0]} refuses the generated C: {_told(done)}")
+    return done.output.decode("utf-8", errors="replace")
+
+
+def _sizes(tool: str, target: Path) -> list[int]:
+    """Bytes of code and constants, of data, and of zeroed data in an object file."""
+    return [int(word) for word in _compile([tool, str(target)]).splitlines()[1].split()[:3]]
+
+
+def _limited(words: Sequence[str], limits: Limits, name: str, data: bytes = b"") -> Finished:
+    try:
+        return run_limited(words, limits, data)
+    except LimitExceededError as error:
+        raise InputError(
+            f"export: {name} {error}, which no model needs; is the model whole? Train it again"
+        ) from None
+
+
+def _told(done: Finished) -> str:
+    return terminal_text(done.errors.strip()[:500])

@@ -12,8 +12,9 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from fogml import __version__
 from fogml.errors import InputError
+from fogml.escaping import c_text
 from fogml.export.c_fixed import fixed_context
-from fogml.export.c_float import float_context
+from fogml.export.c_float import float_context, sensor_identifier
 from fogml.export.layout import Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
@@ -110,7 +111,7 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=True,
-        autoescape=False,
+        finalize=c_text,
     )
 
 
@@ -121,6 +122,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "plan": plan,
         "layout": windows,
         "sensors": plan.sensors,
+        "identifier": sensor_identifier,
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),

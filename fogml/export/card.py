@@ -30,20 +30,13 @@ def export_card(model: DriftModel, plan: Plan, pruning: dict[str, Any] | None) -
 
 
 def card_lines(card: dict[str, Any], plan: Plan, dtype: str) -> list[str]:
-    """The card as lines of a C comment."""
-
-    def safe(text: object) -> str:
-        return str(text).replace("*/", "* /").replace("\n", " ").encode("ascii", "replace").decode()
-
+    """The card as lines of text."""
     runs = card["training_runs"]
     lines = [
-        f"gyro          {safe(card['unit'] or 'not stated')}, axis {safe(card['axis'] or 'not stated')}",
-        *(f"trained on    {safe(run['name'])}, SHA-256 {run['sha256'][:16]}..." for run in runs),
+        f"gyro          {card['unit'] or 'not stated'}, axis {card['axis'] or 'not stated'}",
+        *(f"trained on    {run['name']}, SHA-256 {run['sha256'][:16]}..." for run in runs),
         f"features      {', '.join(plan.names) or 'none'}",
-        *(
-            f"trained box   {safe(name)}: {low:.6g} to {high:.6g}"
-            for name, (low, high) in card["box"].items()
-        ),
+        *(f"trained box   {name}: {low:.6g} to {high:.6g}" for name, (low, high) in card["box"].items()),
         f"accuracy      90 % of {card['averaging_s']:g} s averages within "
         f"{card['half_width_90_deg_h']:.3g} deg/h,",
         "              by parts of the training runs that were left out; not known outside the trained box",

@@ -11,6 +11,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import fogml
+from fogml.escaping import markup, script_data
 from fogml.report import words
 
 
@@ -55,8 +56,7 @@ class _Drawings:
 
     def __call__(self, drawing: Drawing) -> Markup:
         self.count += 1
-        # "<" as an escape keeps any text in the data from ending the script element.
-        data = Markup(drawing.figure.to_json().replace("<", "\\u003c"))
+        data = script_data(drawing.figure.to_json())
         template = _environment().get_template("figure.html")
         height = drawing.figure.layout.height or 400
         return Markup(template.render(drawing=drawing, number=self.count, data=data, height=height))
@@ -67,6 +67,7 @@ def _environment() -> Environment:
     environment = Environment(
         loader=PackageLoader("fogml.report", "templates"),
         autoescape=True,
+        finalize=markup,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,

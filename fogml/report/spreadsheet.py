@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fogml.escaping import cell_text, visible
 from fogml.outputs import whole_file
 from fogml.report.tables import coefficients_of, noticed, repeatability_table
 from fogml.report.verdict import model_card, stated_limits, subject, verdict
@@ -101,7 +102,7 @@ class Writer:
 
     def sheet(self, name: str) -> Worksheet:
         """A new sheet, its name made fit for Excel and unlike the others."""
-        fit = name.translate(_FORBIDDEN)[:_LONGEST_NAME].strip() or "sheet"
+        fit = visible(name).translate(_FORBIDDEN)[:_LONGEST_NAME].strip() or "sheet"
         number = 1
         while fit.lower() in self._names:
             number += 1
@@ -114,7 +115,7 @@ class Writer:
     ) -> int:
         """Write a table from row ``top`` on; the row after it."""
         for column, head in enumerate(heads):
-            sheet.write_string(top, column, head, self.bold)
+            sheet.write_string(top, column, cell_text(head), self.bold)
         for offset, row in enumerate(rows, start=1):
             for column, value in enumerate(row):
                 self.cell(sheet, top + offset, column, value)
@@ -125,7 +126,8 @@ class Writer:
         if value is None or value == "":
             return
         if isinstance(value, bool | str):
-            sheet.write_string(row, column, "yes" if value is True else "no" if value is False else value)
+            text = "yes" if value is True else "no" if value is False else cell_text(value)
+            sheet.write_string(row, column, text)
         elif math.isfinite(value):
             sheet.write_number(row, column, float(value))
 
@@ -134,11 +136,11 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
     sheet = writer.sheet("Summary")
     sheet.set_column(0, 0, 30)
     sheet.set_column(1, 6, 16)
-    sheet.write_string(0, 0, subject(judgement), writer.title)
+    sheet.write_string(0, 0, cell_text(subject(judgement)), writer.title)
     row = 1
     for sentence in verdict(judgement):
         sheet.merge_range(row, 0, row, 6, "", writer.wrapped)
-        sheet.write_string(row, 0, sentence, writer.wrapped)
+        sheet.write_string(row, 0, cell_text(sentence), writer.wrapped)
         sheet.set_row(row, 32)
         row += 1
     heads = ["test run", "averaging [s]", "rms before [deg/h]", "rms after [deg/h]"]

@@ -6,8 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from markupsafe import Markup, escape
+from markupsafe import Markup
 from numpy.typing import NDArray
+
+from fogml.escaping import markup
 
 FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
@@ -104,15 +106,15 @@ def line_figure(
     frame_width, frame_height = width - _LEFT - _RIGHT, height - top - _BOTTOM
     middle = top + frame_height / 2
     return Markup(
-        f'<svg role="img" aria-label="{escape(alt)}" viewBox="0 0 {width} {height}" '
+        f'<svg role="img" aria-label="{markup(alt)}" viewBox="0 0 {width} {height}" '
         'xmlns="http://www.w3.org/2000/svg" font-size="10.5" fill="#1F2328">'
         + "".join(parts)
         + f'<rect x="{_LEFT}" y="{top}" width="{frame_width}" height="{frame_height}" '
         'fill="none" stroke="#9AA1AA"/>'
         + f'<text x="{_LEFT + frame_width / 2}" y="{height - 5}" text-anchor="middle">'
-        + f"{escape(x_title)}</text>"
+        + f"{markup(x_title)}</text>"
         + f'<text transform="translate(12,{middle}) rotate(-90)" text-anchor="middle">'
-        + f"{escape(y_title)}</text>"
+        + f"{markup(y_title)}</text>"
         + "</svg>"
     )
 
@@ -136,7 +138,7 @@ def _legend(curves: Sequence[Curve], width: int) -> str:
         y = _TOP + _LEGEND * (place // _LEGEND_COLUMNS) + 4.0
         dash = f' stroke-dasharray="{curve.dash}"' if curve.dash else ""
         parts.append(f'<path d="M{x:.1f},{y}h22" stroke="{curve.colour}" stroke-width="1.6"{dash}/>')
-        parts.append(f'<text x="{x + 27:.1f}" y="{y + 3.5}">{escape(curve.label)}</text>')
+        parts.append(f'<text x="{x + 27:.1f}" y="{y + 3.5}">{markup(curve.label)}</text>')
     return "".join(parts)
 
 

@@ -74,7 +74,7 @@ def _specs() -> dict[str, ColumnSpec]:
 
 
 KNOWN = _specs()
-_COIL_SENSOR = re.compile(r"T([1-9]\d*)\Z")
+_COIL_SENSOR = re.compile(r"T([1-9][0-9]{0,3})\Z")
 # Spellings that loggers and spreadsheets use for the same unit.
 _ALIASES = {
     "°C": "degC",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from fogml.errors import InputError
 from fogml.export.c_fixed import EXP_ERROR as FIXED_EXP_ERROR
 from fogml.export.c_float import EXP_ERROR
-from fogml.export.c_program import FLAGS, CProgram, cortex_m4_size
+from fogml.export.c_program import FLAGS, RUNNING, CProgram, cortex_m4_size
 from fogml.export.c_source import c_source
 from fogml.export.check import expected_outputs
 from fogml.export.plan import Plan
@@ -23,6 +24,8 @@ from tests.export.conftest import NAMES, training_run
 
 needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 pytestmark = needs_cc
+WITH_SHADOW = replace(RUNNING, memory_bytes=None)
+# The address sanitizer maps a sixteenth of all there is.
 SANITIZERS = (*FLAGS, "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
 BOUND = {"float64": 2e-6, "float32": 2e-3, "q31": 2e-3}
 
@@ -86,7 +89,7 @@ def test_true_times_are_heeded(model_of, tmp_path):
 def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name, dtype):
     source = c_source(Plan.of(model_of(name)), dtype, ["a card with a */ in it".replace("*/", "* /")])
     source = source.with_expected(*expected_outputs(source, tmp_path))
-    program = CProgram(source, tmp_path, flags=SANITIZERS)
+    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
     assert program.self_test() == 0
     out, _ = outputs(program, source, disturbed(7))
     assert np.all(np.isfinite(out))
@@ -108,7 +111,12 @@ def test_the_self_test_notices_a_changed_number(model_of, tmp_path, dtype):
 
 
 def test_a_broken_sensor_or_clock_is_flagged_and_nothing_is_subtracted(model_of, tmp_path):
-    program = CProgram(c_source(Plan.of(model_of("polynomial")), "float64", []), tmp_path, flags=SANITIZERS)
+    program = CProgram(
+        c_source(Plan.of(model_of("polynomial")), "float64", []),
+        tmp_path,
+        flags=SANITIZERS,
+        running=WITH_SHADOW,
+    )
     time = 2.0 * np.arange(200.0)
     temperature = np.full((200, 1), 20.0)
     temperature[150], temperature[151], temperature[152] = np.nan, np.inf, -1e30

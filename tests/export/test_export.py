@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.export.c_float import literal
 from fogml.export.export import ExportSettings, export_model
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, history
 from fogml.export.storage import FILE_DTYPES, stored_array
+from fogml.models.card import TrainingRun
 from fogml.models.names import make_model
 from tests.export.conftest import NAMES, training_run
 from tests.export.test_c_code import disturbed
@@ -178,3 +183,23 @@ def test_small_formats_keep_numbers_of_any_size(dtype):
     values = np.array([4e-7, -3e-5, 0.0, 1.0, 2e5])
     decoded = stored_array("linear", values, dtype).decoded
     np.testing.assert_allclose(decoded, values, rtol=1e-3 if dtype == "float16" else 1e-2)
+
+
+@needs_cc
+def test_foreign_text_stays_a_comment_of_c(model_of, tmp_path):
+    hostile = '*/\nint system(const char *);\n__attribute__((constructor)) void z(void) { system("touch ran"); }\n/*'
+    model = copy(model_of("polynomial"))
+    runs = (TrainingRun(hostile, hostile),)
+    model.card_ = replace(model.card_, unit=hostile, axis="x\\", runs=runs, fogml_version=hostile)
+    model.kind = hostile
+    export_model(model, tmp_path, ExportSettings("c"))
+    for name in ("fogml_model.h", "fogml_model.c"):
+        text = (tmp_path / name).read_text(encoding="ascii")
+        bare = re.sub(r"/\*.*?\*/", "", text, flags=re.DOTALL)
+        assert "system" not in bare and "constructor" not in bare and "system" in text
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, 1e300])
+def test_a_number_that_a_type_does_not_hold_is_told(value):
+    with pytest.raises(InputError, match="float32 does not hold"):
+        literal(value, "float32")

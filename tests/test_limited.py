@@ -1,0 +1,63 @@
+"""Programs end at their limits, nothing of them lives on, and no shell reads their words."""
+
+from __future__ import annotations
+
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fogml.limited import LimitExceededError, Limits, run_limited
+
+PYTHON = [sys.executable, "-I", "-S", "-c"]
+
+
+def test_words_and_input_arrive_as_they_are():
+    words = ["$(id)", "; touch x", "a b", "*"]
+    done = run_limited(
+        [*PYTHON, "import sys; print(sys.argv[1:]); sys.stdout.write(sys.stdin.read()); sys.exit(3)", *words],
+        Limits(),
+        b"in",
+    )
+    assert done.status == 3 and done.output.decode() == f"{words}\nin"
+
+
+@pytest.mark.parametrize(
+    ("limits", "code", "told"),
+    [
+        (Limits(cpu_s=1), "while True: pass", "1 s of processor time"),
+        (Limits(wall_s=0.5), "import time; time.sleep(60)", r"more than 0\.5 s"),
+        (
+            Limits(output_bytes=1 << 20),
+            "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_DFL); print('x' * (2 << 20))",
+            "wrote more than 1 MB",
+        ),
+    ],
+)
+def test_each_limit_is_told(limits, code, told):
+    with pytest.raises(LimitExceededError, match=told):
+        run_limited([*PYTHON, code], limits)
+
+
+def test_memory_has_a_limit():
+    done = run_limited([*PYTHON, "bytearray(1 << 30)"], Limits(memory_bytes=1 << 28))
+    assert done.status == 1 and "MemoryError" in done.errors
+
+
+def test_what_a_program_started_ends_with_it(tmp_path):
+    note = tmp_path / "pid"
+    code = (
+        "import os, sys, time\n"
+        "child = os.fork()\n"
+        "if child == 0: time.sleep(60)\n"
+        "open(sys.argv[1], 'w').write(str(child))\n"
+    )
+    run_limited([*PYTHON, code, str(note)], Limits())
+    child = int(note.read_text())
+    status = Path(f"/proc/{child}/status")
+    for _ in range(100):
+        if not status.exists() or "\nState:\tZ" in status.read_text():
+            return
+        time.sleep(0.05)
+    raise AssertionError("the program's child lives on")
