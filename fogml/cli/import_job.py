@@ -30,7 +30,7 @@ class ImportSettings(Settings):
 def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     """Import, write the runs into ``settings.out``, and say what was written."""
     from fogml.runs.profiles import import_recording, profile_names
-    from fogml.runs.writing import write_run
+    from fogml.runs.writing import check_side_file, write_run
 
     if not settings.file:
         raise InputError("no file is given; name the logger's file")
@@ -45,6 +45,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
             _check_apart(settings.file, settings.out, [run.name for run in runs])
             for run in runs:
                 work.doing(f"writing {run.name}")
+                check_side_file(Path(settings.out) / f"{run.name}.csv", run.facts)
                 write_run(run, folder / f"{run.name}.csv")
         for run in runs:
             for finding in run.findings:

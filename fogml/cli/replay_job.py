@@ -44,8 +44,9 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     if not settings.out:
         raise InputError("no --out is given; name the file to write, .csv or .parquet")
     out = Path(settings.out)
-    if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
-        raise InputError(f"{out}: is the run itself; choose another --out")
+    for what, given in (("the run itself", settings.run), ("the truth", settings.truth)):
+        if given and out.exists() and Path(given).exists() and out.samefile(given):
+            raise InputError(f"{out}: is {what}; choose another --out")
     twin = load_twin(settings.twin)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)

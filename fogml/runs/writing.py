@@ -31,14 +31,13 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
 
     Facts go into a side file of the same stem where there are any, and into the file itself
     where its format can hold them (Parquet, HDF5, MATLAB). A side file that is there already
-    and states the same facts is left as it is; one that states others is replaced together with
-    the run that it belongs to, and never beside a new one.
+    is treated as :func:`check_side_file` says.
 
     Raises
     ------
     InputError
         If the suffix is not known, the place can't be written, or a side file of that stem
-        belongs to another run.
+        states other facts.
     """
     path = Path(path)
     suffix = _checked_suffix(path)
@@ -73,7 +72,8 @@ class BlockWriter:
     path
         Ends in ``.csv`` or ``.parquet``.
     facts
-        Set-up facts: into the side file, and into a Parquet file's metadata.
+        Set-up facts of a run: into the side file, and into a Parquet file's metadata. None for a table that
+        is no run: no side file is written or looked at.
 
     Raises
     ------
@@ -83,7 +83,7 @@ class BlockWriter:
 
     def __init__(self, path: str | Path, facts: Facts | None = None) -> None:
         self.path = Path(path)
-        self.facts = facts or Facts()
+        self.facts = facts
         if _checked_suffix(self.path) not in (".csv", ".parquet"):
             raise InputError(
                 f"{self.path.name}: written block by block are .csv and .parquet; choose one of them"
@@ -123,8 +123,10 @@ class BlockWriter:
             block = {cell: block.columns[name] for name, cell in header_cells(block).items()}
         table = arrow.table({cell: np.asarray(values) for cell, values in block.items()})
         if self._schema is None:
-            metadata = {FACTS_KEY: json.dumps(self.facts.as_dict(), ensure_ascii=False)}
-            self._schema = table.schema.with_metadata(metadata)
+            self._schema = table.schema
+            if self.facts is not None:
+                metadata = {FACTS_KEY: json.dumps(self.facts.as_dict(), ensure_ascii=False)}
+                self._schema = table.schema.with_metadata(metadata)
             self._sink = self._opened(self._schema)
         elif not table.schema.equals(self._schema, check_metadata=False):
             raise InputError(
@@ -161,30 +163,64 @@ class BlockWriter:
 
 
 @contextmanager
-def _with_side_file(path: Path, facts: Facts) -> Iterator[Path]:
+def _with_side_file(path: Path, facts: Facts | None) -> Iterator[Path]:
     """A partial file for `path`; the side file, where one is needed, appears just before it."""
-    beside = side_file(path)
     with ExitStack() as stack:
         partial = stack.enter_context(whole_file(path))
-        if beside is not None and not _states(path, facts):
-            if not path.exists():
-                raise InputError(
-                    f"{path.name}: beside it would stand {beside.name}, which is there already and does not "
-                    "state the facts of this run; choose another name, or move that file"
-                )
-            stack.enter_context(whole_file(beside)).write_text(side_file_text(facts), encoding="utf-8")
-        elif beside is None and facts != Facts():
-            side = path.with_suffix(SIDE_SUFFIXES[0])
-            stack.enter_context(whole_file(side)).write_text(side_file_text(facts), encoding="utf-8")
+        if facts is not None:
+            side = check_side_file(path, facts)
+            if side is not None:
+                stack.enter_context(whole_file(side)).write_text(side_file_text(facts), encoding="utf-8")
         yield partial
 
 
-def _states(path: Path, facts: Facts) -> bool:
-    """Whether the side file beside `path` states just these facts."""
+def check_side_file(path: str | Path, facts: Facts) -> Path | None:
+    """Where the side file of a run has to be written, if at all; facts that are there are never lost.
+
+    A side file that states just these facts stays as it is, with its comments. One that states fewer, or
+    another note, is replaced with the run that it belongs to. One that states another fact, or one that this
+    run lacks, is an error, and so is one that would state more of another file of the stem.
+
+    Parameters
+    ----------
+    path
+        The run to be written.
+    facts
+        What its side file has to state.
+
+    Raises
+    ------
+    InputError
+        Naming the side file and the facts that would be lost.
+    """
+    path = Path(path)
+    beside = side_file(path)
+    if beside is None:
+        return None if facts == Facts() else path.with_suffix(SIDE_SUFFIXES[0])
     try:
-        return read_side_file(path) == facts
+        there = read_side_file(path)
     except InputError:
-        return False
+        raise InputError(
+            f"{path.name}: beside it would stand {beside.name}, which is there already and states no facts "
+            "of a run; choose another name, or move that file"
+        ) from None
+    if there == facts:
+        return None
+    old, new = there.as_dict(), facts.as_dict()
+    lost = [f"{key}: {value}" for key, value in old.items() if new.get(key) != value]
+    lost = [text for text in lost if not (text.startswith("notes: ") and "notes" in new)]
+    others = [path.with_suffix(suffix) for suffix in SUFFIXES if suffix != path.suffix.lower()]
+    # A note is about one file: another file of the stem loses nothing by it.
+    gained = set(new) - set(old) - {"notes"}
+    sharing = [other.name for other in others if other.is_file() and (gained or lost)]
+    if lost or sharing or not path.exists():
+        what = f"states {'; '.join(lost)}" if lost else "does not state the facts of this run"
+        whose = f", and holds for {sharing[0]} too" if sharing else ""
+        raise InputError(
+            f"{path.name}: beside it would stand {beside.name}, which is there already and {what}{whose}; "
+            "choose another name, or move that file and what it belongs to"
+        )
+    return beside
 
 
 def _checked_suffix(path: Path) -> str:

@@ -103,6 +103,10 @@ def test_import_writes_runs_that_can_be_inspected(invoke, invoke_json, tmp_path)
     (run,) = invoke_json("inspect", out / "log.csv")["runs"]
     assert run["rows"] == 50
     assert run["sample_s"] == pytest.approx(0.1)
+    (out / "log.yaml").write_text("unit: by hand\n")
+    refused = invoke("import", log, "--profile", profile, "-o", out, status=2)
+    assert "log.yaml" in refused.stderr and "unit: by hand" in refused.stderr
+    assert (out / "log.yaml").read_text() == "unit: by hand\n"
 
 
 @pytest.mark.parametrize(

@@ -55,6 +55,30 @@ def test_simulate_then_replay(config, tmp_path, invoke_json, invoke):
     np.testing.assert_allclose(part, wanted, atol=0.12 / 8.0 * 0.2)
 
 
+@pytest.mark.parametrize("suffixes", [(".csv", ".parquet"), (".parquet", ".csv")])
+def test_a_truth_of_the_run_s_stem_leaves_its_facts(config, tmp_path, invoke, suffixes):
+    out, truth = (tmp_path / f"run{suffix}" for suffix in suffixes)
+    for seed in (3, 4):
+        invoke("simulate", config, "-o", out, "--truth", truth, "--seed", seed)
+        facts = read_run(out).facts
+        assert facts.unit == "tactical" and f"seed {seed}" in str(facts.notes)
+        assert yaml.safe_load((tmp_path / "run.yaml").read_text()) == facts.as_dict()
+    invoke("replay", "tactical", out, "-o", tmp_path / "again.csv", "--truth", truth)
+    assert read_run(out).facts == facts
+    refused = invoke("replay", "tactical", out, "-o", truth, "--truth", truth, status=2)
+    assert "is the truth" in refused.stderr
+
+
+def test_a_simulation_of_other_facts_does_not_replace_them(config, tmp_path, invoke):
+    out = tmp_path / "run.csv"
+    invoke("simulate", config, "-o", out)
+    values = yaml.safe_load(config.read_text()) | {"facts": {"axis": "z", "unit": "another"}}
+    config.write_text(yaml.safe_dump(values))
+    refused = invoke("simulate", config, "-o", out, status=2)
+    assert "run.yaml" in refused.stderr and "unit: tactical" in refused.stderr
+    assert read_run(out).facts.unit == "tactical"
+
+
 def test_the_written_settings_give_the_same_run(config, tmp_path, invoke):
     out = tmp_path / "run.parquet"
     invoke("simulate", config, "-o", out, "--seed", 8)

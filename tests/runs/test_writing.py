@@ -184,10 +184,40 @@ def test_a_side_file_that_states_the_same_is_left_as_it_is(tmp_path):
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".h5", ".mat"])
-@pytest.mark.parametrize("facts", [Facts(), Facts(unit="B", latitude=39.9)])
-def test_a_side_file_is_replaced_with_its_run(tmp_path, suffix, facts):
+@pytest.mark.parametrize("more", [{"latitude": 39.9}, {"notes": "again"}])
+def test_a_side_file_gains_facts_with_its_run(tmp_path, suffix, more):
+    columns = {"time": np.arange(2.0), "gyro": np.ones(2)}
+    path = tmp_path / f"run{suffix}"
+    write_run(Run("run", columns, Facts(unit="A", notes="first")), path)
+    facts = Facts(**{"unit": "A", "notes": "first", **more})
+    write_run(Run("run", columns, facts), path)
+    assert read_run(path).facts == facts
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".h5", ".mat"])
+@pytest.mark.parametrize("facts", [Facts(), Facts(unit="B", axis="x"), Facts(unit="A", latitude=39.9)])
+def test_facts_are_never_lost(tmp_path, suffix, facts):
     columns = {"time": np.arange(2.0), "gyro": np.ones(2)}
     path = tmp_path / f"run{suffix}"
     write_run(Run("run", columns, Facts(unit="A", axis="x")), path)
-    write_run(Run("run", columns, facts), path)
-    assert read_run(path).facts == facts
+    kept = [file.read_bytes() for file in (path, path.with_suffix(".yaml"))]
+    with pytest.raises(InputError, match=r"run\.yaml, .*states (unit: A|axis: x)"):
+        write_run(Run("run", columns, facts), path)
+    assert [file.read_bytes() for file in (path, path.with_suffix(".yaml"))] == kept
+
+
+def test_facts_of_another_file_of_the_stem_stay(tmp_path):
+    columns = {"time": np.arange(2.0), "gyro": np.ones(2)}
+    for suffix in (".csv", ".h5"):
+        write_run(Run("run", columns, Facts(unit="A")), tmp_path / f"run{suffix}")
+    with pytest.raises(InputError, match=r"holds for run\.h5 too"):
+        write_run(Run("run", columns, Facts(unit="A", latitude=39.9)), tmp_path / "run.csv")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet"])
+def test_a_table_that_is_no_run_leaves_side_files_alone(tmp_path, suffix):
+    (tmp_path / "run.yaml").write_text("unit: A  # by hand\n")
+    for _ in range(2):
+        with BlockWriter(tmp_path / f"run{suffix}") as writer:
+            writer.write({"time [s]": [0.0, 1.0], "noise [deg/h]": [1.0, 2.0]})
+    assert (tmp_path / "run.yaml").read_text() == "unit: A  # by hand\n"
