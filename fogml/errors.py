@@ -1,4 +1,4 @@
-"""The errors that fogml raises on purpose.
+"""The errors that fogml raises on purpose, and how their messages quote what was found.
 
 Anything else that escapes is a defect. The command line turns an `InputError` into one
 message and exit status 2.
@@ -6,9 +6,22 @@ message and exit status 2.
 
 from __future__ import annotations
 
+import re
+import reprlib
+
+LONGEST_QUOTED = 60
+"""Characters of a value that a message quotes; more tells nobody anything."""
+LONGEST_MESSAGE = 2000
+"""Characters of a whole message: a screenful."""
+# Line ends stay: some messages point at a place below a line. Lone surrogates can't be printed.
+_UNPRINTABLE = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
 
 class FogmlError(Exception):
-    """Base of every error that fogml raises on purpose."""
+    """Base of every error that fogml raises on purpose; its message is fit to be printed."""
+
+    def __init__(self, message: object = "") -> None:
+        super().__init__(printable(str(message), LONGEST_MESSAGE))
 
 
 class InputError(FogmlError):
@@ -17,3 +30,29 @@ class InputError(FogmlError):
     The message names the file, the column and the row where they are known, what was
     expected, and what to do.
     """
+
+
+def printable(text: str, longest: int = LONGEST_QUOTED) -> str:
+    """Text from a file fit for a message: cut in the middle of what is too long, no control characters."""
+    if len(text) > longest:
+        end = longest // 3
+        text = f"{text[: longest - end - 3]}...{text[len(text) - end :]}"
+    return _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def quoted(value: object) -> str:
+    """A value that was found, for a message: text in quotation marks, any other as Python writes it, cut."""
+    if isinstance(value, str):
+        return f"'{printable(value.replace(chr(10), ' '))}'"
+    return printable(_brief.repr(value).replace("\n", " "))
+
+
+def listed(names: object, most: int = 12) -> str:
+    """Names for a message, each cut, and only so many of them."""
+    texts = [printable(str(name).replace("\n", " ")) for name in list(names)]  # type: ignore[call-overload]
+    more = f" and {len(texts) - most} more" if len(texts) > most else ""
+    return ", ".join(texts[:most]) + more
+
+
+_brief = reprlib.Repr()
+_brief.maxstring = _brief.maxother = _brief.maxlong = LONGEST_QUOTED

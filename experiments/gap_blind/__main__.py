@@ -21,8 +21,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from fogml.cli.blind_job import (
     MakeSettings,
     MergeSettings,
@@ -40,6 +38,7 @@ from fogml.gap.blind.scoring.marks_file import MARKS, read_marks
 from fogml.outputs import whole_file
 from fogml.report import blind_page
 from fogml.report.error_rates import ERROR_RATES, error_rates
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 STAGES = ("make", "run", "score")
@@ -49,7 +48,7 @@ PART_MARKS = "marks-{}.json.gz"
 
 def main() -> None:
     """All stages of all parts, or some."""
-    config = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    config = read_yaml(HERE / "config.yaml")
     given = _parser(part["name"] for part in config["final"]["parts"]).parse_args()
     suite = config["final" if given.final else "development"]
     stages = (given.stage,) if given.stage else STAGES

@@ -20,7 +20,6 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import yaml
 from sklearn.linear_model import LogisticRegression
 
 from fogml.errors import InputError
@@ -31,6 +30,7 @@ from fogml.gap.blind.scoring.marks_file import read_marks
 from fogml.gap.blind.seeds import is_final, uses
 from fogml.gap.blind.truth import read_truth
 from fogml.gap.confidence import unknown_features
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 Row = tuple[tuple[float, ...], bool, float]
@@ -83,7 +83,7 @@ def marks_of(path: Path, answers: str) -> Iterable[Mark]:
 @cache
 def may_be_learned_from(seed: int) -> bool:
     """Whether a suite's seed is one to develop on, or one that is kept no longer."""
-    kept = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))["final"]["seed"]
+    kept = read_yaml(HERE / "config.yaml")["final"]["seed"]
     spent = {use["seed"] for use in uses(HERE / "final_uses.json")} - {kept}
     return not is_final(seed) or seed in spent
 

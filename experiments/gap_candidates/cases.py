@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from fogml.gap.how_far import averages
 from fogml.gap.model import EffectValue
@@ -25,8 +24,9 @@ from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
+from fogml.yaml_text import read_yaml
 
-CONFIG: dict[str, Any] = yaml.safe_load(Path(__file__).with_name("config.yaml").read_text(encoding="utf-8"))
+CONFIG: dict[str, Any] = read_yaml(Path(__file__).with_name("config.yaml"))
 _ROUNDS = 3
 
 

@@ -16,7 +16,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-import yaml
 
 from fogml.errors import InputError
 from fogml.gap.model import Constant, EffectValue, NoisePrior
@@ -26,6 +25,7 @@ from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
+from fogml.yaml_text import yaml_text
 
 BORROWED = {
     "shupe_mohr": "Bias in proportion to the rate of temperature",
@@ -197,7 +197,7 @@ class MemsTwin:
             },
         }
         with whole_file(path) as partial:
-            partial.write_text(yaml.safe_dump(content, sort_keys=False), encoding="utf-8")
+            partial.write_text(yaml_text(content), encoding="utf-8")
 
 
 def legs_of(axis: str, noise: NoisePrior = NOISE) -> tuple[list[Run], MemsTwin]:

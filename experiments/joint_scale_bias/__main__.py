@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from experiments.joint_scale_bias.page import drawings, page
 from experiments.joint_scale_bias.world import (
@@ -34,6 +33,7 @@ from fogml.features.parse import parse_features
 from fogml.lab.joint import run_figures, two_step
 from fogml.models.joint import JointModel
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 Compensate = Callable[[Run], tuple[FloatArray, BoolArray]]
@@ -41,7 +41,7 @@ Compensate = Callable[[Run], tuple[FloatArray, BoolArray]]
 
 def settings_of(quick: bool) -> dict[str, Any]:
     """The settings, cut down where quick."""
-    settings: dict[str, Any] = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings: dict[str, Any] = read_yaml(HERE / "config.yaml")
     if quick:
         settings |= {"seeds": [1], "windows": [6], "resolutions": [0.01], "turning_soaks": [2, 12]}
         settings |= {"bias_hystereses": [0.0], "scale_hystereses": [80.0]}

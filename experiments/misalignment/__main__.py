@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from experiments.results import write_results
 from fogml import __version__
@@ -22,6 +21,7 @@ from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 from fogml.outputs import whole_file
 from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 METHODS = ("classical test", "single state", "four states")
@@ -217,7 +217,7 @@ the data, turns cut to whole ones: K off by {record["K_ppm"]:.1e} ppm, x by {rec
 
 def main() -> None:
     """Compute and write the results."""
-    settings = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings = read_yaml(HERE / "config.yaml")
     values = {"noise_free": noise_free(settings), "noisy": noisy(settings), "recorded": recorded(settings)}
     text = page(values, settings)
     with whole_file(HERE / "scale_factor_error.svg") as partial:

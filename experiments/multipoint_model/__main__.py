@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from experiments.multipoint_model.page import drawings, page
 from experiments.multipoint_model.start_up import AVERAGING_S, curve, start_up
@@ -26,6 +25,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 CROSS = "T^1..5, dT^1..3, T*dT"
@@ -35,7 +35,7 @@ Drift = Callable[[Run], FloatArray]
 
 def settings_of(quick: bool) -> dict[str, Any]:
     """The settings, cut down where quick."""
-    settings: dict[str, Any] = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings: dict[str, Any] = read_yaml(HERE / "config.yaml")
     if quick:
         settings |= {"orders": [[2, 1], [5, 3]], "choice": {"orders": [2, 5], "rate_orders": [1, 3]}}
     return settings

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from scipy.integrate import solve_ivp
 
 from experiments.results import write_results
@@ -30,6 +29,7 @@ from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
 from fogml.twin.simulate import simulate
 from fogml.validation.judge import judge
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 
@@ -162,7 +162,7 @@ Dotted: before; solid: after. `fogml train --navigation LATITUDE` puts this figu
 
 def main() -> None:
     """Compute and write the results."""
-    settings = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings = read_yaml(HERE / "config.yaml")
     values = {"constant": constant(settings), "compensated": compensated(settings)}
     text = page(values, settings)
     with whole_file(HERE / "position_error.svg") as partial:

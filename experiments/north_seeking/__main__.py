@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from experiments.north_seeking.power_ons import cumulated, power_on, span_means, trained, unit
 from experiments.results import write_results
@@ -22,6 +21,7 @@ from fogml.outputs import whole_file
 from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
 from fogml.runs.run import FloatArray
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 CASES = ("as it is", "drift model first", "noise alone")
@@ -247,7 +247,7 @@ compensates the gyro before it is averaged. With indexing: each angle of the tur
 
 def main() -> None:
     """Compute and write the results."""
-    settings = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings = read_yaml(HERE / "config.yaml")
     values = {"ways": table(settings), "closed_form": closed_form(settings)}
     text = page(values, settings)
     with whole_file(HERE / "error_by_azimuth.svg") as partial:

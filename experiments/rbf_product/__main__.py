@@ -12,13 +12,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from experiments.rbf_product.loop import loops
 from experiments.rbf_product.page import drawings, page
 from experiments.rbf_product.world import Made, deviation, made, signal_to_noise, unit
 from experiments.results import write_results
 from fogml.models.names import make_model
+from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
 MODELS = {"RBF, patent's form": "rbf-patent", "RBF, fogml's": "rbf", "polynomial": "polynomial"}
@@ -34,7 +34,7 @@ QUICK_CASES = [
 
 def settings_of(quick: bool) -> dict[str, Any]:
     """The settings, cut down where quick."""
-    settings: dict[str, Any] = yaml.safe_load((HERE / "config.yaml").read_text(encoding="utf-8"))
+    settings: dict[str, Any] = read_yaml(HERE / "config.yaml")
     if quick:
         settings |= {"seeds": [1], "products": [0.0, 0.01], "rates": [10, 60]}
         settings["loop"] = {**settings["loop"], "centres": [8], "widths": [2.0], "index": 0.05}

@@ -6,7 +6,6 @@ import json
 from pathlib import Path
 from typing import Any, ClassVar
 
-import yaml
 from pydantic import Field, field_validator
 
 from fogml.cli.settings import Settings
@@ -18,6 +17,7 @@ from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.simulate import DEFAULT_FACTS
 from fogml.twin.twin_file import load_twin, twin_names
+from fogml.yaml_text import yaml_text
 
 
 class PlanSettings(Settings):
@@ -109,7 +109,7 @@ def _simulation(place: int, twin: str, facts: Facts) -> str:
         "facts": facts.as_dict(),
     }
     head = f"# Rehearse it with  fogml simulate {simulation_file(place)} --out run.csv\n"
-    return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+    return head + yaml_text(values)
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:

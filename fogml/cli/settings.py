@@ -7,12 +7,11 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
-import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from fogml import __version__
-from fogml.errors import InputError
-from fogml.runs.facts import read_yaml
+from fogml.errors import InputError, quoted
+from fogml.yaml_text import parse_yaml, read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
@@ -21,7 +20,7 @@ SHIPPED = "shipped:"
 class Settings(BaseModel):
     """What every command takes. Unknown keys are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, protected_namespaces=())
     path_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ("out",)
@@ -66,7 +65,7 @@ class Settings(BaseModel):
     def yaml(self, command: str) -> str:
         """The settings in full as the text of a configuration file."""
         head = f"# fogml {__version__}: run it again with  fogml {command} --config config.yaml\n"
-        return head + yaml.safe_dump(self.model_dump(mode="json"), sort_keys=False, allow_unicode=True)
+        return head + yaml_text(self.model_dump(mode="json"))
 
 
 class LimitSettings(Settings):
@@ -108,7 +107,7 @@ def named_values(texts: list[Any]) -> dict[str, Any]:
         name, equals, value = str(text).partition("=")
         if not (equals and name.strip()):
             raise ValueError(f"'{text}' sets nothing; write NAME=VALUE, e.g. centres=16")
-        values[name.strip()] = number_or_text(yaml.safe_load(value))
+        values[name.strip()] = parse_yaml(value, quoted(text))
     return values
 
 
@@ -124,14 +123,6 @@ def number_list(text: str, example: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise ValueError(f"'{text}' is no list of numbers; write e.g. {example}") from None
-
-
-def number_or_text(value: Any) -> Any:
-    """A value that YAML read, and ``1e-4``, which it takes for text, as a number."""
-    try:
-        return float(value) if isinstance(value, str) else value
-    except ValueError:
-        return value
 
 
 def read_config(path: Path) -> dict[str, Any]:
@@ -171,9 +162,9 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
         known = [field.alias or name for name, field in settings.model_fields.items()]
         near = get_close_matches(key, known, n=1)
         hint = f"did you mean '{near[0]}'? " if near else ""
-        return f"{source}: unknown key '{key}'; {hint}known keys are {', '.join(known)}"
+        return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
         return f"{place}nothing is given for '{key}'"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
-    return f"{place}'{key}': {reason} (found {first['input']!r})"
+    return f"{place}'{key}': {reason} (found {quoted(first['input'])})"

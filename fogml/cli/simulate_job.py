@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
-import yaml
 from pydantic import Field
 
 from fogml import __version__
@@ -19,6 +18,7 @@ from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file
 from fogml.twin.timeline import timeline
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
+from fogml.yaml_text import yaml_text
 
 
 class SimulateSettings(Settings):
@@ -44,7 +44,7 @@ class SimulateSettings(Settings):
         """The settings in full as the text of a configuration file."""
         head = f"# fogml {__version__}: run it again with  fogml {command} config.yaml\n"
         values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
-        return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+        return head + yaml_text(values)
 
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:

@@ -7,7 +7,6 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
-import yaml
 from pydantic import Field, field_validator
 
 from fogml import __version__
@@ -19,6 +18,7 @@ from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.tuning.plan import OBJECTIVES, Plan
 from fogml.tuning.space import Space
+from fogml.yaml_text import parse_yaml, yaml_text
 
 if TYPE_CHECKING:
     import optuna
@@ -77,7 +77,7 @@ class SweepSettings(Settings):
         values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
         if self.storage is not None:
             values["storage"] = without_password(self.storage)
-        return head + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+        return head + yaml_text(values)
 
     def plan(self, runs: list[Run]) -> Plan:
         """What workers are told."""
@@ -176,7 +176,7 @@ def _judge(
         return None
     from fogml.cli.train_job import TrainSettings, fit_and_judge
 
-    train = TrainSettings.model_validate(yaml.safe_load(best))
+    train = TrainSettings.model_validate(parse_yaml(best, "best.yaml"))
     return fit_and_judge(train, runs, test_runs, terminal)[1]
 
 

@@ -11,8 +11,8 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError
-from fogml.runs.facts import read_yaml
+from fogml.errors import InputError, quoted
+from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
 COLUMNS = ("unit", "job", "train", "test", "axis")
@@ -91,11 +91,11 @@ def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
 
 
 def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
-    values = read_yaml(path)
+    values = read_yaml(path, COLUMNS)
     if isinstance(values, dict):
         if values.get("schema", MANIFEST_SCHEMA) != MANIFEST_SCHEMA:
             raise InputError(
-                f"{path.name}: 'schema' is {values['schema']!r}; {MANIFEST_SCHEMA} is understood"
+                f"{path.name}: 'schema' is {quoted(values['schema'])}; {MANIFEST_SCHEMA} is understood"
             )
         values = values.get("units")
     if not isinstance(values, list) or not all(isinstance(row, dict) for row in values):
@@ -113,7 +113,7 @@ def _check_keys(keys: Iterable[str], place: str) -> None:
         if key not in COLUMNS:
             near = get_close_matches(key, COLUMNS, n=1)
             hint = f"did you mean '{near[0]}'? " if near else ""
-            raise InputError(f"{place}: unknown column '{key}'; {hint}known are {', '.join(COLUMNS)}")
+            raise InputError(f"{place}: unknown column {quoted(key)}; {hint}known are {', '.join(COLUMNS)}")
     for key in ("unit", "train"):
         if key not in keys:
             raise InputError(f"{place}: column '{key}' is missing; columns are {', '.join(COLUMNS)}")

@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from datetime import datetime
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
+from fogml.yaml_text import read_yaml, yaml_text
 
 EARTH_RATE_DEG_H = 15.041067
 SIDE_SUFFIXES = (".yaml", ".yml")
@@ -20,13 +21,24 @@ _EXAMPLES = {
     "powered_on": "0.0",
     "started": "2026-03-02T08:00:00Z",
 }
-_NAMES = ("unit", "axis", "notes")
+NAMES = ("unit", "axis", "notes")
+"""Facts that are names, as text however they are written."""
+
+
+def _moment(value: Any) -> Any:
+    """A moment from its text; a number is none, though it could be taken for seconds since 1970."""
+    if not isinstance(value, str):
+        return value
+    try:
+        return datetime.fromisoformat(value)
+    except ValueError:
+        raise ValueError("a date and time by ISO 8601 was expected") from None
 
 
 class ScaleFactor(BaseModel):
     """Nominal K0: gyro [deg/h] = counts / value."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     value: float = Field(allow_inf_nan=False)
     unit: Literal["count per deg/h", "count per deg/s"] = "count per deg/h"
 
@@ -46,7 +58,7 @@ class ScaleFactor(BaseModel):
 class Heading(BaseModel):
     """A horizontal input axis, in degrees clockwise from north."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     heading: float = Field(allow_inf_nan=False)
 
 
@@ -56,14 +68,14 @@ class Facts(BaseModel):
     Latitude in degrees north; `powered_on` in seconds on the run's clock.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     unit: str | None = None
     axis: str | None = None
     latitude: float | None = Field(default=None, ge=-90.0, le=90.0)
     input_axis: Literal["up", "down", "north", "south", "east", "west"] | Heading | None = None
     scale_factor: ScaleFactor | None = None
     powered_on: float | None = Field(default=None, allow_inf_nan=False)
-    started: datetime | None = None
+    started: Annotated[datetime | None, BeforeValidator(_moment)] = None
     notes: str | None = None
 
     @property
@@ -106,7 +118,7 @@ def facts_from(values: Any, source: str) -> Facts:
     if not isinstance(values, dict):
         raise InputError(f"{source}: set-up facts must be 'key: value' lines, found {type(values).__name__}")
     # A serial number is a name, also where it was stored as a number.
-    names = {k: str(v) for k, v in values.items() if k in _NAMES and isinstance(v, int | float)}
+    names = {k: str(v) for k, v in values.items() if k in NAMES and type(v) in (int, float)}
     values = {**values, **names}
     try:
         return Facts.model_validate(values)
@@ -115,10 +127,10 @@ def facts_from(values: Any, source: str) -> Facts:
         key = str(first["loc"][0]) if first["loc"] else "?"
         if first["type"] == "extra_forbidden":
             known = ", ".join(Facts.model_fields)
-            raise InputError(f"{source}: unknown key '{key}'; known keys are {known}") from None
-        reason = first["msg"].removeprefix("Value error, ")
+            raise InputError(f"{source}: unknown key {quoted(key)}; known keys are {known}") from None
+        reason = f"{first['msg'].removeprefix('Value error, ')} (found {quoted(first['input'])})"
         example = f"; write e.g. {key}: {_EXAMPLES[key]}" if key in _EXAMPLES else ""
-        raise InputError(f"{source}: key '{key}': {reason} (found {first['input']!r}){example}") from None
+        raise InputError(f"{source}: key '{key}': {reason}{example}") from None
 
 
 def side_file(run_path: Path) -> Path | None:
@@ -138,58 +150,9 @@ def read_side_file(run_path: Path) -> Facts:
     side = side_file(run_path)
     if side is None:
         return Facts()
-    values = read_yaml(side)
-    if isinstance(values, dict):
-        values = {**values, **_names_as_written(side)}
-    return facts_from(values, side.name)
-
-
-def _names_as_written(side: Path) -> dict[str, str]:
-    """Names in a side file letter by letter: YAML makes the number 271 of the serial number 0417."""
-    import yaml
-
-    node = yaml.compose(side.read_text(encoding="utf-8-sig"), Loader=yaml.SafeLoader)
-    names: dict[str, str] = {}
-    seen: set[str] = set()
-    for key, value in node.value if isinstance(node, yaml.MappingNode) else ():
-        if str(key.value) in seen:
-            raise InputError(
-                f"{side.name}, line {key.start_mark.line + 1}: key '{key.value}' is there twice; remove one"
-            )
-        seen.add(str(key.value))
-        is_null = value.tag == "tag:yaml.org,2002:null"
-        if key.value in _NAMES and isinstance(value, yaml.ScalarNode) and not is_null:
-            names[key.value] = value.value
-    return names
+    return facts_from(read_yaml(side, NAMES), side.name)
 
 
 def side_file_text(facts: Facts) -> str:
     """The text of a side file that states `facts`."""
-    import yaml
-
-    return yaml.safe_dump(facts.as_dict(), sort_keys=False, allow_unicode=True)
-
-
-def read_yaml(path: Path) -> Any:
-    """The content of a YAML file.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the line, if it is not YAML or states a key twice.
-    """
-    import yaml
-
-    from fogml.runs.yaml_text import RepeatedKeyError, parse_yaml
-
-    try:
-        return parse_yaml(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
-        # A ValueError is text that is not UTF-8, or a date or number that there is none of.
-        place = getattr(error, "problem_mark", None)
-        where = f", line {place.line + 1}" if place is not None else ""
-        if isinstance(error, RepeatedKeyError):
-            raise InputError(f"{path.name}{where}: {error.problem}; keep one of the two") from None
-        raise InputError(f"{path.name}{where}: not readable as YAML; correct or remove it") from None
+    return yaml_text(facts.as_dict())

@@ -12,9 +12,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.columns import KNOWN, column_spec
-from fogml.runs.facts import Facts, read_yaml
+from fogml.runs.facts import NAMES, Facts
+from fogml.yaml_text import read_yaml
 
 PROFILE_FOLDER = Path(__file__).parent / "import_profiles"
 
@@ -37,7 +38,7 @@ Source = str | Annotated[int, Field(ge=0, strict=True)]
 
 
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class ImportColumn(_Strict):
@@ -132,7 +133,7 @@ class ImportProfile(_Strict):
     reject: Reject = Reject()
     columns: dict[str, ImportColumn]
     axes: dict[str, Source] = {}
-    legs: dict[str, tuple[int, int]] = {}
+    legs: dict[str, Annotated[tuple[int, int], Field(strict=False)]] = {}
     sample_s: float | None = Field(default=None, gt=0.0)
     facts: Facts = Facts()
     axis_facts: dict[str, Facts] = {}
@@ -220,7 +221,7 @@ def load_profile(name_or_path: str | Path) -> ImportProfile:
         raise InputError(
             f"{text}: no such import profile; give a YAML file or one of {', '.join(profile_names())}"
         )
-    values = read_yaml(path)
+    values = read_yaml(path, NAMES)
     if not isinstance(values, dict):
         raise InputError(f"{path.name}: an import profile must be 'key: value' lines")
     try:
@@ -244,4 +245,4 @@ def _first_fault(error: ValidationError) -> str:
     message = str(first["msg"]).removeprefix("Value error, ")
     if not key:
         return message
-    return f"key '{key}': {message} (found {first['input']!r})"
+    return f"key '{key}': {message} (found {quoted(first['input'])})"

@@ -16,6 +16,7 @@ from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.profile_schema import ImportColumn, ImportProfile, LeadingJump, load_profile, profile_names
 from fogml.runs.run import Run
+from fogml.runs.sources import run_sources, unchanged
 
 __all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
 
@@ -53,8 +54,10 @@ def import_recording(
     name = "given" if isinstance(profile, ImportProfile) else Path(profile).stem
     profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
     _check_axis(profile, axis)
-    table = read_logger_text(path, profile, name)
-    return runs_from_table(table, profile, path.stem, path.name, axis, read_side_file(path))
+    with unchanged(*run_sources(path)):
+        table = read_logger_text(path, profile, name)
+        facts = read_side_file(path)
+    return runs_from_table(table, profile, path.stem, path.name, axis, facts)
 
 
 def run_names(profile: ImportProfile, stem: str) -> dict[str, tuple[str | None, str | None]]:

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
-from fogml.runs.facts import Facts, facts_from
+from fogml.runs.facts import NAMES, Facts, facts_from
 from fogml.runs.findings import Finding
+from fogml.yaml_text import parse_yaml
 
 FACTS_KEY = "fogml.facts"
 """Key of the set-up facts (JSON) in Parquet schema metadata, HDF5 attributes and MAT variables."""
@@ -52,8 +53,8 @@ def facts_from_json(text: str | bytes, source: str) -> Facts:
 def embedded_facts(values: Mapping[str, Any], source: str) -> Facts | None:
     """Set-up facts among a file's metadata: JSON under `FACTS_KEY`, else one key per fact.
 
-    Keys that are no facts belong to others and are left alone. `scale_factor` and a heading
-    stand as JSON text.
+    Keys that are no facts belong to others and are left alone. Numbers may stand as text, as
+    Parquet holds nothing else; `scale_factor` and a heading stand as JSON text.
 
     Raises
     ------
@@ -67,11 +68,8 @@ def embedded_facts(values: Mapping[str, Any], source: str) -> Facts | None:
         value = values.get(key)
         if isinstance(value, bytes):
             value = value.decode("utf-8", errors="replace")
-        if isinstance(value, str) and value.lstrip().startswith("{"):
-            try:
-                value = json.loads(value)
-            except ValueError:
-                raise InputError(f"{source}, key '{key}': not readable as JSON: {value[:80]}") from None
+        if isinstance(value, str) and key not in NAMES:
+            value = parse_yaml(value, f"{source}, key '{key}'")
         if value is not None:
             stated[key] = value
     return facts_from(stated, source) if stated else None

@@ -7,12 +7,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from fogml.errors import InputError
+from fogml.errors import InputError, listed, quoted
 from fogml.runs.assemble import Assembler, run_from_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
 from fogml.runs.raw_table import RawTable, wanted_cells
 from fogml.runs.run import Run
+from fogml.runs.sources import run_sources, unchanged
 
 Format = Literal["csv", "parquet", "hdf5", "mat"]
 BLOCK_ROWS = 1_000_000
@@ -62,11 +63,12 @@ def read_run(path: str | Path, *, repair: bool = False, name: str | None = None)
     Raises
     ------
     InputError
-        Naming file, column, first bad row, and what to do.
+        Naming file, column, first bad row, and what to do; if the file changes while it is read.
     """
     path = Path(path)
-    kind = file_format(path)
-    run = run_from_table(_read_table(path, kind, repair), path, repair=repair, name=name)
+    with unchanged(*run_sources(path)):
+        kind = file_format(path)
+        run = run_from_table(_read_table(path, kind, repair), path, repair=repair, name=name)
     return run.with_findings(check_run(run))
 
 
@@ -97,21 +99,24 @@ def read_blocks(
     ------
     InputError
         As `read_run`, and if a column of `columns` is not there; a fault in a later block is met
-        when that block is asked for.
+        when that block is asked for, and so is a file that changed when the last one was.
     """
     path = Path(path)
-    kind = file_format(path)
     if block_rows < 1:
         raise InputError(f"{block_rows} rows a block: at least 1 is needed")
-    assembler = Assembler(path)
-    for table in _table_blocks(path, kind, block_rows, columns):
-        held = [parse_header(cell)[0] for cell in table.columns]
-        missing = [column for column in columns or () if column not in held]
-        if missing:
-            raise InputError(f"{path.name}: no column '{missing[0]}' of numbers; it holds {', '.join(held)}")
-        yield assembler.block(table)
-    if assembler.samples < 2:
-        raise too_short(path.name, assembler.samples)
+    with unchanged(*run_sources(path)):
+        kind = file_format(path)
+        assembler = Assembler(path)
+        for table in _table_blocks(path, kind, block_rows, columns):
+            held = [parse_header(cell)[0] for cell in table.columns]
+            missing = [column for column in columns or () if column not in held]
+            if missing:
+                raise InputError(
+                    f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
+                )
+            yield assembler.block(table)
+        if assembler.samples < 2:
+            raise too_short(path.name, assembler.samples)
 
 
 def read_table(path: Path) -> RawTable:
@@ -122,7 +127,8 @@ def read_table(path: Path) -> RawTable:
     InputError
         Naming the fault.
     """
-    return _read_table(path, file_format(path), repair=False)
+    with unchanged(path):
+        return _read_table(path, file_format(path), repair=False)
 
 
 def file_format(path: Path) -> Format:

@@ -25,7 +25,7 @@ class Range(BaseModel):
     """Numbers from `low` to `high`, both included; whole ones if both are whole; evenly in the logarithm
     where `log` is set."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     low: int | float
     high: int | float
     log: bool = False
@@ -75,7 +75,7 @@ class Space(BaseModel):
         Names of models, each with its parameters to choose.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     features: dict[str, list[str]]
     builder: list[str] = ["block"]
     window: Range | list[float] | float = 64.0

@@ -9,11 +9,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError
-from fogml.runs.facts import read_yaml
+from fogml.errors import InputError, quoted
 from fogml.twin.schedule import Schedule, schedule
 from fogml.twin.sentences import parse_action, parse_quantity, parse_step
 from fogml.twin.steps import Action, Repeat, Step, number_text
+from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.programme/1"
 PROGRAMME_FOLDER = Path(__file__).parent / "programmes"
@@ -113,9 +113,7 @@ class Programme:
 
     def as_yaml(self) -> str:
         """The text of a programme file."""
-        import yaml
-
-        return yaml.safe_dump(self.as_dict(), sort_keys=False, allow_unicode=True, width=1000)
+        return yaml_text(self.as_dict(), width=1000)
 
 
 def programme_names() -> tuple[str, ...]:
@@ -156,9 +154,9 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
         raise InputError(f"{source}: a programme is a list of steps, or 'key: value' lines")
     for key in values:
         if key not in _KEYS:
-            raise InputError(f"{source}: unknown key '{key}'; known keys are {', '.join(_KEYS)}")
+            raise InputError(f"{source}: unknown key {quoted(key)}; known keys are {', '.join(_KEYS)}")
     if values.get("schema", SCHEMA) != SCHEMA:
-        raise InputError(f"{source}: 'schema' is {values['schema']!r}; {SCHEMA} is understood")
+        raise InputError(f"{source}: 'schema' is {quoted(values['schema'])}; {SCHEMA} is understood")
     settings: dict[str, Any] = {}
     for key, (dimension, _) in _QUANTITIES.items():
         if key in values:
@@ -176,10 +174,9 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
 
 
 def _power(value: Any, source: str) -> bool:
-    # YAML reads a bare on or off as true or false.
     known = {True: True, False: False, "on": True, "off": False}
     if not isinstance(value, bool | str) or value not in known:
-        raise InputError(f"{source}: 'power' is {value!r}; it is on or off at the beginning")
+        raise InputError(f"{source}: 'power' is {quoted(value)}; it is on or off at the beginning")
     return known[value]
 
 
@@ -211,7 +208,7 @@ def _step(value: Any, source: str, label: str) -> Step:
 def _pointed(parse: Any, owner: str, value: Any, *more: Any) -> Any:
     """Parse a sentence; faults name the owner."""
     if not isinstance(value, str):
-        raise InputError(f"{owner}: a sentence was expected, found {value!r}")
+        raise InputError(f"{owner}: a sentence was expected, found {quoted(value)}")
     try:
         return parse(value, *more)
     except InputError as error:

@@ -12,7 +12,6 @@ from pydantic import ValidationError
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 from fogml.runs.columns import KNOWN, is_temperature
-from fogml.runs.facts import read_yaml
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
@@ -33,6 +32,7 @@ from fogml.twin.set_up import (
 )
 from fogml.twin.twin import EffectSetting, Twin
 from fogml.twin.twin_schema import AIRFLOW, HEATING, LINE, NOMINAL, TWIN_FILE, Stated, message, near
+from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
 TWIN_FOLDER = Path(__file__).parent / "twins"
@@ -63,11 +63,8 @@ def load_twin(source: str | Path | Mapping[str, Any]) -> Twin:
 
 def save_twin(twin: Twin, path: str | Path) -> None:
     """Write a twin file that `load_twin` reads back as the same twin."""
-    import yaml
-
     with whole_file(path) as partial:
-        text = yaml.safe_dump(twin_dict(twin), sort_keys=False, allow_unicode=True, width=110)
-        partial.write_text(text, encoding="utf-8")
+        partial.write_text(yaml_text(twin_dict(twin)), encoding="utf-8")
 
 
 def twin_from(values: Any, source: str = "twin") -> Twin:

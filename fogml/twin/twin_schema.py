@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
+from fogml.errors import quoted
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.plant.standard import LARGEST_ORDER
@@ -37,20 +38,14 @@ LINE = (
 )
 
 
-def _no_truth(value: Any) -> Any:
-    if isinstance(value, bool):
-        raise ValueError("a number is needed")
-    return value
-
-
 class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Stated(_Strict):
     """A constant: its value, its unit, and the spread of its prior where it has one."""
 
-    value: Annotated[float, BeforeValidator(_no_truth)] = Field(allow_inf_nan=False)
+    value: float = Field(allow_inf_nan=False)
     unit: str | None = None
 
 
@@ -118,11 +113,12 @@ def message(error: ValidationError, source: str) -> str:
     key = ".".join(words) or "?"
     if first["type"] == "extra_forbidden":
         known = _known_keys(words[:-1])
-        return f"{source}: unknown key '{key}'{near(words[-1], known)}; known keys are {', '.join(known)}"
+        hint = near(words[-1], known)
+        return f"{source}: unknown key {quoted(key)}{hint}; known keys are {', '.join(known)}"
     if first["type"] == "missing":
         return f"{source}: nothing is given for '{key}'"
     reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
-    return f"{source}: key '{key}': {reason} (found {first['input']!r})"
+    return f"{source}: key '{key}': {reason} (found {quoted(first['input'])})"
 
 
 def _known_keys(path: list[str]) -> list[str]:

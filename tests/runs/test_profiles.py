@@ -255,7 +255,7 @@ def test_counts_stay_counts(write):
         ("header: false\nfields: 3\n", r"given by position"),
         ("axis_facts: {q: {}}\n", r"axis_facts.q"),
         ("separator: pipe\n", r"key 'separator'"),
-        ("sample_s: [1\n", r"line \d+: not readable as YAML"),
+        ("sample_s: [1\n", r"line \d+, column \d+: not readable as YAML"),
     ],
 )
 def test_a_faulty_profile_names_file_and_key(write, change, message):

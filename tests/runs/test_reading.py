@@ -209,13 +209,20 @@ class TestFacts:
             ("scale_factor: 3", "scale_factor.*value: 1.0"),
             ("scale_factor: {value: 0}", "scale_factor.*0"),
             ('scale_factor: {value: 1, unit: "V"}', "count per deg/h"),
-            ("started: 2026-13-45", "YAML"),
+            ("started: 2026-13-45", "started.*ISO 8601"),
+            ("started: 20260302", "started.*20260302.*2026-03-02T08"),
+            ("powered_on: yes", "powered_on.*number.*'yes'"),
+            ("powered_on: true", "powered_on.*number.*True"),
+            ("powered_on: 1:30", "powered_on.*number.*'1:30'"),
+            ("latitude: 030", "latitude.*'030' begins with a zero"),
+            ("latitude: '39.9'", "latitude.*number.*'39.9'"),
+            ("scale_factor: {value: true}", "scale_factor.*True"),
             ("started: soon", "started.*2026-03-02"),
             ("powered_on: .inf", "powered_on"),
             ("- a\n- b", "key: value"),
             ("unit: [", "line 1.*YAML|YAML"),
             ("unit: a\naxis: x\nunit: b", "line 3.*'unit'.*twice"),
-            ("[" * 5000, "YAML"),
+            ("[" * 5000, "more than 32 levels"),
             ("1: 2", "'1'"),
         ],
     )
@@ -227,5 +234,5 @@ class TestFacts:
 
     def test_a_side_file_that_is_no_text(self, path):
         path.with_suffix(".yaml").write_bytes(bytes(range(256)))
-        with pytest.raises(InputError, match=r"run\.yaml.*YAML"):
+        with pytest.raises(InputError, match=r"run\.yaml, line 2: is no UTF-8"):
             read_run(path)

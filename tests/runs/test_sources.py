@@ -7,7 +7,10 @@ import os
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs import reading
+from fogml.runs.reading import read_blocks, read_run
 from fogml.runs.sources import run_sources, sources_stamp, unchanged
+from tests.runs.files import SUFFIXES, samples, write_table
 
 
 @pytest.mark.parametrize("suffix", [".yaml", ".yml"])
@@ -61,3 +64,33 @@ def test_a_file_that_changes_while_it_is_read_is_told(tmp_path, change, fault):
 def test_a_fault_in_a_file_that_stays_is_told_as_it_is(tmp_path):
     with pytest.raises(InputError, match="row 3"), unchanged(tmp_path):
         raise InputError("row 3")
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("change", ["cut", "edited", "side"])
+def test_no_run_is_made_of_a_file_that_changes(tmp_path, suffix, change):
+    path = write_table(tmp_path / f"a{suffix}", samples(300))
+    path.with_suffix(".yaml").write_text("latitude: 39.9\n")
+    touched = path.with_suffix(".yaml") if change == "side" else path
+    blocks = read_blocks(path, block_rows=100)
+    assert len(next(blocks)) == 100
+    content = bytearray(touched.read_bytes())
+    if change == "cut":
+        del content[len(content) // 2 :]
+    touched.write_bytes(content)
+    os.utime(touched, ns=(1, 1))
+    with pytest.raises(InputError, match=rf"{touched.name}: changed while it was read"):
+        list(blocks)
+
+
+def test_a_run_read_whole_from_a_file_that_is_replaced_meanwhile(tmp_path, monkeypatch):
+    path = write_table(tmp_path / "a.csv", samples())
+    read = reading.run_from_table
+
+    def replaced_meanwhile(*arguments, **more):
+        replaced(path)
+        return read(*arguments, **more)
+
+    monkeypatch.setattr("fogml.runs.reading.run_from_table", replaced_meanwhile)
+    with pytest.raises(InputError, match=r"a\.csv: changed while it was read"):
+        read_run(path)

@@ -5,20 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-import yaml
 
 from fogml.cli.sweep_job import SweepSettings
 from fogml.cli.train_job import TrainSettings
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
 from fogml.validation.limits import check_limits
+from fogml.yaml_text import read_yaml
 
 CONFIGS = sorted((Path(__file__).parents[2] / "configs" / "models").glob("*.yaml"))
 
 
 @pytest.mark.parametrize("path", CONFIGS, ids=lambda path: path.stem)
 def test_model_configuration(path: Path) -> None:
-    settings = TrainSettings.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    settings = TrainSettings.model_validate(read_yaml(path))
     make_model(settings.model, settings.features)
     check_limits(settings.limits)
     if settings.features is not None:
@@ -30,5 +30,5 @@ SWEEPS = sorted((Path(__file__).parents[2] / "configs" / "sweeps").glob("*.yaml"
 
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
 def test_sweep_configuration(path: Path) -> None:
-    settings = SweepSettings.model_validate(yaml.safe_load(path.read_text(encoding="utf-8")))
+    settings = SweepSettings.model_validate(read_yaml(path))
     settings.plan([]).check()

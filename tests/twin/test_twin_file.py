@@ -88,7 +88,7 @@ def test_bare_numbers_are_in_the_documented_unit():
 
 
 FAULTS = [
-    (("nominal", "b0"), {"value": True}, "'nominal.b0.value': a number is needed"),
+    (("nominal", "b0"), {"value": True}, "'nominal.b0.value': Input should be a valid number"),
     (("sensors", "single"), {"T_tip": {"lag": 3.0}}, "'sensors.single.T_tip' is no temperature's name"),
     (("nominl",), {}, "unknown key 'nominl'; did you mean 'nominal'"),
     (("nominal", "e9"), 1, "unknown key 'nominal.e9'"),

@@ -1,0 +1,43 @@
+"""What messages quote is short and fit to be printed."""
+
+from __future__ import annotations
+
+import pytest
+
+from fogml.errors import LONGEST_MESSAGE, LONGEST_QUOTED, InputError, listed, quoted
+
+NESTED: list = [1]
+for _ in range(50):
+    NESTED = [NESTED] * 9
+
+
+@pytest.mark.parametrize(
+    "value",
+    [
+        "x" * 10**6,
+        "\x1b[2J\x00\u202e",
+        "a\nb",
+        "\udc80",
+        NESTED,
+        {"a" * 999: "b" * 999},
+        10**4000,
+        b"\x00" * 999,
+    ],
+)
+def test_a_quoted_value_is_short_and_printable(value):
+    text = quoted(value)
+    assert len(text) <= LONGEST_QUOTED + 2
+    assert text.isprintable()
+
+
+def test_short_ones_are_quoted_as_they_are():
+    assert quoted("a b") == "'a b'"
+    assert quoted({"a": [1, None]}) == "{'a': [1, None]}"
+    assert listed(["a", 1]) == "a, 1"
+    assert listed(map(str, range(100))) == "0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 88 more"
+
+
+def test_no_message_writes_on_the_terminal_or_fills_it():
+    text = str(InputError("a\x1b[2J\n  ^" + "b" * 10**6))
+    assert text.startswith("a\N{REPLACEMENT CHARACTER}[2J\n  ^b")
+    assert len(text) <= LONGEST_MESSAGE
