@@ -73,6 +73,7 @@ class TwinOnMeans:
             facts=inputs.facts,
             powered_on_s=inputs.powered_on_s,
             power_ons_s=inputs.power_ons_s,
+            coil=inputs.coil,
             drives={name: mean(drive) for name, drive in inputs.drives.items()},
             rate_window_s=inputs.rate_window_s,
             hindsight=inputs.hindsight,
@@ -99,7 +100,7 @@ class MeanInputs(Inputs):
 
     def dT(self, name: str = "T") -> FloatArray:
         """Rate of a temperature [degC/min], shape (b,)."""
-        if self.mean_dT is None:
+        if self.mean_dT is None or self.place(name) is None:
             return super().dT(name)
         key = f"dT({self.place(name)})"
         if key not in self.cache:

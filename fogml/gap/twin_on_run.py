@@ -76,7 +76,8 @@ class TwinOnRun:
             )
         self._twin, self._run = twin, run
         self._replayer = Replayer(run)
-        self._recorded, self._windows = self._replayer.recorded, self._replayer.windows
+        self._recorded = replace(self._replayer.recorded, coil=twin.coil)
+        self._windows = self._replayer.windows
         self._missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
         nodes = self._nodes(twin.network)
         # Responses to rates of temperature would be blurred by the readings' noise.

@@ -17,6 +17,7 @@ SIDE_SUFFIXES = (".yaml", ".yml")
 _EXAMPLES = {
     "latitude": "39.9",
     "input_axis": "up, or input_axis: {heading: 30.0}",
+    "table_axis": "up, or table_axis: {heading: 90.0, elevation: 0.0}",
     "scale_factor": '{value: 1.0, unit: "count per deg/h"}',
     "powered_on": "0.0",
     "started": "2026-03-02T08:00:00Z",
@@ -62,10 +63,17 @@ class Heading(BaseModel):
     heading: float = Field(allow_inf_nan=False)
 
 
+class Direction(Heading):
+    """Any direction: degrees clockwise from north, and degrees above the horizon."""
+
+    elevation: float = Field(default=0.0, ge=-90.0, le=90.0, allow_inf_nan=False)
+
+
 class Facts(BaseModel):
     """The facts about the set-up that a side file may state. All optional.
 
-    Latitude in degrees north; `powered_on` in seconds on the run's clock.
+    Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
+    turns about, counter-clockwise; up where it is not stated.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -73,6 +81,7 @@ class Facts(BaseModel):
     axis: str | None = None
     latitude: float | None = Field(default=None, ge=-90.0, le=90.0)
     input_axis: Literal["up", "down", "north", "south", "east", "west"] | Heading | None = None
+    table_axis: Literal["up", "down", "north", "south", "east", "west"] | Direction | None = None
     scale_factor: ScaleFactor | None = None
     powered_on: float | None = Field(default=None, allow_inf_nan=False)
     started: Annotated[datetime | None, BeforeValidator(_moment)] = None

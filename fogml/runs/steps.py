@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from fogml.runs.run import FloatArray
@@ -9,6 +11,7 @@ from fogml.runs.run import FloatArray
 FINEST_STEP_DEGC = 5e-4
 """Steps of a record that are finer are its digits and no sensor's."""
 _WHOLE = 1e-2
+_ORDERS = (2, 4, 6, 8)
 
 
 def recorded_step(values: FloatArray) -> float:
@@ -33,6 +36,24 @@ def to_steps(values: FloatArray, step: float) -> FloatArray:
     if abs(per_unit * step - 1.0) < 1e-9:
         return np.asarray(whole / per_unit)
     return np.asarray(whole * step)
+
+
+def noisy_beyond(temperature: FloatArray, least: float) -> bool:
+    """Whether readings hold more noise than `least`, a standard deviation in their unit.
+
+    Of white noise all differences tell the same, ``Var(D^k x) = C(2 k, k) sigma**2``; a course that is
+    smooth over some samples leaves ever less in the higher ones, however slow the samples are.
+    """
+    if reading_noise(temperature) <= least:
+        return False
+    orders = [order for order in _ORDERS if len(temperature) >= 16 + order]
+    told = [_noise_in_differences(temperature, order) for order in orders]
+    return not told or min(told) > least or recorded_step(temperature) > least
+
+
+def _noise_in_differences(values: FloatArray, order: int) -> float:
+    size = float(np.median(np.abs(np.diff(values, order)))) / 0.6745
+    return size / math.sqrt(math.comb(2 * order, order))
 
 
 def reading_noise(temperature: FloatArray) -> float:

@@ -46,7 +46,9 @@ def check_amplitude(effect: Effect, inputs: Inputs) -> None:
     if isinstance(effect, LoopEffect):
         output = inputs.output
         assert output is not None
+        # One not in proportion to its amplitude has the signature of the usual amplitude.
         step = 1e-3 * effect.amplitude.typical("navigation")
+        step = effect.amplitude.typical() if effect.amplitudes else step
         change = effect.apply(output, fresh(inputs), step, **shape) - output
         wanted = step * signature(effect, inputs, shape)
         slack = 0.02 * rms(wanted) + 1e-14 * float(np.abs(output).max())

@@ -16,7 +16,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import FloatArray
 from fogml.runs.steps import to_steps
 from fogml.twin.effect import (
@@ -33,12 +32,10 @@ from fogml.twin.effect import (
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import bias_deg_h, scale_factor_ppm, temperature_slopes
-from fogml.twin.responses import heading_change
 from fogml.twin.twin import EffectSetting, Twin
 
 Signature = Callable[[Effect, EffectSetting, Inputs], FloatArray]
 """Gives the signature of an effect on inputs; a replay keeps those that it has."""
-_AXES = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,7 @@ def through_chain(
         to first order.
     """
     parts: dict[str, FloatArray] = {}
-    rate = inputs.input_rate_deg_h + heading_change(inputs)
+    rate = inputs.input_rate_deg_h
     scale = 1.0 + 1e-6 * scale_factor_ppm(nominal_inputs, twin.nominal)
     bias = bias_deg_h(nominal_inputs, twin.nominal)
     if contributions:
@@ -209,17 +206,6 @@ def _falsified(
         if declared.digitises == digitising:
             temperature = declared.sense(name, temperature, inputs, setting.amplitude, **setting.shape)
     return temperature
-
-
-def heading_of(facts: Facts, angle: FloatArray) -> FloatArray | None:
-    """Heading of a horizontal input axis [deg clockwise from north] on a table turned by `angle` [deg].
-
-    None where the axis is not horizontal. A table angle counts counter-clockwise.
-    """
-    axis = facts.input_axis
-    if axis is None or axis in ("up", "down"):
-        return None
-    return (axis.heading if isinstance(axis, Heading) else _AXES[axis]) - angle
 
 
 def fresh(inputs: Inputs) -> Inputs:

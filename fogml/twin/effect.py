@@ -64,6 +64,9 @@ class Effect(ABC):
     told_by
         Columns without whose changes a run can't tell the effect from others: of each group one has to be
         recorded to change.
+    amplitudes
+        Of an effect whose response is not in proportion to its amplitude, amplitudes about which a
+        diagnosis takes it; the signature is then the one about the usual amplitude.
     drawn_per_run
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
@@ -82,6 +85,7 @@ class Effect(ABC):
     confused_with: ClassVar[Mapping[str, str]] = {}
     candidate: ClassVar[bool] = True
     told_by: ClassVar[tuple[tuple[str, ...], ...]] = ()
+    amplitudes: ClassVar[tuple[float, ...]] = ()
     drawn_per_run: ClassVar[bool] = False
 
     @abstractmethod

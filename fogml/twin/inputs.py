@@ -12,7 +12,10 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
+from fogml.signals.sample_means import mean_cosine, with_whole_turns
+from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
 from fogml.twin.memory import Memory
+from fogml.twin.optics import REFERENCE_COIL, Coil
 
 REST = {
     "power": 0.0,
@@ -45,8 +48,12 @@ STAND_INS = {
 }
 """The nearest places, nearest first, for one that neither recording nor plant gives.
 
-The names are all those that an effect may ask for; ``T_leads`` are the fibre's ends.
+The names are all those that an effect may ask for.
 """
+LEAST_ALONG = 0.1
+"""Share of the table's rate about the input axis that tells the table's own: less is mostly error."""
+LEADS = {"T_electronics": 0.5, "T_case": 0.5}
+"""Where the fibre's ends lie, ``T_leads``: half way from the electronics to the case."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +83,12 @@ class Inputs:
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
         Window of rates [s]; 0 for neighbouring samples.
+    angle_begins_anew
+        Whether the recorded angle may begin anew after a turn.
     hindsight
         Whether these are all samples of a recording, so that a rate may look ahead as far as back.
+    coil
+        The unit's coil, for what follows from its optics.
     output
         The output that the effect meets [deg/h], shape (n,); for loop, sensor and logger effects.
     slopes
@@ -98,7 +109,9 @@ class Inputs:
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     sensors: Mapping[str, Sequence[FloatArray]] = field(default_factory=dict)
     rate_window_s: float = 64.0
+    angle_begins_anew: bool = False
     hindsight: bool = False
+    coil: Coil = REFERENCE_COIL
     output: FloatArray | None = None
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)
@@ -120,6 +133,8 @@ class Inputs:
         place = self.place(name)
         if place is not None:
             return self.temperatures[place]
+        if name == "T_leads" and self.temperatures:
+            return np.asarray(sum(weight * self.temperature(end) for end, weight in LEADS.items()))
         held = ", ".join(self.temperatures) or "none"
         raise InputError(f"no temperature '{name}' is recorded or given by the plant; there is {held}")
 
@@ -137,6 +152,8 @@ class Inputs:
 
     def dT(self, name: str = "T") -> FloatArray:
         """Rate of a temperature [degC/min], shape (n,)."""
+        if name == "T_leads" and self.place(name) is None:
+            return np.asarray(sum(weight * self.dT(end) for end, weight in LEADS.items()))
         key = f"dT({self.place(name)})"
         if key not in self.cache:
             self.cache[key] = self.rate_per_minute(key, self.temperature(name))
@@ -169,9 +186,72 @@ class Inputs:
         if "angle" in self.drives:
             return self.drives["angle"]
         if "angle" not in self.cache:
-            step = self.time - self.memory.previous("angle time", self.time)
-            self.cache["angle"] = self.memory.total("angle", step * self.table_rate)
+            mean = 0.5 * (self.table_rate + self.memory.previous("angle rate", self.table_rate))
+            self.cache["angle"] = self.memory.total("angle", self._step_s * mean)
         return self.cache["angle"]
+
+    @property
+    def _step_s(self) -> FloatArray:
+        """Time since the sample before [s], shape (n,); 0 at the first one."""
+        if "step" not in self.cache:
+            self.cache["step"] = self.time - self.memory.previous("step time", self.time)
+        return self.cache["step"]
+
+    @property
+    def turned_deg(self) -> FloatArray:
+        """How far the table turned since the sample before [deg], shape (n,), in the sense of its angle.
+
+        Of a recorded angle that begins anew after a turn the whole turns follow from the table's rate; where
+        the rate about the input axis does not tell the table's, from the shorter way.
+        """
+        if "turned" not in self.cache:
+            angle = self.angle_deg
+            turned = angle - self.memory.previous("turned angle", angle)
+            along = abs(self.attitude.along)
+            if along > LEAST_ALONG:
+                turned = with_whole_turns(turned, self._step_s * self.table_rate / along)
+            elif self.angle_begins_anew:
+                turned = with_whole_turns(turned, np.zeros(len(turned)))
+            self.cache["turned"] = turned
+        return self.cache["turned"]
+
+    @property
+    def turning_deg_s(self) -> FloatArray:
+        """Rate of the table about its own axis [deg/s], shape (n,).
+
+        From the rate about the input axis where that has a share in it, else from the recorded angle.
+        """
+        held = self.attitude
+        if abs(held.along) > LEAST_ALONG:
+            return self.table_rate if held.along == 1.0 else self.table_rate / held.along
+        if "angle" not in self.drives:
+            return np.zeros(len(self))
+        still = np.zeros(len(self))
+        return np.divide(held.sense * self.turned_deg, self._step_s, out=still, where=self._step_s > 0.0)
+
+    @property
+    def attitude(self) -> Attitude:
+        """How the gyro lies on its table."""
+        return attitude(self.facts)
+
+    def table_cosine(self, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
+        """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,)."""
+        after = np.radians(harmonic * self.angle_deg + phase_deg)
+        return mean_cosine(after - np.radians(harmonic * self.turned_deg), after)
+
+    def carried(self, fixed: FloatArray, vector: FloatArray, *, mean: bool = True) -> FloatArray | float:
+        """A fixed vector along one that turns with the table; shape (n,).
+
+        Both of shape (3,), to north, west and up, the second at table angle 0; one number where the table
+        does not change it. As the mean since the sample before, or at the samples.
+        """
+        held = self.attitude
+        constant, cosine, sine = turned(fixed, vector, held.table)
+        if cosine == 0.0 and sine == 0.0:
+            return constant
+        phase = -held.sense * float(np.degrees(np.arctan2(sine, cosine)))
+        turning = self.table_cosine(phase) if mean else np.cos(np.radians(self.angle_deg + phase))
+        return np.asarray(constant + np.hypot(cosine, sine) * turning)
 
     @cached_property
     def time_on_s(self) -> FloatArray:
@@ -184,10 +264,19 @@ class Inputs:
         """How many power-ons came after the first one, shape (n,)."""
         return np.searchsorted(np.array(self.power_ons_s), self.time, side="right")
 
-    @cached_property
+    @property
     def input_rate_deg_h(self) -> FloatArray:
-        """Rate about the input axis [deg/h]: table and Earth, shape (n,)."""
-        return 3600.0 * self.table_rate + self.earth_deg_h
+        """Rate about the input axis [deg/h]: table, and Earth where the table has turned the axis; (n,)."""
+        if "input rate" not in self.cache:
+            self.cache["input rate"] = 3600.0 * self.table_rate + self._earth_along_deg_h
+        return self.cache["input rate"]
+
+    @property
+    def _earth_along_deg_h(self) -> FloatArray | float:
+        told = self.facts.earth_rate_deg_h is not None and "angle" in self.drives
+        if not told or self.attitude.fixed:
+            return self.earth_deg_h
+        return self.carried(earth_rate(self.facts), self.attitude.z, mean=False)
 
     def afresh(self) -> Inputs:
         """The same whole run with nothing remembered, for another signature on it.

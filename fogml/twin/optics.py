@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import TypeVar
+from typing import Literal, TypeVar
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
@@ -21,6 +21,8 @@ _Power = TypeVar("_Power", float, FloatArray)
 LIGHT_M_S = 299_792_458.0
 ELECTRON_C = 1.602176634e-19
 BOLTZMANN_J_K = 1.380649e-23
+Spectrum = Literal["gaussian", "flat"]
+_COHERENCE: dict[Spectrum, float] = {"gaussian": 2.0 * math.sqrt(2.0 * math.log(2.0) / math.pi), "flat": 2.0}
 DEG_H = math.pi / 180.0 / 3600.0
 """One deg/h in rad/s."""
 
@@ -106,9 +108,29 @@ def polarization_period(
     return wavelength / (length * abs(birefringence_slope))
 
 
-def relative_intensity_noise(line_width: float, wavelength: float = 1550e-9) -> float:
-    """Excess noise of a broadband source lambda**2 / (c dlambda) [1/Hz]; line width in m."""
-    return wavelength * wavelength / (LIGHT_M_S * line_width)
+def relative_intensity_noise(
+    line_width: float, wavelength: float = 1550e-9, spectrum: Spectrum = "gaussian"
+) -> float:
+    """Excess noise of a polarised broadband source, one-sided [1/Hz].
+
+    Thermal light of one polarisation has a density of twice its coherence time, the integral of the squared
+    degree of coherence (unpolarised light half of it): over ``1 / dnu = lambda**2 / (c dlambda)`` that
+    is 2 for a flat spectrum and ``2 sqrt(2 ln 2 / pi) = 1.33`` for a Gaussian one.
+
+    Parameters
+    ----------
+    line_width
+        Full width at half of the maximum [m].
+    wavelength
+        Mean wavelength [m].
+    spectrum
+        ``gaussian`` or ``flat``.
+
+    References
+    ----------
+    J. W. Goodman, Statistical Optics (1985), section 6.1.
+    """
+    return _COHERENCE[spectrum] * wavelength * wavelength / (LIGHT_M_S * line_width)
 
 
 @dataclass(frozen=True)
@@ -118,7 +140,7 @@ class Receiver:
     Attributes
     ----------
     line_width
-        Of the source [m].
+        Of the source, polarised and Gaussian, at half of its maximum [m].
     responsivity
         Of the diode [A/W].
     resistance
@@ -164,9 +186,9 @@ class Receiver:
         return (shot + thermal + excess) / (slope * slope)
 
 
-def phase_noise_to_walk(density: float, coil: Coil) -> float:
+def phase_noise_to_walk(density: _Power, coil: Coil) -> _Power:
     """Angle random walk [deg/sqrt(h)] of a one-sided white phase noise [rad**2/Hz]."""
-    return math.degrees(math.sqrt(0.5 * density) / coil.sagnac_s) * 60.0
+    return (0.5 * density) ** 0.5 * (60.0 * math.degrees(1.0 / coil.sagnac_s))
 
 
 REFERENCE_COIL = Coil()

@@ -36,6 +36,8 @@ class Quantity:
         A few words.
     default
         What is taken where nothing is stated; the middle of the grade's range if None.
+    whole
+        Whether it counts something: draws are whole numbers, 1 at least in size.
     """
 
     name: str
@@ -46,6 +48,7 @@ class Quantity:
     limits: tuple[float, float] = (-math.inf, math.inf)
     signed: bool = False
     default: float | None = None
+    whole: bool = False
 
     def range(self, grade: Grade) -> tuple[float, float]:
         """Usual range (low, high) for a grade."""
@@ -61,7 +64,13 @@ class Quantity:
         if self.default is not None:
             return self.default
         low, high = self.range(grade)
-        return math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high)
+        return self.within(math.sqrt(low * high) if low > 0.0 else 0.5 * (low + high))
+
+    def within(self, value: float) -> float:
+        """A value brought to where it can be: within `limits`, and whole where it counts."""
+        if self.whole:
+            value = math.copysign(max(float(round(abs(value))), 1.0), value)
+        return float(np.clip(value, *self.limits))
 
     def draw(self, rng: np.random.Generator, grade: Grade = "tactical") -> float:
         """A value from the prior: log-normal with the range as its central 90 %, normal where
@@ -74,7 +83,7 @@ class Quantity:
             value = math.exp(middle + spread * z)
         else:
             value = 0.5 * (low + high) + 0.5 * (high - low) / _Z90 * z
-        return float(np.clip(sign * value, *self.limits))
+        return self.within(sign * value)
 
     def check(self, value: float, owner: str) -> float:
         """The value as a float.
@@ -86,6 +95,8 @@ class Quantity:
         """
         if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
             raise InputError(f"{owner}: '{self.name}' is {value!r}; a number in {self.unit} is needed")
+        if self.whole and value != round(value):
+            raise InputError(f"{owner}: '{self.name}' is {value:g}; a whole number is needed")
         low, high = self.limits
         if not low <= value <= high:
             raise InputError(

@@ -13,9 +13,11 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number
+from fogml.runs.facts import Direction, Facts, Heading
 from fogml.runs.run import FloatArray, Run
-from fogml.runs.steps import reading_noise
-from fogml.twin.chain import heading_of, hidden, logged, through_chain
+from fogml.runs.steps import noisy_beyond
+from fogml.twin.attitude import earth_field
+from fogml.twin.chain import hidden, logged, through_chain
 from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.plant.estimate import estimate_nodes, recorded_power
@@ -78,26 +80,33 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
             temperatures[name] = run.temperature(name)
             sensors[name] = [run.columns[sensor] for sensor in held]
     drives = {name: run.columns[name] for name in (*REST, "angle") if name in run.columns}
-    heading = heading_of(run.facts, drives["angle"]) if "angle" in drives else None
     # The air itself is never quiet.
-    noisy = any(reading_noise(t) > QUIET_DEGC for name, t in temperatures.items() if name != "T_chamber")
-    # A table that turns about the input axis does not change its heading.
-    if heading is not None and not run.rate.any():
-        drives["heading"] = heading
+    noisy = any(noisy_beyond(t, QUIET_DEGC) for name, t in temperatures.items() if name != "T_chamber")
     inputs = Inputs(
         time=run.time,
         temperatures=temperatures,
         table_rate=run.rate,
         earth_deg_h=run.facts.earth_rate_deg_h or 0.0,
-        facts=run.facts,
+        facts=_with_table_axis(run),
         powered_on_s=windows[0][0] if windows else -math.inf,
         power_ons_s=tuple(on for on, _ in windows[1:]),
         drives=drives,
         sensors=sensors,
         rate_window_s=RATE_WINDOW_S if noisy else 0.0,
+        angle_begins_anew="angle" in drives and float(np.ptp(drives["angle"])) <= 360.0,
         hindsight=noisy,
     )
     return inputs, windows
+
+
+def _with_table_axis(run: Run) -> Facts:
+    """A run's facts; a table that turns about a horizontal input axis has that axis, if nothing is stated."""
+    facts = run.facts
+    if facts.table_axis is not None or facts.input_axis in (None, "up", "down") or not run.rate.any():
+        return facts
+    axis = facts.input_axis
+    table = Direction(heading=axis.heading) if isinstance(axis, Heading) else axis
+    return facts.model_copy(update={"table_axis": table})
 
 
 def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
@@ -218,10 +227,14 @@ class Replayer:
         recorded = self.recorded
         needed = {need for declared, _ in twin.on for need in declared.needs if need in STAND_INS}
         missing = needed - set(recorded.temperatures) - ({"T"} if recorded.place("T") else set())
+        around = self._around(twin)
         if self.truth is not None or not missing or not recorded.temperatures:
-            return self._given.setdefault("recorded", _Given("recorded", recorded, recorded))
+            if around not in self._given:
+                given = self._surrounded(twin, recorded)
+                self._given[around] = _Given(around, given, given)
+            return self._given[around]
         changes = tuple((d, s.amplitude, s.key) for d, s in twin.thermal)
-        key = (twin.plant, changes)
+        key = (twin.plant, changes, around)
         if key not in self._given:
             nodes = estimate_nodes(
                 twin.network,
@@ -229,14 +242,32 @@ class Replayer:
                 recorded.temperatures,
                 powered=self.windows,
                 fan=recorded.drives.get("fan"),
-                table_rate=recorded.table_rate,
+                table_rate=recorded.afresh().turning_deg_s,
             )
-            inputs = replace(recorded.afresh(), temperatures={**nodes, **recorded.temperatures}, cache={})
+            nominal = self._surrounded(twin, recorded)
+            inputs = replace(nominal.afresh(), temperatures={**nodes, **recorded.temperatures}, cache={})
             # Bounded: a fit may try many plants.
             if len(self._given) > 8:
-                self._given = {k: v for k, v in self._given.items() if k == "recorded"}
-            self._given[key] = _Given(key, inputs, recorded)
+                self._given.clear()
+            self._given[key] = _Given(key, inputs, nominal)
         return self._given[key]
+
+    def _around(self, twin: Twin) -> tuple[Hashable, ...]:
+        """What of a twin is an input: its coil, and the field about it where none is recorded."""
+        outside, fields = twin.surroundings, {"B_x", "B_y", "B_z"}
+        asked = any(fields & set(declared.needs) for declared, _ in twin.on)
+        if not asked or fields & set(self.recorded.drives):
+            return (twin.coil,)
+        return twin.coil, outside.horizontal_field, outside.vertical_field
+
+    def _surrounded(self, twin: Twin, recorded: Inputs) -> Inputs:
+        """The recorded inputs with what `_around` tells."""
+        given, outside = replace(recorded, coil=twin.coil), twin.surroundings
+        if len(self._around(twin)) == 1:
+            return given
+        angle = given.afresh().angle_deg
+        field = earth_field(given.facts, angle, outside.horizontal_field, outside.vertical_field)
+        return replace(given, drives={**given.drives, **field})
 
 
 _replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()

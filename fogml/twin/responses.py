@@ -1,23 +1,19 @@
-"""What several effects ask of their inputs: the output's slope, the table's angle, unseen errors.
+"""What several effects ask of their inputs: the output's slope, tilts, unseen errors.
 
-Each function takes the key of the effect that asks, so that no two share a state.
+A function that remembers takes the key of the effect that asks, so that no two share a state.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
 
-from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.runs.run import FloatArray
-from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.signals.waves import sine
+from fogml.twin.attitude import earth_rate, turned
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
-
-_HEADINGS = {"north": 0.0, "east": 90.0, "south": 180.0, "west": 270.0}
 
 
 def met_output(inputs: Inputs) -> FloatArray:
@@ -30,18 +26,6 @@ def slope_per_s(inputs: Inputs, key: str, x: FloatArray) -> FloatArray:
     step_x = x - inputs.memory.previous(f"{key} value", x)
     step_t = inputs.time - inputs.memory.previous(f"{key} time", inputs.time)
     return np.divide(step_x, step_t, out=np.zeros(len(x)), where=step_t > 0.0)
-
-
-def table_cosine(inputs: Inputs, key: str, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
-    """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,).
-
-    Of a recorded angle that begins anew after a turn the whole turns follow from the table's rate.
-    """
-    angle, time = inputs.angle_deg, inputs.time
-    told = (time - inputs.memory.previous(f"{key} time", time)) * inputs.table_rate
-    turned = with_whole_turns(angle - inputs.memory.previous(f"{key} angle", angle), told)
-    after = np.radians(harmonic * angle + phase_deg)
-    return mean_cosine(after - np.radians(harmonic * turned), after)
 
 
 def line(inputs: Inputs, period_s: float, phase_deg: float) -> FloatArray:
@@ -73,46 +57,24 @@ def unseen(inputs: Inputs, key: str, missed: Callable[[str], FloatArray]) -> Flo
     return total
 
 
-def tilt_response(inputs: Inputs, key: str, direction_deg: float) -> FloatArray:
+def tilt_response(inputs: Inputs, direction_deg: float) -> FloatArray:
     """Rate that an input axis picks up per radian of its tilt [deg/h], shape (n,), means over samples.
 
     ::
 
         upright      15.041 cos(lat) cos(direction + table angle)
         horizontal   15.041 (sin(lat) cos(direction) - cos(lat) sin(heading) sin(direction))
+                     + 3600 cos(direction) table rate
 
-    An upright axis is that of the table, which carries the tilt round from `direction`, north at table
-    angle 0. A horizontal one tilts upwards at direction 0 and in azimuth at 90 deg; a recorded
-    table angle turns its heading. An axis of unknown attitude is taken for an upright one at 45 deg of
-    latitude.
+    for a table whose axis is up: the Earth's rate and the table's, across the axis in the direction of the
+    tilt, which the table carries round (`fogml.twin.attitude`). A vertical axis tilts to north at direction
+    0 and table angle 0, a horizontal one upwards, and in azimuth at 90 deg. Where the attitude is not known
+    the axis is taken for an upright one, and where the latitude is not, for one at 45 deg.
     """
-    facts = inputs.facts
-    latitude = math.radians(45.0 if facts.latitude is None else facts.latitude)
-    heading = heading_deg(facts)
-    if heading is None or facts.latitude is None:
-        return EARTH_RATE_DEG_H * math.cos(latitude) * table_cosine(inputs, key, direction_deg)
-    direction = math.radians(direction_deg)
-    upwards = math.sin(latitude) * math.cos(direction)
-    sideways = math.cos(latitude) * math.sin(direction)
-    if "angle" in inputs.drives:
-        # sin(heading - angle) = cos(angle + 90 deg - heading)
-        course = table_cosine(inputs, key, 90.0 - heading)
-    else:
-        course = np.full(len(inputs), math.sin(math.radians(heading)))
-    return EARTH_RATE_DEG_H * (upwards - sideways * course)
-
-
-def heading_change(inputs: Inputs) -> FloatArray | float:
-    """Change of Earth rate with the heading [deg/h], shape (n,), where one is given; else 0."""
-    if "heading" not in inputs.drives or inputs.facts.latitude is None:
-        return 0.0
-    horizontal = EARTH_RATE_DEG_H * np.cos(np.radians(inputs.facts.latitude))
-    projected = horizontal * np.cos(np.radians(inputs.drives["heading"]))
-    return np.asarray(projected - inputs.earth_deg_h)
-
-
-def heading_deg(facts: Facts) -> float | None:
-    """Heading of a horizontal input axis [deg clockwise from north]; None where it is not one."""
-    if isinstance(facts.input_axis, Heading):
-        return facts.input_axis.heading
-    return _HEADINGS.get(facts.input_axis or "")
+    held = inputs.attitude
+    across = held.tilted_to(direction_deg)
+    picked = inputs.carried(earth_rate(inputs.facts), across)
+    share, _, _ = turned(held.table, across, held.table)
+    if share != 0.0:
+        picked = picked + 3600.0 * share * inputs.turning_deg_s
+    return np.asarray(picked) if np.ndim(picked) else np.full(len(inputs), picked)

@@ -107,12 +107,21 @@ class Sensors:
         return {"T_in" if number % 2 else "T_out": 1.0}
 
 
+EARTH_HORIZONTAL_UT, EARTH_VERTICAL_UT = 20.0, 40.0
+"""Sizes of Earth's magnetic field at middle latitudes [uT]."""
 SURROUNDING_QUANTITIES: tuple[Quantity, ...] = (
     Quantity("supply", "V", (5.0, 28.0), (5.0, 28.0), "supply voltage", (0.0, 1e3)),
     Quantity("vibration", "g", (0.0, 0.01), (0.0, 0.01), "rms with the compressor off", (0.0, 100.0)),
-    Quantity("compressor_vibration", "g", (0.0, 0.1), (0.0, 0.1), "rms at full duty, added", (0.0, 100.0)),
+    Quantity("compressor_vibration", "g", (0.0, 0.1), (0.0, 0.1), "rms of its own, while on", (0.0, 100.0)),
     Quantity("horizontal_field", "uT", (15.0, 30.0), (15.0, 30.0), "magnetic, northward", (0.0, 1e6)),
-    Quantity("vertical_field", "uT", (30.0, 55.0), (30.0, 55.0), "magnetic, upward", (-1e6, 1e6)),
+    Quantity(
+        "vertical_field",
+        "uT",
+        (30.0, 55.0),
+        (30.0, 55.0),
+        "magnetic, downward in the north and upward in the south",
+        (-1e6, 1e6),
+    ),
 )
 
 
@@ -123,8 +132,8 @@ class Surroundings:
     supply: float = 28.0
     vibration: float = 0.0
     compressor_vibration: float = 0.0
-    horizontal_field: float = 20.0
-    vertical_field: float = 40.0
+    horizontal_field: float = EARTH_HORIZONTAL_UT
+    vertical_field: float = EARTH_VERTICAL_UT
 
     def __post_init__(self) -> None:
         for quantity in SURROUNDING_QUANTITIES:

@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
+from fogml.twin.optics import REFERENCE_COIL, Coil
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.quantities import Grade
 from fogml.twin.registry import catalogue_order, effect
@@ -64,6 +65,8 @@ class Twin:
         Coefficients of the noise terms.
     noise_factor
         Factor of each coefficient's log-normal prior; 1 for one that is known.
+    coil
+        Its fibre coil, from which leads, fringes, photon noise and proper frequency follow.
     plant, sensors, surroundings
         The rest of the set-up.
     settings
@@ -83,6 +86,7 @@ class Twin:
     nominal_sd: NominalConstants = PRIOR_SD
     noise: NoiseConstants = field(default_factory=NoiseConstants)
     noise_factor: Mapping[str, float] = field(default_factory=dict)
+    coil: Coil = REFERENCE_COIL
     plant: Plant = field(default_factory=Plant)
     sensors: Sensors = field(default_factory=Sensors)
     surroundings: Surroundings = field(default_factory=Surroundings)

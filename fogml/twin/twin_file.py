@@ -15,6 +15,7 @@ from fogml.runs.columns import KNOWN, is_temperature
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
+from fogml.twin.optics import Coil
 from fogml.twin.plant.air import Airflow
 from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.power import SelfHeating
@@ -31,12 +32,13 @@ from fogml.twin.set_up import (
     Surroundings,
 )
 from fogml.twin.twin import EffectSetting, Twin
-from fogml.twin.twin_schema import AIRFLOW, HEATING, LINE, NOMINAL, TWIN_FILE, Stated, message, near
+from fogml.twin.twin_schema import AIRFLOW, COIL, HEATING, LINE, NOMINAL, TWIN_FILE, Stated, message, near
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
 TWIN_FOLDER = Path(__file__).parent / "twins"
-_MINUTES = {("s", "s"): 1.0, ("s", "min"): 60.0, ("s", "h"): 3600.0}
+_FACTORS = {("s", "min"): 60.0, ("s", "h"): 3600.0, ("m", "km"): 1e3, ("m", "mm"): 1e-3, ("m", "nm"): 1e-9}
+"""Of a documented unit and another one that is understood."""
 
 
 def twin_names() -> tuple[str, ...]:
@@ -97,6 +99,7 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
             ),
             noise=NoiseConstants(**noise),
             noise_factor={name: held.factor for name, held in factors.items() if held and held.factor},
+            coil=Coil(**_values(source, "coil", stated.coil, COIL)),
             plant=_plant(source, stated.plant),
             sensors=_sensors(source, stated.sensors),
             surroundings=Surroundings(
@@ -138,7 +141,8 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
     values: dict[str, Any] = {"schema": SCHEMA, "name": twin.name}
     if twin.description:
         values["description"] = twin.description
-    values |= {"grade": twin.grade, "nominal": nominal, "noise": noise, "plant": plant}
+    values |= {"grade": twin.grade, "nominal": nominal, "noise": noise, "coil": section(COIL, twin.coil)}
+    values["plant"] = plant
     values["sensors"] = section(SENSOR_QUANTITIES, twin.sensors.common) | (
         {"single": single} if single else {}
     )
@@ -208,7 +212,7 @@ def _values(source: str, section: str, stated: Any, quantities: Iterable[Quantit
 
 def _value(source: str, key: str, held: Stated, quantity: Quantity) -> float:
     unit = held.unit.replace("°", "deg") if held.unit else quantity.unit
-    factor = 1.0 if unit == quantity.unit else _MINUTES.get((quantity.unit, unit))
+    factor = 1.0 if unit == quantity.unit else _FACTORS.get((quantity.unit, unit))
     if factor is None:
         raise InputError(f"{source}: key '{key}' has unit '{held.unit}'; {quantity.unit} is needed")
     low, high = quantity.limits

@@ -31,6 +31,14 @@ HEATING = (
     _quantity("time_constant", "s", 1.0),
 )
 AIRFLOW = (_quantity("fan_gain", "1", 0.0, 100.0), _quantity("rotation_gain", "1", 0.0, 100.0))
+COIL = (
+    _quantity("length", "m", 1.0, 1e5),
+    _quantity("diameter", "m", 1e-3, 10.0),
+    _quantity("wavelength", "m", 1e-7, 1e-5),
+    _quantity("index", "1", 1.0, 4.0),
+    _quantity("index_slope", "1/degC", -1e-3, 1e-3),
+    _quantity("expansion", "1/degC", -1e-3, 1e-3),
+)
 LINE = (
     _quantity("inner_radius", "m", 1e-4, 10.0),
     _quantity("outer_radius", "m", 1e-4, 10.0),
@@ -88,6 +96,7 @@ TWIN_FILE: Any = create_model(
     grade=(Grade, "tactical"),
     nominal=_optional(_section("_Nominal", NOMINAL, _WithDeviation)),
     noise=_optional(_section("_Noise", NOISE, _WithFactor)),
+    coil=_optional(_section("_Coil", COIL)),
     plant=_optional(
         _section(
             "_Plant",

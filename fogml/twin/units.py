@@ -91,7 +91,7 @@ def repeat_unit(unit: Twin, count: int, *, seed: int = 0) -> tuple[Twin, ...]:
         settings: dict[str, EffectSetting] = dict(unit.settings)
         for declared, setting in unit.on:
             if declared.drawn_per_run:
-                drawn = float(np.clip(setting.amplitude * rng.standard_normal(), *declared.amplitude.limits))
+                drawn = declared.amplitude.within(setting.amplitude * rng.standard_normal())
                 settings[declared.id] = replace(setting, amplitude=drawn)
         repeats.append(replace(unit, settings=settings))
     return tuple(repeats)

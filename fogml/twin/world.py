@@ -11,7 +11,8 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
-from fogml.twin.chain import ChainOutput, heading_of, hidden, logged, sensed, sensor_shares, through_chain
+from fogml.twin.attitude import attitude, earth_field
+from fogml.twin.chain import ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
@@ -59,20 +60,20 @@ class _Branch:
         self.state = PlantState()
         self.chamber_memory, self.memory = Memory(), Memory()
 
-    def nodes(
-        self, block: TimelineBlock, drives: dict[str, FloatArray], rate: FloatArray
-    ) -> dict[str, FloatArray]:
+    def nodes(self, block: TimelineBlock, drives: dict[str, FloatArray]) -> dict[str, FloatArray]:
         """Temperature of every node at all samples of the block, on or off."""
         chamber = block.set_point
         for declared, setting in self.twin.thermal:
-            inputs = Inputs(block.time, {AIR: chamber}, rate, drives=drives, memory=self.chamber_memory)
+            inputs = Inputs(
+                block.time, {AIR: chamber}, block.table_rate, drives=drives, memory=self.chamber_memory
+            )
             chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
         return self.network.temperatures(
             block.time,
             chamber,
             powered=block.timeline.power_windows,
             fan=block.fan,
-            table_rate=rate,
+            table_rate=block.table_rate,
             state=self.state,
         )
 
@@ -165,17 +166,16 @@ class World:
 
     def _samples(self, block: TimelineBlock) -> Samples:
         facts = self.facts
-        angle = block.angle + block.yaw
-        heading = heading_of(facts, angle)
-        rate = block.table_rate if heading is None else np.zeros(len(block))
-        rate = -rate if facts.input_axis == "down" else rate
-        drives = self._block_drives(block, angle, heading)
+        held = attitude(facts)
+        # Both about the input axis, as a run records them.
+        rate = block.table_rate if held.along == 1.0 else held.along * block.table_rate
+        drives = self._block_drives(block, held.sense * (block.angle + block.yaw))
         on = block.powered > 0.0
         rows = slice(None) if on.all() else on
         drives_on = {name: values[rows] for name, values in drives.items()}
 
         def inputs(branch: _Branch) -> Inputs:
-            nodes = branch.nodes(block, drives, rate)
+            nodes = branch.nodes(block, drives)
             return Inputs(
                 time=block.time[rows],
                 temperatures={name: values[rows] for name, values in nodes.items()},
@@ -185,6 +185,7 @@ class World:
                 powered_on_s=self._power_ons[0],
                 power_ons_s=tuple(self._power_ons[1:]),
                 drives=drives_on,
+                coil=branch.twin.coil,
                 rate_window_s=0.0,
                 memory=branch.memory,
             )
@@ -201,18 +202,15 @@ class World:
         needed = {need for declared, _ in self.twin.on for need in declared.needs}
         return needed | set(self.columns)
 
-    def _block_drives(
-        self, block: TimelineBlock, angle: FloatArray, heading: FloatArray | None
-    ) -> dict[str, FloatArray]:
+    def _block_drives(self, block: TimelineBlock, angle: FloatArray) -> dict[str, FloatArray]:
         outside, needed = self.twin.surroundings, self._drives
         drives = {"angle": angle, "fan": block.fan}
-        if heading is not None:
-            drives["heading"] = heading
         if needed & {"compressor", "vibration"}:
             drives["compressor"] = block.compressor
         if "vibration" in needed:
-            shaken = outside.compressor_vibration * drives["compressor"]
-            drives["vibration"] = outside.vibration + shaken
+            # Independent sources add in squares; one on for a share of the time has that share of its square.
+            shaken = drives["compressor"] * outside.compressor_vibration**2
+            drives["vibration"] = np.sqrt(outside.vibration**2 + shaken)
         if "heater" in needed:
             drives["heater"] = block.heater
         if "humidity" in needed:
@@ -222,18 +220,8 @@ class World:
         if "power" in needed:
             drives["power"] = self._main.network.heating.power(block.time, self.timeline.power_windows)
         if needed & {"B_x", "B_y", "B_z"}:
-            drives |= self._field(angle, heading)
+            drives |= earth_field(self.facts, angle, outside.horizontal_field, outside.vertical_field)
         return drives
-
-    def _field(self, angle: FloatArray, heading: FloatArray | None) -> dict[str, FloatArray]:
-        """Earth's field in the gyro frame [uT]: z along the input axis, x up where that is horizontal."""
-        north, up = self.twin.surroundings.horizontal_field, self.twin.surroundings.vertical_field
-        turned = np.radians(angle if heading is None else heading)
-        along, across = north * np.cos(turned), -north * np.sin(turned)
-        level = np.full(len(angle), -up if self.facts.input_axis == "down" else up)
-        if heading is None:
-            return {"B_x": along, "B_y": across, "B_z": level}
-        return {"B_x": level, "B_y": across, "B_z": along}
 
     def _check_sensors(self) -> None:
         known = {*self._main.network.names, "T"}

@@ -87,6 +87,8 @@ def left_share(on, base, id) -> float | None:
     shape = declared.default_shape()
     response = on.response(id, shape, VALUES)
     amplitude = 1e-3 * declared.amplitude.tactical[1]
+    # The signature of one that is not in proportion is that of its usual amplitude.
+    amplitude = declared.amplitude.typical() if declared.amplitudes else amplitude
     changed = on.output(VALUES, (EffectValue(id, amplitude, shape),)) - base
     size = float(np.sqrt(np.mean(response**2)))
     if size == 0.0:

@@ -7,14 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.runs.facts import EARTH_RATE_DEG_H, Facts, Heading
 from fogml.testing.effect_inputs import block, standard_inputs
-from fogml.twin.chain import heading_of, sensed, through_chain
+from fogml.twin.chain import sensed, through_chain
 from fogml.twin.effect import BiasEffect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effects
-from fogml.twin.responses import heading_change
 from fogml.twin.set_up import SensorErrors, Sensors
 from fogml.twin.twin import Twin
 
@@ -172,20 +170,3 @@ def test_coil_sensors_alternate_between_the_faces():
     assert sensors.place("T2") == {"T_out": 1.0}
     assert sensors.place("T4") == {"T_out": 0.8, "T_case": 0.2}
     assert sensors.place("T_case") == {"T_case": 1.0}
-
-
-def test_heading_of_a_horizontal_axis(inputs):
-    facts = Facts(latitude=30.0, input_axis=Heading(heading=20.0))
-    angle = np.array([0.0, -90.0, -180.0, 20.0])
-    heading = heading_of(facts, angle)
-    # Clockwise turns, negative table angles, add to the heading.
-    np.testing.assert_allclose(heading, [20.0, 110.0, 200.0, 0.0])
-    given = replace(
-        block(inputs, 0, 4),
-        facts=facts,
-        earth_deg_h=facts.earth_rate_deg_h,
-        drives={"heading": heading},
-    )
-    wanted = EARTH_RATE_DEG_H * np.cos(np.radians(30.0)) * np.cos(np.radians([20.0, 110.0, 200.0, 0.0]))
-    np.testing.assert_allclose(given.earth_deg_h + heading_change(given), wanted, atol=1e-12)
-    assert heading_of(Facts(latitude=30.0, input_axis="up"), angle) is None

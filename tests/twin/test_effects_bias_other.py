@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import bisect
 
 from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import FloatArray
@@ -75,7 +76,21 @@ def test_intensity_modulation_in_microradian() -> None:
     assert flat == pytest.approx(1.0 / 6.5554, rel=1e-4)
     hot = inputs(np.full(N, 75.0))
     found = response("intensity_modulation", hot, modulation_depth=135.0, halfwave_coefficient=1000.0)
-    assert found == pytest.approx(np.tan(np.radians(67.5 / 1.05)) / 6.5554, rel=1e-4)
+    assert found == pytest.approx(1.0 / np.tan(np.radians(67.5 / 1.05)) / 6.5554, rel=1e-4)
+
+
+@pytest.mark.parametrize("depth", [60.0, 90.0, 157.5])
+def test_intensity_modulation_is_where_two_state_detection_comes_to_rest(depth: float) -> None:
+    """Root of the difference of the two states' powers, found by bisection."""
+    m, phi = 1e-6, np.radians(depth)
+
+    def difference(error: float) -> float:
+        plus, minus = (1.0 + m) * (1.0 + np.cos(phi + error)), (1.0 - m) * (1.0 + np.cos(phi - error))
+        return float(plus - minus)
+
+    wanted = bisect(difference, -1e-3, 1e-3, xtol=1e-18, rtol=1e-12)
+    found = response("intensity_modulation", inputs(), modulation_depth=depth)[0] * 6.5554
+    assert found == pytest.approx(1e6 * wanted, rel=1e-4)
 
 
 def test_kerr_follows_the_power() -> None:

@@ -14,6 +14,8 @@ from hypothesis import strategies as st
 from fogml.runs.run import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.nominal import nominal_columns
+from fogml.twin.optics import Coil
+from fogml.twin.plant.standard import standard_network
 from fogml.twin.registry import effect
 
 Node = Callable[[FloatArray], FloatArray]
@@ -54,10 +56,39 @@ class TestShupe:
         assert np.abs(found[4000:6000]).max() < 1e-4
 
     def test_trim_has_a_plateau_of_the_worked_size(self) -> None:
+        """1.05 deg/h a metre where the coil warms by 1 degC/min and the leads do not."""
         ramp = behind(1.0, 60.0)
-        assert response("shupe_trim", inputs(30, T=ramp))[-1] == pytest.approx(1.05, abs=5e-3)
-        common = inputs(30, T=ramp, T_leads=ramp)
-        assert np.abs(response("shupe_trim", common)).max() < 1e-9
+        still = inputs(30, T=ramp, T_case=lambda t: 25.0 + 0.0 * t)
+        assert response("shupe_trim", still)[-1] == pytest.approx(1.05, abs=5e-3)
+
+    def test_a_rate_common_to_all_fibre_gives_nothing(self) -> None:
+        ramp = behind(1.0, 60.0)
+        for id in ("shupe_trim", "pigtail_shupe"):
+            for nodes in ({}, {"T_leads": ramp}, {"T_case": ramp, "T_electronics": ramp}):
+                assert np.abs(response(id, inputs(30, T=ramp, **nodes))).max() < 1e-9
+
+    @pytest.mark.parametrize("length_ratio", [0.3, 3.0])
+    def test_leads_are_shupes_integral_over_the_whole_fibre(self, length_ratio: float) -> None:
+        """Own integration: both ends at their places' rates, all between at the coil's."""
+        coil, first, second = Coil(length=800.0, diameter=0.08), 0.5, 0.5 * length_ratio
+        rates = {"T_electronics": 2.0, "T_case": -0.7, "T": 0.4}
+        given = inputs(30, **{n: lambda t, r=r: 25.0 + r * t / 60.0 for n, r in rates.items()})
+        z = np.linspace(0.0, coil.length, 400_001)
+        warming = np.where(z < first, 2.0, np.where(z > coil.length - second, -0.7, 0.4)) / 60.0
+        integral = np.trapezoid((2.0 * z - coil.length) * warming, z)
+        wanted = -coil.index * coil.phase_slope / (coil.length * coil.diameter) * integral
+        found = 0.5 * response("pigtail_shupe", replace(given, coil=coil), length_ratio=length_ratio)
+        assert np.radians(found[-1]) / 3600.0 == pytest.approx(wanted, rel=1e-2)
+
+    def test_a_chamber_shows_leads_at_the_ends_of_its_ramps_alone(self) -> None:
+        time = 10.0 * np.arange(4000)
+        chamber = 25.0 + np.clip((time - 6000.0) / 60.0, 0.0, 400.0)
+        nodes = standard_network().temperatures(time, chamber)
+        given = Inputs(time, nodes, np.zeros(len(time)), rate_window_s=0.0)
+        for id in ("shupe_trim", "pigtail_shupe"):
+            found = np.abs(response(id, given))
+            assert found[(time > 25_000.0) & (time < 30_000.0)].max() < 1e-3 * found.max()
+            assert found[:600].max() < 1e-9 and found.max() > 0.05
 
     def test_mohr_lies_in_the_span_of_the_nominal_gyro_while_its_slope_is_constant(self) -> None:
         given = inputs(200, T=behind(300.0, 3000.0, 9000.0), rate_window_s=64.0)
@@ -80,7 +111,7 @@ class TestShupe:
 
     def test_leads_follow_their_nodes(self) -> None:
         both = {"T_electronics": lambda t: 3.0 * t / 60.0, "T_case": lambda t: 2.0 * t / 60.0}
-        found = response("pigtail_shupe", inputs(10, **both), length_ratio=0.5)
+        found = response("pigtail_shupe", inputs(10, T=lambda t: 25.0 + 0.0 * t, **both), length_ratio=0.5)
         assert found[1:] == pytest.approx(0.5 * 1.0486 * (3.0 - 0.5 * 2.0), rel=1e-3)
 
     def test_side_on_gradient_turns_with_the_table(self) -> None:
@@ -93,7 +124,7 @@ class TestShupe:
         table = np.where(still.time < 180.0, 1.0, 0.0)  # 180 deg in three minutes
         spun = replace(still.afresh(), table_rate=table)
         half = response("azimuthal_gradient", spun, phase=0.0)
-        assert half[300:] == pytest.approx(np.cos(np.radians(179.0)) * pure[300:])
+        assert half[300:] == pytest.approx(np.cos(np.radians(179.5)) * pure[300:])
 
 
 class TestGlassTransition:

@@ -9,6 +9,8 @@ from fogml.runs.run import FloatArray
 from fogml.signals.allan import allan_deviation
 from fogml.signals.noise_terms import noise_terms
 from fogml.twin.effect import NoiseEffect
+from fogml.twin.inputs import Inputs
+from fogml.twin.optics import Coil
 from fogml.twin.registry import effect
 
 COUNT, SAMPLE_S = 1 << 16, 2.0
@@ -53,14 +55,37 @@ def test_terms_agree_with_the_twins_noise_source() -> None:
         assert found.adev == pytest.approx(expected, rel=0.12), id
 
 
-@pytest.mark.parametrize(
-    ("depth", "walk"), [(np.pi / 2, 1.65e-3), (3 * np.pi / 4, 7.2e-4), (7 * np.pi / 8, 4.6e-4)]
-)
-def test_photon_noise_at_20_microwatt(depth: float, walk: float) -> None:
-    series = draw("arw_physics", 1.0, power=20.0, modulation_depth=depth)
-    found = allan_deviation(series, SAMPLE_S, [3600.0 / 256])
-    assert float(np.std(series) * np.sqrt(SAMPLE_S / 3600.0)) == pytest.approx(walk, rel=0.015)
-    assert found.adev[0] * np.sqrt(found.taus_s[0] / 3600.0) == pytest.approx(walk, rel=0.05)
+@pytest.mark.parametrize("depth", [np.pi / 2, 3 * np.pi / 4, 7 * np.pi / 8])
+@pytest.mark.parametrize("coil", [Coil(), Coil(length=500.0, diameter=0.06)])
+def test_photon_noise_of_the_units_coil(depth: float, coil: Coil) -> None:
+    """Written out for 20 uW; polarised Gaussian light has 2 sqrt(2 ln 2 / pi) over its line width."""
+    given = Inputs(np.arange(1.0), {"T_electronics": np.full(1, 25.0)}, np.zeros(1), coil=coil)
+    found = effect("arw_physics").strength(given, power=20.0, modulation_depth=depth, power_loss=0.03)[0]
+    current = 0.9 * 20e-6 * (1.0 + np.cos(depth)) / 2.0
+    excess = 2.0 * np.sqrt(2.0 * np.log(2.0) / np.pi) * 1550e-9**2 / (299_792_458.0 * 10e-9)
+    density = 2 * 1.602176634e-19 * current + 4 * 1.380649e-23 * 300.0 / 100e3 + current**2 * excess
+    density /= (0.9 * 20e-6 * np.sin(depth) / 2.0) ** 2
+    sagnac = 2.0 * np.pi * coil.length * coil.diameter / (1550e-9 * 299_792_458.0)
+    assert found == pytest.approx(np.degrees(np.sqrt(density / 2.0) / sagnac) * 60.0, rel=1e-6)
+
+
+def test_vibration_makes_noise_in_proportion() -> None:
+    vibration = np.array([0.0, 0.02, 0.04])
+    given = Inputs(np.arange(3.0), {"T": np.zeros(3)}, np.zeros(3), drives={"vibration": vibration})
+    assert effect("vibration_noise").strength(given) == pytest.approx(vibration)
+    series = draw("vibration_noise", 0.02)
+    assert float(np.std(series) * np.sqrt(SAMPLE_S / 3600.0)) == pytest.approx(0.02, rel=0.015)
+
+
+def test_hump_of_a_line_lies_at_0_371_of_its_period() -> None:
+    """Allan variance of a sine: (sin(x)**2 / x)**2 with x = pi f tau."""
+    period = 200.0
+    taus = np.arange(40.0, 120.0, 2.0)
+    wave = np.sin(2.0 * np.pi * np.arange(400_000) / (period / SAMPLE_S))
+    found = allan_deviation(wave, SAMPLE_S, taus)
+    assert found.taus_s[np.argmax(found.adev)] / period == pytest.approx(0.371, abs=0.006)
+    x = np.pi * found.taus_s / period
+    assert found.adev == pytest.approx(np.sin(x) ** 2 / x, rel=0.01)
 
 
 def test_hump_of_a_gauss_markov_process() -> None:

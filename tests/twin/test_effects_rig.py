@@ -16,7 +16,6 @@ from fogml.signals.sample_means import mean_cosine
 from fogml.twin.effects.input_axis_misalignment import InputAxisMisalignment, scale_factor_loss_ppm
 from fogml.twin.inputs import Inputs
 from fogml.twin.registry import effect
-from fogml.twin.responses import table_cosine
 
 N = 720
 TIME = np.arange(float(N))
@@ -120,7 +119,7 @@ def test_cosine_of_a_table_is_its_mean_however_fast_it_turns(rate: float, record
     turning = inputs(time=step * np.arange(N), table_rate=np.full(N, rate), drives=drives)
     start = 30.0 if drives else 0.0
     edges = np.radians(rate * step * np.arange(N) + start - 70.0)
-    found = table_cosine(turning, "table", -70.0)
+    found = turning.table_cosine(-70.0)
     assert found[1:] == pytest.approx(np.diff(np.sin(edges)) / np.radians(rate * step), abs=1e-9)
 
 

@@ -96,7 +96,17 @@ def test_scale_factor_loop_opens_by_twice_the_amplitude() -> None:
     assert (down - up)[middle] == pytest.approx(2.0)
 
 
-def test_clock_runs_slow_on_both_sides_of_its_turnover() -> None:
-    found = signature("time_base", inputs(), turnover_temperature=10.0)
-    assert found[[0, -1]] == pytest.approx(1.0)
-    assert found.min() == pytest.approx(0.0, abs=1e-6)
+def test_a_tuning_fork_runs_slow_on_both_sides_of_its_turnover() -> None:
+    found = signature("time_base", inputs(), turnover_temperature=10.0, parabolic_share=1.0)
+    u = inputs().temperature("T_electronics") - 10.0
+    assert 85.0 * found == pytest.approx(0.034 * u**2)
+
+
+def test_an_at_cut_is_a_cubic_with_two_turnovers() -> None:
+    """Frequency a_1 u + a_3 u**3 with a_3 = 1.05e-4 ppm/degC3: counts per second are off the other way."""
+    found = signature("time_base", inputs(), turnover_temperature=10.0, linear_share=0.75)
+    u = inputs().temperature("T_electronics") - 10.0
+    a_3 = 1.05e-4
+    frequency = a_3 * u**3 - 3.0 * a_3 * 25.0**2 * u
+    assert a_3 * 50.0**3 * found == pytest.approx(-frequency, abs=1e-9)
+    assert abs(u[np.argmax(np.where(np.abs(u) < 40.0, found, -9.0))]) == pytest.approx(25.0, abs=0.2)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from fogml.errors import InputError
@@ -11,6 +12,7 @@ from fogml.twin.optics import (
     REFERENCE_COIL,
     Coil,
     Receiver,
+    Spectrum,
     phase_noise_to_walk,
     polarization_period,
     relative_intensity_noise,
@@ -55,14 +57,24 @@ def test_polarisation_period() -> None:
     assert polarization_period(1.0, birefringence_slope=-5e-7) == polarization_period(1.0)
 
 
-@pytest.mark.parametrize(("depth", "walk"), [(0.5, 1.65e-3), (0.75, 7.2e-4), (0.875, 4.6e-4)])
+@pytest.mark.parametrize(("depth", "walk"), [(0.5, 1.89e-3), (0.75, 8.2e-4), (0.875, 4.9e-4)])
 def test_angle_random_walk_of_photon_noise(depth: float, walk: float) -> None:
     found = Receiver().angle_random_walk(REFERENCE_COIL, 20e-6, depth * math.pi)
     assert found == pytest.approx(walk, rel=0.015)
 
 
-def test_excess_noise() -> None:
-    assert 10.0 * math.log10(relative_intensity_noise(10e-9)) == pytest.approx(-121.0, abs=0.1)
+@pytest.mark.parametrize("spectrum", ["gaussian", "flat"])
+def test_excess_noise_is_twice_the_coherence_time_of_polarised_light(spectrum: Spectrum) -> None:
+    """The integral of |gamma(tau)|**2, by Parseval that of the spectrum's square over its area squared."""
+    width = 10e-9 / 1550e-9**2 * 299_792_458.0
+    f = width * np.linspace(-4.0, 4.0, 200_001)
+    shape = np.exp(-4.0 * np.log(2.0) * (f / width) ** 2) if spectrum == "gaussian" else np.abs(f) < width / 2
+    coherence = np.trapezoid(shape**2.0, f) / np.trapezoid(shape * 1.0, f) ** 2
+    assert relative_intensity_noise(10e-9, spectrum=spectrum) == pytest.approx(2.0 * coherence, rel=1e-4)
+    over = 1.33 if spectrum == "gaussian" else 2.0
+    assert 10.0 * math.log10(relative_intensity_noise(10e-9, spectrum=spectrum) / over) == pytest.approx(
+        -121.0, abs=0.1
+    )
 
 
 def test_how_each_noise_follows_the_power() -> None:

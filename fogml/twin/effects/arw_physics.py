@@ -7,7 +7,7 @@ import numpy as np
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.optics import REFERENCE_COIL, Receiver
+from fogml.twin.optics import Receiver, phase_noise_to_walk
 from fogml.twin.quantities import Quantity
 
 
@@ -17,11 +17,12 @@ class ArwPhysics(NoiseEffect):
     ::
 
         S = (2 e I + 4 k T / R_f + I**2 RIN) / (R P_0 sin(phi_m) / 2)**2,      I = R P_0 (1 + cos phi_m) / 2
-        RIN = lambda**2 / (c dlambda),      N = A sqrt(S / 2) / K_S
+        RIN = 1.33 lambda**2 / (c dlambda),      N = A sqrt(S / 2) / K_S
 
-    with P_0 = power 10**(-power_loss |T_electronics - 25| / 10), for the reference coil and receiver of
-    `fogml.twin.optics`; ``modulation_depth`` is phi_m and the amplitude A the noise over that of physics.
-    At 20 uW N is 1.65e-3, 7.2e-4 and 4.6e-4 deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8. Light that falls off
+    with P_0 = power 10**(-power_loss |T_electronics - 25| / 10), for the unit's coil and the receiver of
+    `fogml.twin.optics`, whose source is polarised and Gaussian (2 in place of 1.33 for a flat spectrum);
+    ``modulation_depth`` is phi_m and the amplitude A the noise over that of physics. At 20 uW N is 1.89e-3,
+    8.2e-4 and 4.9e-4 deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8 with the reference coil. Light that falls off
     room temperature raises N where shot or thermal noise leads, and not where excess noise does.
 
     Source: Lefevre (literature); numbers derived; ranges are engineering ones.
@@ -51,17 +52,14 @@ class ArwPhysics(NoiseEffect):
     def draw(
         self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
     ) -> FloatArray:
-        """One realisation at 25 degC [deg/h], shape (count,)."""
+        """One realisation of A deg/sqrt(h) [deg/h], shape (count,)."""
         from fogml.signals.random_noise import white_noise
 
-        receiver, power = Receiver(), 1e-6 * shape["power"]
-        walk = receiver.angle_random_walk(REFERENCE_COIL, power, shape["modulation_depth"])
         # From deg/sqrt(h) to deg/h sqrt(s).
-        return white_noise(rng, count, sample_s, 60.0 * amplitude * walk)
+        return white_noise(rng, count, sample_s, 60.0 * amplitude)
 
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
-        """Angle random walk over that at 25 degC, shape (n,)."""
-        receiver, depth, power = Receiver(), shape["modulation_depth"], 1e-6 * shape["power"]
+        """Angle random walk of the unit's coil [deg/sqrt(h)], shape (n,)."""
+        depth, power = shape["modulation_depth"], 1e-6 * shape["power"]
         dimmed = power * np.power(10.0, -0.1 * shape["power_loss"] * np.abs(inputs.u("T_electronics")))
-        density = receiver.phase_density(REFERENCE_COIL, dimmed, depth)
-        return np.sqrt(density / receiver.phase_density(REFERENCE_COIL, power, depth))
+        return phase_noise_to_walk(Receiver().phase_density(inputs.coil, dimmed, depth), inputs.coil)

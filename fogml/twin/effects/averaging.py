@@ -10,17 +10,21 @@ from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 from fogml.twin.responses import met_output, slope_per_s
 
+_SLACK = 1e-9
+"""Of the window, for the rounding of times."""
+
 
 class Averaging(LoggerEffect):
     """The logger gives the mean over a window that ends at the time it states.
 
     ::
 
-        y_recorded(t) = (1 / W) * integral of y from t - W to t
+        y_recorded(t) = mean of the samples in t - W to t
 
-    W is the amplitude, 1 to 100 s. To first order it is a delay by half of the window, which a time stamp in
-    the middle would not show. Samples further apart than W leave parts of the signal out; lines
-    above half of the sample rate then appear elsewhere.
+    W is the amplitude, 1 to 100 s. Samples are means over their interval already, so that of n = W / dt of
+    them the mean is the one over W, with white noise lower by sqrt(n): a window of one sample changes
+    nothing. To first order it is a delay by half of W - dt, half of W for a long window, which a time
+    stamp in the middle would not show.
 
     Source: derived; 1 to 100 s is an engineering range.
     """
@@ -40,7 +44,7 @@ class Averaging(LoggerEffect):
     candidate = False
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        """Response per second of the window [deg/h], shape (n,)."""
+        """Response per second of a window much longer than a sample [deg/h], shape (n,)."""
         return -0.5 * slope_per_s(inputs, self.id, met_output(inputs))
 
     def record(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
@@ -48,13 +52,10 @@ class Averaging(LoggerEffect):
         if amplitude == 0.0 or len(output) == 0:
             return output
         time, held = inputs.memory.recent(f"{self.id} output", inputs.time, output, amplitude)
-        steps = np.diff(time)
-        integral = np.concatenate([[0.0], np.cumsum(0.5 * steps * (held[1:] + held[:-1]))])
-        begin = np.maximum(inputs.time - amplitude, time[0])
-        piece = np.clip(np.searchsorted(time, begin, side="right") - 1, 0, max(len(time) - 2, 0))
-        since = begin - time[piece]
-        at_begin = np.interp(begin, time, held)
-        before = integral[piece] + 0.5 * since * (held[piece] + at_begin)
-        width = inputs.time - begin
-        area = integral[len(time) - len(output) :] - before
-        return np.divide(area, width, out=output.copy(), where=width > 0.0)
+        total = np.concatenate([[0.0], np.cumsum(held - held[0])])
+        stop = np.arange(len(time) - len(output), len(time)) + 1
+        # A sample as old as the window has just left it, but for the clock's rounding.
+        first = np.searchsorted(time, inputs.time - amplitude * (1.0 - _SLACK), side="left")
+        first = np.minimum(first, stop - 1)
+        mean = held[0] + (total[stop] - total[first]) / (stop - first)
+        return np.where(stop - first == 1, output, mean)

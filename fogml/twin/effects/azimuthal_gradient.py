@@ -6,7 +6,6 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
-from fogml.twin.responses import table_cosine
 
 
 class AzimuthalGradient(BiasEffect):
@@ -28,7 +27,7 @@ class AzimuthalGradient(BiasEffect):
     code = "B7"
     title = "Shupe effect of a side-on gradient"
     amplitude = Quantity(
-        "amplitude", "deg/h/(degC/min)", (0.05, 6.0), (2e-3, 0.15), "S_az", (-1e3, 1e3), signed=True
+        "amplitude", "deg/h/(degC/min)", (0.01, 0.6), (4e-4, 0.03), "S_az", (-1e3, 1e3), signed=True
     )
     shape = (
         Quantity(
@@ -45,4 +44,4 @@ class AzimuthalGradient(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h/(degC/min) [deg/h], shape (n,)."""
-        return table_cosine(inputs, self.id, -shape["phase"]) * (inputs.dT("T_out") - inputs.dT("T_in"))
+        return inputs.table_cosine(-shape["phase"]) * (inputs.dT("T_out") - inputs.dT("T_in"))

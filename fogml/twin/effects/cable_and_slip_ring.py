@@ -41,5 +41,5 @@ class CableAndSlipRing(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h [deg/h], shape (n,), between 0 and 1."""
-        rate = np.abs(inputs.table_rate)
+        rate = np.abs(inputs.turning_deg_s)
         return rate / (rate + shape["half_rate"])

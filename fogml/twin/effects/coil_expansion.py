@@ -15,8 +15,9 @@ class CoilExpansion(ScaleFactorEffect):
 
         s = (alpha_L + alpha_D) (T - 25)
 
-    alpha_D is 0.55 ppm/degC for free silica and 5 to 25 on a former or in adhesive, alpha_L 0.5 to 5. It is
-    one with the nominal gyro's own slope of the scale factor.
+    alpha_D is 0.55 ppm/degC for free silica and 5 to 25 on a former or in adhesive, alpha_L 0.5 to 5; a
+    navigation gyro has a former of low expansion, or none. It is one with the nominal gyro's own slope of
+    the scale factor.
 
     Source: Lefevre (literature); ranges partly engineering ones.
     """
@@ -24,7 +25,7 @@ class CoilExpansion(ScaleFactorEffect):
     id = "coil_expansion"
     code = "D2"
     title = "Expansion of the coil"
-    amplitude = Quantity("amplitude", "ppm/degC", (1.0, 30.0), (1.0, 30.0), "alpha_L + alpha_D", (-1e3, 1e3))
+    amplitude = Quantity("amplitude", "ppm/degC", (1.0, 30.0), (0.5, 5.0), "alpha_L + alpha_D", (-1e3, 1e3))
     needs = ("T",)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "a scale factor in proportion to the coil's temperature"

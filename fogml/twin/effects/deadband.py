@@ -12,27 +12,34 @@ from fogml.twin.responses import met_output
 
 
 class Deadband(LoopEffect):
-    """Small rates that the loop swallows, by cross-talk of its own modulation.
+    """Small rates that the loop swallows, locked in by cross-talk of its own modulation.
 
     ::
 
-        out = w - A tanh(w / width)
+        out = sign(w) sqrt(max(w**2 - w_d**2, 0))
 
-    A = width = w_d is the usual soft dead zone: nothing comes out near zero, and the output is w_d short far
-    from it. Other forms of the same: the hard one, out = kappa w within w_d with kappa 0 to 0.2, and
-    that of Adler, out = sqrt(w**2 - w_d**2) beyond w_d.
+    The mean rate of an oscillator that is pulled by w and locked within w_d: nothing comes out within the
+    zone, and beyond it the error fades as w_d**2 / (2 w). Only rates near zero show it; with the axis
+    up and Earth rate well above w_d there is nearly nothing. The amplitude w_d is all that it has. It is
+    0.01 to 1 deg/h; a closed loop with dither comes down to 1e-3 deg/h, several deg/h are those of an old
+    design without.
 
-    Source: Lefevre (literature); "Interferometric FOG dead band suppression" (read), whose suppressed
-    designs show none at 0.001 deg/h; ranges are engineering ones.
+    Source: Adler, Proceedings of the IRE 34 (1946) 351, for the locked oscillator (literature; mean beat
+    rate derived); "Interferometric FOG dead band suppression" (read), whose suppressed designs show none at
+    0.001 deg/h; ranges are engineering ones.
     """
 
     id = "deadband"
     code = "D6"
     title = "Dead zone about zero rate"
-    amplitude = Quantity("amplitude", "deg/h", (0.1, 5.0), (0.0, 0.05), "w_d", (0.0, 1e3))
-    shape = (Quantity("width", "deg/h", (0.1, 5.0), (1e-3, 0.05), "width of the zone", (1e-6, 1e4)),)
+    amplitude = Quantity("amplitude", "deg/h", (0.01, 1.0), (1e-3, 0.05), "w_d", (0.0, 1e3))
+    amplitudes = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
     needs = ("output",)
-    sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope", "Interferometric FOG dead band suppression")
+    sources = (
+        "R. Adler, Proceedings of the IRE 34 (1946) 351",
+        "H. C. Lefevre, The Fiber-Optic Gyroscope",
+        "Interferometric FOG dead band suppression",
+    )
     shows = "only where the rate is small: axis to east or west, in north seeking, under slow turns"
     confused_with = {
         "electronic_crosstalk": "a sweep of the rate through zero",
@@ -41,5 +48,13 @@ class Deadband(LoopEffect):
     }
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        """Response per deg/h of w_d [deg/h], shape (n,), between -1 and 1."""
-        return -np.tanh(met_output(inputs) / shape["width"])
+        """Response per deg/h of w_d about its usual size [deg/h], shape (n,), between -1 and 1."""
+        usual, met = self.amplitude.typical(), met_output(inputs)
+        return (self.apply(met, inputs, usual) - met) / usual
+
+    def apply(self, output: FloatArray, inputs: Inputs, amplitude: float, **shape: float) -> FloatArray:
+        """The loop's output [deg/h] for an undistorted `output` [deg/h], both of shape (n,)."""
+        size = np.abs(output)
+        # As a product, a small zone costs no digits of a large rate.
+        beyond = np.maximum(size - amplitude, 0.0) * (size + amplitude)
+        return np.copysign(np.sqrt(beyond), output) if amplitude != 0.0 else output

@@ -17,8 +17,8 @@ class FringeJump(LoopEffect):
 
         out = w + m lambda c / (L D)        from `onset` until the next power-on
 
-    The amplitude is the offset m lambda c / (L D) [deg/s], 266 deg/s a fringe for 1 km on 0.1 m at
-    1550 nm; ``onset`` is the time since power-on, since the first sample where that was long before.
+    The amplitude m is a whole number of fringes, each 266 deg/s for 1 km on 0.1 m at 1550 nm, of the
+    unit's coil else; ``onset`` is the time since power-on, since the first sample where that was long before.
     The sample in which it happens holds its share.
 
     Source: closed loop's operating points, Lefevre (literature); offset derived.
@@ -28,7 +28,7 @@ class FringeJump(LoopEffect):
     code = "D9"
     title = "Fringe jump"
     amplitude = Quantity(
-        "amplitude", "deg/s", (266.0, 2700.0), (60.0, 266.0), "m lambda c / (L D)", (-1e5, 1e5), signed=True
+        "amplitude", "1", (1.0, 10.0), (1.0, 3.0), "m, fringes", (-1e4, 1e4), signed=True, whole=True
     )
     shape = (
         Quantity("onset", "s", (1.0, 3600.0), (1.0, 3600.0), "since power-on", (0.0, 1e9), default=905.0),
@@ -45,11 +45,11 @@ class FringeJump(LoopEffect):
     drawn_per_run = True
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
-        """Response per deg/s [deg/h], shape (n,)."""
+        """Response per fringe [deg/h], shape (n,)."""
         time = inputs.time
         step = time - inputs.memory.previous(f"{self.id} time", time)
         beginning = inputs.memory.first(f"{self.id} first time", time)
         since = np.where(np.isinf(inputs.time_on_s), time - beginning, inputs.time_on_s)
         late = since - shape["onset"]
         share = np.divide(late, step, out=(late > 0.0).astype(np.float64), where=step > 0.0)
-        return 3600.0 * np.clip(share, 0.0, 1.0)
+        return 3600.0 * inputs.coil.fringe_offset_deg_s * np.clip(share, 0.0, 1.0)

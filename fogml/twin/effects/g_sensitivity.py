@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import FloatArray
+from fogml.twin.attitude import UP
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
@@ -18,7 +19,8 @@ class GSensitivity(BiasEffect):
         b = g_1 a_ia + g_2 a_x
 
     a in g along the input axis and along the gyro's x axis, which points up when the input axis is
-    horizontal; the attitude is the set-up's. The amplitude is g_1 [deg/h/g], ``cross_ratio`` g_2 / g_1.
+    horizontal; the attitude is the set-up's, and changes where a table turns about a horizontal axis. The
+    amplitude is g_1 [deg/h/g], ``cross_ratio`` g_2 / g_1.
 
     Source: IEEE Std 952-1997 (literature); ranges are engineering ones, usually 0 in a fibre-optic gyro.
     """
@@ -27,7 +29,7 @@ class GSensitivity(BiasEffect):
     code = "C13"
     title = "Sensitivity to acceleration"
     amplitude = Quantity(
-        "amplitude", "deg/h/g", (1e-3, 2e-2), (1e-3, 2e-2), "g_1", (-100.0, 100.0), signed=True
+        "amplitude", "deg/h/g", (1e-3, 2e-2), (2e-5, 1e-3), "g_1", (-100.0, 100.0), signed=True
     )
     shape = (Quantity("cross_ratio", "1", (-1.0, 1.0), (-1.0, 1.0), "g_2 / g_1", (-1e3, 1e3)),)
     needs = ("facts",)
@@ -42,9 +44,8 @@ class GSensitivity(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h/g [deg/h], shape (n,)."""
-        axis = inputs.facts.input_axis
-        if axis is None:
+        if inputs.facts.input_axis is None:
             return np.zeros(len(inputs))
-        upright = {"up": 1.0, "down": -1.0}.get(axis, 0.0) if isinstance(axis, str) else 0.0
-        across = 1.0 if upright == 0.0 else 0.0
-        return np.full(len(inputs), upright + shape["cross_ratio"] * across)
+        held = inputs.attitude
+        sensitive = held.z + shape["cross_ratio"] * held.x
+        return np.zeros(len(inputs)) + inputs.carried(UP, sensitive, mean=False)

@@ -8,7 +8,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import RigEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
-from fogml.twin.responses import heading_change, tilt_response
+from fogml.twin.responses import tilt_response
 
 
 class InputAxisMisalignment(RigEffect):
@@ -18,10 +18,11 @@ class InputAxisMisalignment(RigEffect):
 
         w = sin(delta) E(direction, table angle) + (cos(delta) - 1) (3600 rate + earth)
 
-    delta is the amplitude and E the Earth rate that a tilt picks up, as in ``mount_tilt``. The signature is
-    that pick-up for a small delta; `added_rate` is all of it. The loss of scale factor delta**2 / 2,
-    12.5 ppm at 5 mrad, can't be told from the nominal scale factor, nor changes with temperature of
-    0.1 to 5 urad/degC from its slope.
+    delta is the amplitude and E what a tilt picks up of the rates across it, as in ``mount_tilt``: Earth's,
+    and with a horizontal axis the table's, 180 deg/h for 5 mrad at 10 deg/s. The signature is that pick-up
+    for a small delta; `added_rate` is all of it. The loss of scale factor delta**2 / 2, 12.5 ppm at 5 mrad,
+    can't be told from the nominal scale factor, nor changes with temperature of 0.1 to 5 urad/degC from its
+    slope.
 
     Source: geometry (derived); 0.5 to 20 mrad (tactical) and 0.05 to 0.5 mrad (navigation) are engineering
     ranges.
@@ -46,15 +47,14 @@ class InputAxisMisalignment(RigEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per mrad [deg/h], shape (n,)."""
-        return 1e-3 * tilt_response(inputs, self.id, shape["direction"])
+        return 1e-3 * tilt_response(inputs, shape["direction"])
 
     def added_rate(
         self, signature: FloatArray, inputs: Inputs, amplitude: float, **shape: float
     ) -> FloatArray:
         """What the misalignment adds to the rate about the input axis [deg/h], exactly; shape (n,)."""
         pick_up = 1e3 * math.sin(1e-3 * amplitude) * signature
-        along = inputs.input_rate_deg_h + heading_change(inputs)
-        return pick_up + 1e-6 * scale_factor_loss_ppm(amplitude) * along
+        return pick_up + 1e-6 * scale_factor_loss_ppm(amplitude) * inputs.input_rate_deg_h
 
 
 def scale_factor_loss_ppm(misalignment: float) -> float:

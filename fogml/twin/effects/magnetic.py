@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import FloatArray
+from fogml.twin.attitude import earth_field
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
+from fogml.twin.set_up import EARTH_HORIZONTAL_UT, EARTH_VERTICAL_UT
 
-_EARTH_HORIZONTAL_UT = 20.0
-_EARTH_VERTICAL_UT = 40.0
 _UT_PER_G = 100.0
 
 
@@ -22,8 +22,9 @@ class Magnetic(BiasEffect):
         b = s_r (B_x cos(psi) + B_y sin(psi)) + s_a B_z
 
     B in the gyro frame, z along the coil's axis [G]; s_r is the amplitude, after the shield, psi the
-    shape's ``phase`` and ``axial_ratio`` is s_a / s_r. Where no field is recorded, it is Earth's, 0.2 G
-    horizontal, in which the coil turns by the table's angle, and 0.4 G vertical.
+    shape's ``phase`` and ``axial_ratio`` is s_a / s_r. Where no field is recorded, it is Earth's in the
+    gyro's attitude, in which the coil turns by the table's angle: 0.2 G to the north, and 0.4 G down in the
+    northern hemisphere or up in the southern, or what the twin's surroundings state.
 
     Source: Hotate and Tabe, Applied Optics 25 (1986) and 26 (1987); IEEE Access 8 (2020) 222242, axial
     (read); ranges partly literature, partly engineering.
@@ -61,6 +62,7 @@ class Magnetic(BiasEffect):
             radial = np.cos(psi) * inputs.drive("B_x") + np.sin(psi) * inputs.drive("B_y")
             axial = inputs.drive("B_z")
         else:
-            radial = _EARTH_HORIZONTAL_UT * np.cos(np.radians(inputs.angle_deg) + psi)
-            axial = np.full(len(inputs), _EARTH_VERTICAL_UT)
+            field = earth_field(inputs.facts, inputs.angle_deg, EARTH_HORIZONTAL_UT, EARTH_VERTICAL_UT)
+            radial = np.cos(psi) * field["B_x"] + np.sin(psi) * field["B_y"]
+            axial = field["B_z"]
         return (radial + shape["axial_ratio"] * axial) / _UT_PER_G

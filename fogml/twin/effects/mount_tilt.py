@@ -16,13 +16,15 @@ class MountTilt(RigEffect):
 
         upright:     w = 15.041 cos(lat) beta cos(direction + table angle)
         horizontal:  w = 15.041 beta (sin(lat) cos(direction) - cos(lat) sin(heading) sin(direction))
+                         + beta cos(direction) (table rate)
         beta = 1e-6 beta_1 (T_case - 25)
 
     The amplitude is beta_1 [urad/degC]; an upright axis tilts by ``direction`` from north, a horizontal one
     upwards at 0 and in azimuth at 90 deg. 0.013 deg/h per mrad with the axis upright at 30 deg. The tilt at
-    25 degC belongs to the bias.
+    25 degC belongs to the bias. The last term is the rate of a table whose axis is up, across the axis.
 
-    Source: Earth rate, derived; 0.2 to 5 urad/degC is an engineering range.
+    Source: rates of Earth and table in the tilted frame (derived); 0.2 to 5 urad/degC is an engineering
+    range.
     """
 
     id = "mount_tilt"
@@ -34,7 +36,7 @@ class MountTilt(RigEffect):
     )
     needs = ("T_case", "angle", "facts")
     sources = ("IEEE Std 952-1997",)
-    shows = "a static bias over temperature that changes sign when the fixture is yawed by 180 deg"
+    shows = "a static bias over temperature that changes sign when an upright fixture is yawed by 180 deg"
     confused_with = {
         "bias_polynomial": "yaw the fixture by 180 deg, or put the axis the other way up",
         "magnetic": "a Helmholtz coil, or a turned shield",
@@ -44,4 +46,4 @@ class MountTilt(RigEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per urad/degC [deg/h], shape (n,)."""
-        return 1e-6 * inputs.u("T_case") * tilt_response(inputs, self.id, shape["direction"])
+        return 1e-6 * inputs.u("T_case") * tilt_response(inputs, shape["direction"])

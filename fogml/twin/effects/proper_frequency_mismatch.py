@@ -5,7 +5,6 @@ from __future__ import annotations
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.optics import REFERENCE_COIL
 from fogml.twin.quantities import Quantity
 
 
@@ -19,7 +18,7 @@ class ProperFrequencyMismatch(BiasEffect):
     q in deg/h per unit; f_m is the proper frequency at 25 degC, which falls by 7.2 ppm/degC. Another
     f_m adds a constant to the bias.
 
-    Source: proper frequency n L / c (derived); Lefevre (literature); q before gating of the demodulator
+    Source: proper frequency c / (2 n L) (derived); Lefevre (literature); q before gating of the demodulator
     is an engineering range.
     """
 
@@ -39,4 +38,4 @@ class ProperFrequencyMismatch(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h and unit of mismatch [deg/h], shape (n,)."""
-        return REFERENCE_COIL.proper_frequency_slope * inputs.u("T")
+        return inputs.coil.proper_frequency_slope * inputs.u("T")

@@ -16,7 +16,8 @@ class ShupePure(BiasEffect):
         b = S_g d(T_out - T_in)/dt
 
     The radial form of Shupe's integral over the fibre (`fogml.twin.coil`), with S_g in deg/h per
-    degC/min. Zero in soaks and on the plateau of a long ramp.
+    degC/min. Zero in soaks and on the plateau of a long ramp. S_g is 0.05 to 2 for a quadrupole winding, 3
+    to 4 for a dipole and more for a simple one.
 
     Source: Shupe, Applied Optics 19 (1980) 654; Frigo, SPIE 412 (1983) 268; Lefevre (literature).
     Form and size derived with a layer model; ranges are engineering ones.
@@ -26,7 +27,7 @@ class ShupePure(BiasEffect):
     code = "B1"
     title = "Shupe effect of a changing gradient"
     amplitude = Quantity(
-        "amplitude", "deg/h/(degC/min)", (0.5, 20.0), (0.02, 0.5), "S_g", (-1e3, 1e3), signed=True
+        "amplitude", "deg/h/(degC/min)", (0.05, 2.0), (2e-3, 0.1), "S_g", (-1e3, 1e3), signed=True
     )
     needs = ("T_in", "T_out")
     sources = (
@@ -37,7 +38,7 @@ class ShupePure(BiasEffect):
     shows = "spikes at start, stop and reversal of a ramp; nothing in soaks and in long constant ramps"
     confused_with = {
         "shupe_mohr": "long ramps with sharp start and stop: this one spikes, shupe_mohr has a plateau",
-        "shupe_trim": "long ramps with sharp start and stop: this one spikes, shupe_trim has a plateau",
+        "shupe_trim": "a power step: it warms the leads before any gradient across the coil",
         "azimuthal_gradient": "turn the unit in the airflow: only azimuthal_gradient changes",
         "sensor_lag": "a power step: the lag is one of the sensor and leaves other heat inputs alone",
         "logger_skew": "edges of the table rate show the clock's error with no temperature in it",

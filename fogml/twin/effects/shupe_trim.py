@@ -8,8 +8,6 @@ from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 
-_LEADS = "T_leads"
-
 
 class ShupeTrim(BiasEffect):
     """Fibre ends of unequal length: the coil's middle is off by delta.
@@ -19,8 +17,8 @@ class ShupeTrim(BiasEffect):
         b = 2 n c_T delta (dT_coil/dt - dT_leads/dt) / D,      c_T = dn/dT + n alpha
 
     1.05 deg/h per degC/min and metre for the reference coil (D = 0.1 m). A rate common to coil and
-    leads gives nothing; leads without a node ``T_leads`` of their own are taken to lie where the
-    temperature stays. T stands for the coil's mean.
+    leads gives nothing. The leads lie between electronics and case and have the mean of both; in a chamber
+    they ramp as the coil does, so that starts and ends of ramps show it. T stands for the coil's mean.
 
     Source: Senol et al., Scientific Reports (2024), arXiv 2311.16908 and Honeywell CA2137463C (read)
     for trimming; the coefficient is derived; ranges are engineering ones.
@@ -30,12 +28,12 @@ class ShupeTrim(BiasEffect):
     code = "B2"
     title = "Mid-point error of the coil"
     amplitude = Quantity("amplitude", "m", (0.1, 2.0), (0.005, 0.1), "delta", (-1e3, 1e3), signed=True)
-    needs = ("T", _LEADS)
+    needs = ("T", "T_leads")
     sources = ("M. Senol et al., Scientific Reports (2024), arXiv 2311.16908", "Honeywell, CA2137463C")
-    shows = "a plateau in each ramp, proportional to the rate, that changes sign with it"
+    shows = "at starts and ends of ramps, while coil and leads warm at different rates, and after power-on"
     confused_with = {
-        "shupe_mohr": "not from the output alone; trim the fibre ends, or find a slope over temperature",
-        "shupe_pure": "long ramps with sharp start and stop: shupe_pure spikes, this one has a plateau",
+        "shupe_mohr": "long ramps: shupe_mohr has a plateau, this one only their starts and ends",
+        "shupe_pure": "a power step: it warms the leads before any gradient across the coil",
         "sensor_lag": "a lag acts by the slope of the static bias, which changes sign at its extremum",
         "logger_skew": "edges of the table rate show the clock's error with no temperature in it",
     }
@@ -43,7 +41,4 @@ class ShupeTrim(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per metre [deg/h], shape (n,)."""
-        rate = inputs.dT("T")
-        if inputs.place(_LEADS) is not None:
-            rate = rate - inputs.dT(_LEADS)
-        return midpoint_sensitivity() * rate
+        return midpoint_sensitivity(inputs.coil) * (inputs.dT("T") - inputs.dT("T_leads"))

@@ -16,7 +16,8 @@ class Sinusoidal(NoiseEffect):
 
         y = Omega_0 sin(2 pi frequency t + phase)
 
-    with a phase drawn anew for each realisation. Samples are means over their interval, so that lines
+    with a phase drawn anew for each realisation. The Allan variance is Omega_0**2 (sin(x)**2 / x)**2 with x =
+    pi frequency tau, greatest where tan x = 2 x. Samples are means over their interval, so that lines
     above the Nyquist frequency come weakened and aliased.
 
     Source: IEEE Std 952, annex C (literature); ranges are engineering ones.
@@ -28,7 +29,7 @@ class Sinusoidal(NoiseEffect):
     amplitude = Quantity("amplitude", "deg/h", (0.01, 1.0), (1e-4, 2e-2), "Omega_0", (0.0, 1e6))
     shape = (Quantity("frequency", "Hz", (1e-3, 10.0), (1e-3, 10.0), "of the line", (1e-9, 1e6)),)
     sources = ("IEEE Std 952-1997",)
-    shows = "a hump of the Allan deviation at half of its period, with dips at whole periods"
+    shows = "a hump of the Allan deviation at 0.371 of its period, with dips at whole periods"
     confused_with = {
         "supply_ripple": "another supply: that line goes with it",
         "chamber_ripple": "a sensor in the air",

@@ -26,7 +26,7 @@ class SourceWavelength(ScaleFactorEffect):
     code = "D1"
     title = "Wavelength of the source"
     amplitude = Quantity(
-        "amplitude", "ppm/degC", (2.0, 20.0), (0.1, 10.0), "alpha_lambda", (-1e3, 1e3), signed=True
+        "amplitude", "ppm/degC", (2.0, 400.0), (0.1, 10.0), "alpha_lambda", (-1e3, 1e3), signed=True
     )
     needs = ("T_electronics",)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope", "US8254416", "US7269190")

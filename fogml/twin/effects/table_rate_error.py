@@ -6,7 +6,6 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import RigEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
-from fogml.twin.responses import table_cosine
 
 
 class TableRateError(RigEffect):
@@ -42,5 +41,5 @@ class TableRateError(RigEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per ppm [deg/h], shape (n,)."""
-        uneven = table_cosine(inputs, self.id, shape["phase"], shape["harmonic"])
+        uneven = inputs.table_cosine(shape["phase"], shape["harmonic"])
         return 3600e-6 * inputs.table_rate * uneven

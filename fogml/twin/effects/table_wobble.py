@@ -20,9 +20,10 @@ class TableWobble(RigEffect):
 
         w = eps E(phase, table angle),      and a loss of eps**2 / 2 of the rate
 
-    eps is the amplitude: 1 to 10 arcsec for a good table, 30 to 60 for a shaft through a chamber's wall.
-    E is the Earth rate that a tilt picks up, as in ``mount_tilt``: once a turn with the axis upright. The
-    loss is below 0.1 ppm and left out.
+    eps is the amplitude: 1 to 10 arcsec for a good table, 30 to 60 for a shaft through a chamber's wall. The
+    table's plate is not square to its axis and goes round with it; E is what such a tilt picks up, as in
+    ``mount_tilt``: Earth rate once a turn with the axis upright, with a horizontal one the table's rate too.
+    The loss is below 0.1 ppm and left out.
 
     Source: geometry (derived); ranges are engineering ones.
     """
@@ -46,4 +47,4 @@ class TableWobble(RigEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per arcsec [deg/h], shape (n,)."""
-        return _ARC_SECOND * tilt_response(inputs, self.id, shape["phase"])
+        return _ARC_SECOND * tilt_response(inputs, shape["phase"])

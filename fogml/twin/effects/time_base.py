@@ -17,24 +17,31 @@ class TimeBase(ScaleFactorEffect):
 
     ::
 
-        s = A ((T_electronics - turnover_temperature) / 50)**2
+        s = A ((1 - q) (r x - x**3) + q x**2),      x = (T_electronics - turnover_temperature) / 50
 
-    A is the clock's error 50 degC away from the turnover [ppm].
+    An AT cut, the usual one, is a cubic about its inflection: A = 13 ppm, from 1.05e-4 ppm/degC3 at 50 degC,
+    with ``linear_share`` r by the angle of the cut, fast and slow at turnovers 50 sqrt(r / 3) degC either
+    side. The parabola of a tuning fork, -0.034 ppm/degC2, has ``parabolic_share`` q = 1 and A = 85 ppm.
+    Smaller A are those of a compensated oscillator.
 
-    Source: parabola of a quartz cut (literature); 0.5 to 50 ppm over temperature is an engineering range.
+    Source: Bechmann, Proceedings of the IRE 44 (1956) 1600, for the AT cut; Vig (literature) for both; ranges
+    are engineering ones.
     """
 
     id = "time_base"
     code = "D7"
     title = "Time base"
-    amplitude = Quantity("amplitude", "ppm", (5.0, 50.0), (0.5, 5.0), "at 50 degC from turnover", (-1e4, 1e4))
+    amplitude = Quantity("amplitude", "ppm", (5.0, 50.0), (0.5, 5.0), "of the clock 50 degC off", (-1e4, 1e4))
     shape = (
-        Quantity(
-            "turnover_temperature", "degC", (20.0, 30.0), (20.0, 30.0), "of the crystal", (-100.0, 200.0)
-        ),
+        Quantity("turnover_temperature", "degC", (20.0, 30.0), (20.0, 30.0), "inflection", (-100.0, 200.0)),
+        Quantity("linear_share", "1", (0.0, 1.0), (0.0, 1.0), "r, by the angle of the cut", (-10.0, 10.0)),
+        Quantity("parabolic_share", "1", (0.0, 1.0), (0.0, 1.0), "q", (0.0, 1.0), default=0.0),
     )
     needs = ("T_electronics",)
-    sources = ("IEEE Std 952-1997", "J. R. Vig, Quartz Crystal Resonators and Oscillators")
+    sources = (
+        "R. Bechmann, Proceedings of the IRE 44 (1956) 1600",
+        "J. R. Vig, Quartz Crystal Resonators and Oscillators",
+    )
     shows = "a scale factor error common to all sensors on the clock, for outputs in counts per second"
     confused_with = {
         "source_wavelength": "another sensor on the same clock; counts against a reference clock",
@@ -44,5 +51,6 @@ class TimeBase(ScaleFactorEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per ppm [ppm], shape (n,)."""
-        away = (inputs.temperature("T_electronics") - shape["turnover_temperature"]) / _SPAN_DEGC
-        return np.square(away)
+        x = (inputs.temperature("T_electronics") - shape["turnover_temperature"]) / _SPAN_DEGC
+        q, square = shape["parabolic_share"], np.square(x)
+        return np.asarray((1.0 - q) * x * (shape["linear_share"] - square) + q * square)

@@ -17,7 +17,8 @@ class VibrationRectification(BiasEffect):
 
         b = k_v g_rms**2
 
-    with g_rms the vibration [g], and k_v with the gain of the unit's resonances in it.
+    with g_rms the vibration [g], and k_v with the gain of the unit's resonances in it. Sources that shake
+    independently add in squares. The noise that comes with it is ``vibration_noise``.
 
     Source: second-order response (literature); ranges are engineering ones.
     """
@@ -32,6 +33,7 @@ class VibrationRectification(BiasEffect):
     confused_with = {
         "chamber_pickup": "a vibration sensor; the compressor off for ten minutes in a soak",
         "bias_polynomial": "the compressor off for ten minutes in a soak",
+        "vibration_noise": "the mean: noise has none",
         "g_sensitivity": "another attitude at rest changes that one alone",
     }
 

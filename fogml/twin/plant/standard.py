@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.twin.inputs import LEADS
 from fogml.twin.plant.network import AIR, ThermalNetwork
 from fogml.twin.quantities import Quantity
 
@@ -91,7 +92,7 @@ def standard_network(
     Returns
     -------
     ThermalNetwork
-        With temperatures ``T_chamber, T_case, T_out, T_in, T_electronics, T_hub`` at any order,
+        With temperatures ``T_chamber, T_case, T_out, T_in, T_electronics, T_hub, T_leads`` at any order,
         ``T_plate`` from order 6 on, ``T_coil_2`` ... between the faces, and no self-heating.
 
     Raises
@@ -182,7 +183,7 @@ def _full(c: ThermalConstants, coil_nodes: int, order: int) -> ThermalNetwork:
     capacities = {"T_case": c.case_capacity, **dict(zip(coil, parts.tolist()))}
     capacities |= {"T_hub": c.hub_capacity, "T_electronics": c.electronics_capacity}
     capacities["T_plate"] = c.plate_capacity
-    return ThermalNetwork(capacities, links)
+    return ThermalNetwork(capacities, links, {"T_leads": LEADS})
 
 
 def coil_names(count: int) -> tuple[str, ...]:

@@ -138,7 +138,7 @@ def happen(
     deltas = {name: _delta(full[name], fine, at) for name in ("T_in", "T_out")}
     table_rate = _table(programme, t[at], sample_s)
     angle = np.cumsum(table_rate * sample_s)
-    b_field = _field(rng, angle, machines["heater"][at], t[at])
+    b_field = _field(rng, angle, machines["heater"][at], t[at], np.sign(set_up.latitude) or 1.0)
     drives = {name: values[at] for name, values in machines.items()}
     drives |= {"supply": supply[at], "power": power[at], "fan": fan[at], **b_field}
     drives["humidity"] = _humidity(rng, air, fine)[at]
@@ -218,19 +218,20 @@ def _humidity(rng: np.random.Generator, air: FloatArray, step_s: float) -> Float
 
 def _vibration(rng: np.random.Generator, compressor: FloatArray) -> FloatArray:
     quiet, running = rng.uniform(0.005, 0.02), rng.uniform(0.03, 0.12)
-    return (quiet + running * compressor) * np.exp(0.05 * rng.standard_normal(len(compressor)))
+    return np.sqrt(quiet**2 + running**2 * compressor) * np.exp(0.05 * rng.standard_normal(len(compressor)))
 
 
 def _field(
-    rng: np.random.Generator, angle: FloatArray, heater: FloatArray, t: FloatArray
+    rng: np.random.Generator, angle: FloatArray, heater: FloatArray, t: FloatArray, hemisphere: float
 ) -> dict[str, FloatArray]:
+    """Earth's field in an upright gyro, down in the north (`hemisphere` 1), and a stray one."""
     turn = np.radians(angle)
     stray = rng.uniform(0.5, 4.0) * heater + 2.0 * (np.sin(2 * np.pi * t / rng.uniform(3e3, 9e3)) > 0.6)
     level = rng.uniform(17.0, 24.0)
     return {
         "B_x": level * np.cos(turn) + stray,
         "B_y": -level * np.sin(turn) + 0.4 * stray,
-        "B_z": rng.uniform(35.0, 48.0) + 0.6 * stray,
+        "B_z": -hemisphere * rng.uniform(35.0, 48.0) + 0.6 * stray,
     }
 
 

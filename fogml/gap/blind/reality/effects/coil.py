@@ -120,11 +120,12 @@ class Leads(Additive):
         return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(10.0, 40.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
-        """n c_T (l_1 dT_1/dt - l_2 dT_case/dt) / D."""
-        h = shape["hub_share"]
+        """n c_T (l_1 (dT_1/dt - dT_coil/dt) - l_2 (dT_case/dt - dT_coil/dt)) / D."""
+        h, coil = shape["hub_share"], world.rates["T_coil"]
         around = (1.0 - h) * world.rates["T_electronics"] + h * world.rates["T_hub"]
         first = lag(world.sample_s, around, shape["jacket"])
-        return _LEAD_DEG_H_PER_M * (first - shape["length_ratio"] * world.rates["T_case"])
+        second = world.rates["T_case"] - coil
+        return _LEAD_DEG_H_PER_M * (first - coil - shape["length_ratio"] * second)
 
 
 class SideWind(Additive):

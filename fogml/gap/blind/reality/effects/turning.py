@@ -75,20 +75,19 @@ class Asymmetry(ScaleFactor):
 
 
 class DeadZone(Distorting):
-    """A dead zone with an algebraic knee."""
+    """A soft dead zone: what it swallows is gone a little beyond it."""
 
-    name, stage, form, unit = "deadband", "loop", "algebraic knee", "deg/h"
+    name, stage, form, unit = "deadband", "loop", "exponential knee", "deg/h"
     demands, horizontal = Demands(turns=True, small_rates=True), True
     greatest: ClassVar[float] = 20.0
 
     def draw(self, rng: np.random.Generator) -> Shape:
-        """Width over the amplitude's unit, and sharpness of the knee."""
-        return {"width": float(np.exp(rng.uniform(np.log(0.1), np.log(5.0)))), "knee": rng.uniform(1.5, 3.0)}
+        """Sharpness of the knee."""
+        return {"knee": rng.uniform(1.0, 2.0)}
 
     def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
-        """w - A x / (1 + |x|**p)**(1 / p) with x = w / width."""
-        x, p = output / shape["width"], shape["knee"]
-        return output - amplitude * x / (1.0 + np.abs(x) ** p) ** (1.0 / p)
+        """w (1 - exp(-|w / w_d|**(2 n))), with w_d the amplitude and n the knee."""
+        return -output * np.expm1(-(np.abs(output / amplitude) ** (2.0 * shape["knee"])))
 
 
 class Skew(Distorting):
