@@ -187,7 +187,8 @@ def test_small_formats_keep_numbers_of_any_size(dtype):
 
 @needs_cc
 def test_foreign_text_stays_a_comment_of_c(model_of, tmp_path):
-    hostile = '*/\nint system(const char *);\n__attribute__((constructor)) void z(void) { system("touch ran"); }\n/*'
+    calls = '__attribute__((constructor)) void z(void) { system("touch ran"); }'
+    hostile = f"*/\nint system(const char *);\n{calls}\n/*"
     model = copy(model_of("polynomial"))
     runs = (TrainingRun(hostile, hostile),)
     model.card_ = replace(model.card_, unit=hostile, axis="x\\", runs=runs, fogml_version=hostile)
