@@ -19,6 +19,8 @@ from fogml.errors import FogmlError, InputError
 from fogml.models.table import usable_rows
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.signals.averages import block_averages
+from fogml.validation.floors import floor_of_run
+from fogml.validation.reach import out_of_reach
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -74,25 +76,31 @@ class IndexSearch:
     model
         The candidate found, fitted to all training runs.
     chosen
-        Its trial.
+        Its trial; None where nothing was tried.
     trials
         Every trial, in order.
     design_index
         The index asked for [deg/h].
+    out_of_reach
+        Why no model can meet the index, in which case nothing was tried.
     """
 
     model: DriftModel
-    chosen: Trial
+    chosen: Trial | None
     trials: tuple[Trial, ...]
     design_index: float
+    out_of_reach: str | None = None
 
     @property
     def met(self) -> bool:
         """Whether the index was met on the folds of the training runs."""
-        return self.chosen.rms is not None and self.chosen.rms <= self.design_index
+        rms = None if self.chosen is None else self.chosen.rms
+        return rms is not None and rms <= self.design_index
 
     def summary(self) -> str:
         """The search in a sentence: how many tries, and what was taken."""
+        if self.chosen is None:
+            return f"{self.out_of_reach}. Nothing was searched; the model is fitted as without a search."
         outcome = (
             f"{self.chosen.candidate.name} is the first to meet the design index there"
             if self.met
@@ -118,7 +126,8 @@ def train_until_index(
     """Try sizes and features until the design index is met on folds of the training runs.
 
     Each training run in turn is held out where there are several, else each of five parts of the
-    one run's time.
+    one run's time. An index below what the noise of the training runs leaves is out of reach of any model:
+    then nothing is tried, and `model` is fitted as it is.
 
     Parameters
     ----------
@@ -144,6 +153,11 @@ def train_until_index(
         If no candidate can be fitted.
     """
     group = [runs] if isinstance(runs, Run) else list(runs)
+    beyond = _out_of_reach(group, design_index, averaging_s)
+    if beyond is not None:
+        if step is not None:
+            step(f"fitting {model}, as the design index is out of reach")
+        return IndexSearch(Candidate(model, features).make(seed).fit(group), None, (), design_index, beyond)
     trials: list[Trial] = []
     for candidate in candidates(model, features):
         if step is not None:
@@ -161,6 +175,15 @@ def train_until_index(
     if step is not None:
         step(f"fitting {chosen.candidate.name} to all training runs")
     return IndexSearch(chosen.candidate.make(seed).fit(group), chosen, tuple(trials), design_index)
+
+
+def _out_of_reach(runs: Sequence[Run], design_index: float, averaging_s: float) -> str | None:
+    floors, averages = [], []
+    for run in runs:
+        every = np.ones(len(run), dtype=bool)
+        averages.append(len(block_averages(run.time, run.error_deg_h, window_s=averaging_s).values[0]))
+        floors.append(floor_of_run(run, every, run.error_deg_h, averaging_s))
+    return out_of_reach(design_index, floors, averages, averaging_s, "the training runs")
 
 
 def candidates(model: str, features: str | None) -> list[Candidate]:

@@ -16,6 +16,7 @@ from fogml.runs.run import FloatArray, Run
 from fogml.validation.floors import floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
+from fogml.validation.reach import out_of_reach
 from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors, training_means
@@ -125,9 +126,20 @@ def judgement_of(
         test=judged_test,
         design_index=outcome_of("rms", design_index, judged_test) if design_index is not None else None,
         limits=tuple(outcome_of(name, limit, judged_test) for name, limit in limits.items()),
-        notes=(*notes, *_notes(train_runs, test_runs)),
+        notes=(*notes, *_out_of_reach(judged_test, design_index), *_notes(train_runs, test_runs)),
         repeatability=repeatability_of(judged_test),
     )
+
+
+def _out_of_reach(test: Sequence[RunJudgement], design_index: float | None) -> tuple[str, ...]:
+    """For each test run on which the noise alone is over the design index, that no model can meet it."""
+    if design_index is None:
+        return ()
+    told = [
+        out_of_reach(design_index, [run.floor], [len(run.series.time)], run.averaging_s, run.run)
+        for run in test
+    ]
+    return tuple(f"{text}." for text in told if text)
 
 
 def _within(errors: RunErrors, models: Sequence[DriftModel]) -> RunErrors:

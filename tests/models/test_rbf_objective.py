@@ -77,3 +77,25 @@ def test_weights_solve_the_penalised_least_squares() -> None:
     left = target - columns @ expected
     np.testing.assert_allclose(objective.residuals(at), left, atol=1e-9)
     assert objective.mean_square(at, expected) == pytest.approx(np.mean(left**2))
+
+
+def test_leaving_out_centres_costs_what_the_evidence_says() -> None:
+    """The closed form of each loss against the objective worked out anew, and no smaller set missed."""
+    random = np.random.default_rng(4)
+    inputs = random.normal(size=(200, 2))
+    linear = np.column_stack([inputs, np.ones(200)])
+    target = np.exp(-np.sum((inputs - 0.5) ** 2, axis=1) / 0.3) + 0.05 * random.normal(size=200)
+    objective = Objective(inputs, linear, target - target.mean())
+    objective.share = 0.7
+    shape = Shape(np.vstack([[0.5, 0.5], random.normal(size=(4, 2)), [[50.0, 50.0]]]), np.zeros((6, 2)), -4.0)
+
+    def without(kept: np.ndarray) -> Shape:
+        return Shape(shape.centres[kept], shape.log_widths[kept], shape.log_ridge)
+
+    kept = objective.fewest_centres(shape, 0.0)
+    assert 0 in kept and 5 not in kept
+    best = objective.value(without(kept)).value
+    assert best <= objective.value(shape).value
+    for j in kept:
+        assert objective.value(without(np.setdiff1d(kept, [j]))).value > best
+    assert len(objective.fewest_centres(shape, 1e9)) == 0

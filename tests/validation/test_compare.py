@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import partial
 
 import numpy as np
@@ -14,6 +15,7 @@ from fogml.validation.compare import compare
 from fogml.validation.index_search import Candidate, candidates, train_until_index
 from fogml.validation.judge import judge
 from fogml.validation.leave_one_out import leave_one_run_out
+from fogml.validation.reach import floor_interval
 from tests.validation.known_drift import KnownDrift
 
 
@@ -149,11 +151,31 @@ def test_the_search_stops_at_the_first_that_meets_the_index(runs, count):
 
 
 def test_an_index_out_of_reach_takes_the_nearest(runs):
-    found = train_until_index(runs[:2], 1e-6, model="polynomial")
+    found = train_until_index(runs[:2], 0.0139, model="polynomial", features="T")
     assert not found.met
-    assert len(found.trials) == len(candidates("polynomial", None))
+    assert len(found.trials) == len(candidates("polynomial", "T"))
     assert found.chosen.rms == min(trial.rms for trial in found.trials)
     assert "none meets" in found.summary()
+
+
+def test_an_index_below_the_floor_is_said_at_once(runs):
+    """White noise of 0.1 in averages of 50 samples: 0.0141, and 120 averages tell it to a tenth."""
+    found = train_until_index(runs[:2], 0.01, model="polynomial")
+    assert not found.met and found.trials == ()
+    assert "No model can reach the design index of 0.01" in found.summary()
+    said = re.search(r"leaves (\S+) deg/h rms \((\S+) to (\S+), 90%\)", found.summary())
+    floor, low, high = (float(value) for value in said.groups())
+    assert floor == pytest.approx(0.1 / np.sqrt(50), rel=0.05) and low < 0.1 / np.sqrt(50) < high
+    judged = judge(found.model, runs[:2], runs[2], design_index=0.01)
+    assert any("No model can reach" in note for note in judged.notes)
+    assert not any(
+        "No model" in note for note in judge(found.model, runs[:2], runs[2], design_index=0.02).notes
+    )
+    # The rms of averages of noise lies in the interval as often as it says.
+    white = np.random.default_rng(1).normal(size=(2000, 40))
+    low, high = floor_interval(1.0, 40)
+    inside = (np.sqrt((white**2).mean(axis=1)) > low) & (np.sqrt((white**2).mean(axis=1)) < high)
+    assert inside.mean() == pytest.approx(0.9, abs=0.025)
 
 
 def test_each_part_of_a_single_run_is_held_out_once(runs, monkeypatch):
@@ -165,7 +187,7 @@ def test_each_part_of_a_single_run_is_held_out_once(runs, monkeypatch):
             return super().fit(runs)
 
     monkeypatch.setattr(Candidate, "make", lambda self, seed: Recording())
-    train_until_index(runs[0], 1e-6, model="any")
+    train_until_index(runs[0], 0.0141, model="any")
     *folds, whole = fitted_times
     assert len(folds) == 5
     times, counts = np.unique(np.concatenate(folds), return_counts=True)

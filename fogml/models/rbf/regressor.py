@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
+PRUNE_NATS = 1.1
 SIZES = (16, 32, 64)
 """Numbers of centres among which ``centres="evidence"`` chooses."""
 
@@ -42,8 +43,8 @@ class RBFRegressor(NetworkRegressor):
     Parameters
     ----------
     centres
-        Number of centres; ``"evidence"`` chooses among `SIZES`, a sequence among its numbers.
-        Fewer are used where there are fewer than three averaged rows to each.
+        Greatest number of centres; ``"evidence"`` chooses among `SIZES`, a sequence among its numbers.
+        Fewer are used where there are fewer than three averaged rows to each, and where fewer are as good.
     centre_choice
         Where tuning begins: ``"kmeans"``, or ``"ols"`` for orthogonal least squares.
     tune
@@ -63,6 +64,11 @@ class RBFRegressor(NetworkRegressor):
         its slope there. None: starts are tried input by input.
     average_rows
         Rows are averaged in blocks down to about this number for the network that is kept.
+    prune
+        By how much the log evidence of a smaller network may be less for it to be taken as good [nat], and so
+        to be kept: of the sizes tried the smallest such, and of its centres those without which it is not.
+        Log 3, as an evidence smaller by less is not worth a mention (Jeffreys; Kass & Raftery, J. Am. Stat.
+        Assoc. 90 (1995) 773). 0 keeps every centre. Only with ``objective="evidence"``.
     width_prior
         Standard deviation of the log-normal prior of own widths about the shared ones.
     seed
@@ -94,6 +100,7 @@ class RBFRegressor(NetworkRegressor):
         network_inputs: Sequence[int] | None = None,
         wide_inputs: Sequence[int] | None = None,
         average_rows: int = 4000,
+        prune: float = PRUNE_NATS,
         width_prior: float = 0.5,
         seed: int = 0,
         threads: int | None = None,
@@ -108,6 +115,7 @@ class RBFRegressor(NetworkRegressor):
         self.network_inputs = network_inputs
         self.wide_inputs = wide_inputs
         self.average_rows = average_rows
+        self.prune = prune
         self.width_prior = width_prior
         self.seed = seed
         self.threads = threads
@@ -253,6 +261,7 @@ class RBFRegressor(NetworkRegressor):
             seed=self.seed,
             device=self.device,
             dtype=self.dtype,
+            worth=float(self.prune),
         )
 
     def _check_parameters(self) -> None:
@@ -272,5 +281,5 @@ class RBFRegressor(NetworkRegressor):
             raise InputError(f"ridge {self.ridge}: must be 'evidence', 0 or a positive number")
         if min(self._settings().sizes, default=-1) < 0:
             raise InputError(f"centres {self.centres}: must not be negative")
-        if not (self.average_rows >= 10 and self.width_prior > 0.0):
-            raise InputError("average_rows must be at least 10, and width_prior positive")
+        if not (self.average_rows >= 10 and self.width_prior > 0.0 and self.prune >= 0.0):
+            raise InputError("average_rows must be at least 10, width_prior positive, and prune not negative")

@@ -56,6 +56,7 @@ class SearchSettings:
     seed: int
     device: str
     dtype: str
+    worth: float
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,10 @@ class Search:
         self._tuning = replace(settings.tuning, least_log_widths=least)
 
     def run(self) -> Found:
-        """Tune every size and keep the best; larger sizes are left once they gain nothing."""
+        """Tune every size, keep the smallest of those as good as the best, and of it the centres that count.
+
+        Larger sizes are left once they gain nothing.
+        """
         dimensions = self._fine.inputs.shape[1]
         most = len(np.unique(self._fine.inputs, axis=0)) // _ROWS_PER_CENTRE
         sizes = sorted({min(size, most) for size in self.settings.sizes} - {0})
@@ -157,14 +161,24 @@ class Search:
             # With fewer independent rows another optimum is the better one, and not near the first.
             same = evidence and sizes[0] <= _TRIED_CENTRES and self._share == 1.0
             best = first[0] if same else self._race(sizes[0], starts, evidence)[0]
-            values = {sizes[0]: best.reached[0]}
+            values, all_tried = {sizes[0]: best.reached[0]}, [best]
             for size in sizes[1:]:
                 tried = self._race(size, starts[:1], evidence, best)[0]
                 values[size] = tried.reached[0]
+                all_tried.append(tried)
                 if tried.reached[0] >= best.reached[0]:
                     break
                 best = tried
-            return Found(self._refined(best), values, self._share)
+            worth = self.settings.worth if evidence else 0.0
+            kept = next(tried for tried in all_tried if tried.reached[0] <= best.reached[0] + worth)
+            return Found(self._fewest(self._refined(kept)), values, self._share)
+
+    def _fewest(self, shape: Shape) -> Shape:
+        """The shape without the centres that its evidence does not miss."""
+        if not self.settings.evidence or not self.settings.worth:
+            return shape
+        kept = self._fine.objective(True, self._share)[0].fewest_centres(shape, self.settings.worth)
+        return Shape(shape.centres[kept], shape.log_widths[kept], shape.log_ridge)
 
     @staticmethod
     def _beside_others() -> AbstractContextManager[None]:
