@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -145,7 +146,8 @@ def facts_from(values: Any, source: str) -> Facts:
 def side_file(run_path: Path) -> Path | None:
     """The side file beside a run: same stem, ``.yaml`` or else ``.yml``; None if there is none."""
     sides = (run_path.with_suffix(suffix) for suffix in SIDE_SUFFIXES)
-    return next((side for side in sides if side.is_file()), None)
+    # A folder that can't be looked into holds none; reading the run says what is wrong.
+    return next((side for side in sides if os.path.isfile(side)), None)
 
 
 def read_side_file(run_path: Path) -> Facts:

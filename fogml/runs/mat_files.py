@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import json
 import re
-import warnings
+from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any, Literal
 
@@ -23,84 +23,48 @@ from fogml.errors import InputError
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
-from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, first_line
+from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, stored_blocks
+from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits, stored_file
 from fogml.runs.run import Run
 
-_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
 _LARGEST_V5_BYTES = 1 << 31
 _RESERVED = ("units", "facts")
 _VARIABLE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,62}\Z")
 
 
-def read_mat(path: Path) -> RawTable:
-    """The table of a MATLAB file.
+def mat_blocks(
+    path: Path,
+    rows: int | None,
+    columns: Collection[str] | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Iterator[RawTable]:
+    """The table of a MATLAB file in blocks of `rows` rows; all at once for None.
+
+    Only time, gyro and `columns` are read where these are given. Version 5 is held whole by the
+    process that reads it.
 
     Raises
     ------
     InputError
-        If the file is damaged, or holds no numeric vectors of one length.
+        If the file is damaged, reading it takes more than `limits`, or it holds no numeric vectors of one
+        length.
     """
-    with path.open("rb") as file:
-        head = file.read(_USER_BLOCK + len(_HDF5_MAGIC))
-    is_hdf5 = head.startswith(_HDF5_MAGIC) or head[_USER_BLOCK:].startswith(_HDF5_MAGIC)
-    try:
-        with warnings.catch_warnings():
-            # SciPy warns of variables that it can't read; those it leaves out are missed below.
-            warnings.simplefilter("ignore")
-            variables = _hdf5_variables(path) if is_hdf5 else _v5_variables(path)
-    except InputError:
-        raise
-    except Exception as error:  # scipy raises whatever the damage leads to
-        raise InputError(
-            f"{path.name}: damaged or no MATLAB file ({first_line(error)}); save it again"
-        ) from None
-    return _raw(path.name, variables)
+    with stored_file(path, "mat", (), limits) as stored:
+        units, stated = stored.told["units"], stored.told["facts"]
+        if units is None:
+            raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
+        if not stored.arrays:
+            raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
+        cells = [(_cell(array.name, units.get(array.name)), array) for array in stored.arrays]
+        vectors, findings = choose_vectors(path.name, cells)
+        source = f"{path.name}, facts"
+        facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
+        yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
 
 
-def _v5_variables(path: Path) -> dict[str, Any]:
-    from scipy.io import loadmat
-
-    loaded = loadmat(path, simplify_cells=True, mat_dtype=False, chars_as_strings=True)
-    return {name: value for name, value in loaded.items() if not name.startswith("__")}
-
-
-def _hdf5_variables(path: Path) -> dict[str, Any]:
-    h5py = h5py_module()
-
-    def value_of(item: Any) -> Any:
-        if isinstance(item, h5py.Group):
-            return {name: value_of(member) for name, member in item.items() if not name.startswith("#")}
-        values = np.asarray(item)
-        if item.attrs.get("MATLAB_class", b"") in (b"char", "char"):
-            return "".join(chr(int(code)) for code in values.T.reshape(-1))
-        return values
-
-    with h5py.File(path, "r") as file:
-        return {name: value_of(item) for name, item in file.items() if not name.startswith("#")}
-
-
-def _raw(file: str, variables: dict[str, Any]) -> RawTable:
-    held = variables["run"] if isinstance(variables.get("run"), dict) else variables
-    units = held.get("units", variables.get("units", {}))
-    if not isinstance(units, dict):
-        raise InputError(f"{file}: 'units' must be a struct of texts, e.g. units.time = 's'")
-    arrays = []
-    for name, value in held.items():
-        if name in _RESERVED:
-            continue
-        unit = units.get(name)
-        cell = name if unit is None else f"{parse_header(name)[0]} [{str(unit).strip()}]"
-        arrays.append((cell, np.asarray(value)))
-    if not arrays:
-        raise InputError(f"{file}: holds no numeric vectors; time, gyro and others were expected")
-    vectors, findings = choose_vectors(file, arrays)
-    columns = {cell: values.reshape(-1).astype(np.float64) for cell, values in vectors}
-    source = f"{file}, facts"
-    stated = held.get("facts", variables.get("facts"))
-    facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
-    cells = tuple(cell for cell, _ in vectors)
-    return RawTable(file, cells, columns, None if stated is None else facts, findings=findings)
+def _cell(name: str, unit: str | None) -> str:
+    return name if unit is None else f"{parse_header(name)[0]} [{unit.strip()}]"
 
 
 def write_mat(

@@ -23,6 +23,7 @@ from fogml.runs.raw_table import (
     text_column,
     wanted_cells,
 )
+from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits
 
 if TYPE_CHECKING:
     from pyarrow import ChunkedArray, Schema, Table
@@ -31,30 +32,21 @@ if TYPE_CHECKING:
 _BUFFER_BYTES = 1 << 20
 
 
-def read_parquet(path: Path) -> RawTable:
-    """The table of a Parquet file.
-
-    Raises
-    ------
-    InputError
-        If the file is damaged, or a column of the run format holds no numbers.
-    """
-    with _opened(path) as file:
-        try:
-            return _raw(path.name, file.read(), 0)
-        except _failures() as error:
-            raise _damaged(path, error) from None
-
-
-def parquet_blocks(path: Path, rows: int, columns: Collection[str] | None = None) -> Iterator[RawTable]:
-    """The table of a Parquet file in blocks of at most `rows` rows, in bounded memory.
+def parquet_blocks(
+    path: Path,
+    rows: int | None,
+    columns: Collection[str] | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Iterator[RawTable]:
+    """The table of a Parquet file in blocks of at most `rows` rows, in bounded memory; whole for None.
 
     Only time, gyro and `columns` are read where these are given.
 
     Raises
     ------
     InputError
-        As `read_parquet`.
+        If the file is damaged or states more than it can hold, or a column of the run format holds no
+        numbers.
     """
     import pyarrow as arrow
 
@@ -62,13 +54,26 @@ def parquet_blocks(path: Path, rows: int, columns: Collection[str] | None = None
     # Buffering ahead would hold whole row groups of every column: memory grows with the file.
     with _opened(path) as file:
         try:
+            _check_sizes(path, file, limits)
             wanted = wanted_cells(file.schema_arrow.names, columns)
+            if rows is None:
+                yield _raw(path.name, file.read(columns=wanted), 0)
+                return
             for batch in file.iter_batches(batch_size=rows, columns=wanted):
                 table = arrow.Table.from_batches([batch])
                 yield _raw(path.name, table, start)
                 start += len(batch)
         except _failures() as error:
             raise _damaged(path, error) from None
+
+
+def _check_sizes(path: Path, file: ParquetFile, limits: ReadingLimits) -> None:
+    """Refuse a file whose catalogue states more than it can hold, before memory is taken for it."""
+    held = file.metadata
+    limits.check_size(path, float(held.num_rows) * held.num_columns)
+    for group in range(held.num_row_groups):
+        columns = [held.row_group(group).column(i) for i in range(held.num_columns)]
+        limits.check_size(path, sum(max(column.total_uncompressed_size, 0) for column in columns) / 8.0)
 
 
 def _opened(path: Path) -> ParquetFile:

@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import NAMES, Facts, facts_from
 from fogml.runs.findings import Finding
+from fogml.runs.reader_process import StoredArray, StoredFile
 from fogml.yaml_text import parse_yaml
 
 FACTS_KEY = "fogml.facts"
@@ -88,17 +89,9 @@ def first_line(error: BaseException) -> str:
     return next(iter(str(error).splitlines()), type(error).__name__)
 
 
-def axis_of_samples(shape: Sequence[int]) -> int | None:
-    """The axis along which an array holds samples, or None where it is no vector."""
-    longest = max(range(len(shape)), key=lambda axis: shape[axis], default=None)
-    if longest is None or any(size != 1 for axis, size in enumerate(shape) if axis != longest):
-        return None
-    return longest
-
-
 def choose_vectors(
-    file: str, arrays: Sequence[tuple[str, Any]]
-) -> tuple[list[tuple[str, Any]], tuple[Finding, ...]]:
+    file: str, arrays: Sequence[tuple[str, StoredArray]]
+) -> tuple[list[tuple[str, StoredArray]], tuple[Finding, ...]]:
     """The columns among named arrays: numeric vectors as long as ``time``.
 
     Parameters
@@ -106,7 +99,7 @@ def choose_vectors(
     file
         Base name, for messages.
     arrays
-        Header cell and array (anything with `shape` and `dtype`).
+        Header cell and array.
 
     Returns
     -------
@@ -118,26 +111,52 @@ def choose_vectors(
     InputError
         If a column of the run format is no numeric vector or differs from ``time`` in length.
     """
-    kept: list[tuple[str, Any]] = []
+    kept: list[tuple[str, StoredArray]] = []
     findings = []
     time = next((array for cell, array in arrays if parse_header(cell)[0] == "time"), None)
-    count = None if time is None else max(time.shape, default=0)
+    count = None if time is None or time.fault else max(time.shape, default=0)
     for cell, array in arrays:
         name = parse_header(cell)[0]
-        known = column_spec(name) is not None
-        fault = None
-        if array.dtype.kind not in "fiub" or axis_of_samples(array.shape) is None:
+        fault = array.fault
+        if fault is None and (array.kind not in "fiub" or not array.is_vector):
             shape = " by ".join(str(size) for size in array.shape) or "one value"
-            fault = f"holds {array.dtype} ({shape}), a vector of numbers was expected"
-        elif count is not None and max(array.shape) != count:
+            fault = f"holds {array.type_name} ({shape}), a vector of numbers was expected"
+        elif fault is None and count is not None and max(array.shape) != count:
             fault = f"holds {max(array.shape)} samples, 'time' holds {count}"
         if fault is None:
             kept.append((cell, array))
-        elif known:
+        elif column_spec(name) is not None:
             raise InputError(f"{file}, column '{name}': {fault}; one number per sample, export it again")
         else:
-            findings.append(Finding("left_out", f"'{name}' is left out: it {fault}", column=name))
+            findings.append(Finding("left_out", f"{quoted(name)} is left out: it {fault}", column=name))
     return kept, tuple(findings)
+
+
+def stored_blocks(
+    stored: StoredFile,
+    vectors: Sequence[tuple[str, StoredArray]],
+    findings: tuple[Finding, ...],
+    facts: Facts | None,
+    rows: int | None,
+    columns: Collection[str] | None,
+) -> Iterator[RawTable]:
+    """Vectors of a stored file in blocks of `rows` rows, whole for None; time, gyro and `columns` alone.
+
+    Raises
+    ------
+    InputError
+        If the file states more samples than it can hold, or is damaged.
+    """
+    wanted = wanted_cells((cell for cell, _ in vectors), columns)
+    vectors = [(cell, array) for cell, array in vectors if cell in wanted]
+    count = max((max(array.shape) for _, array in vectors), default=0)
+    stored.limits.check_size(stored.path, float(count) * len(vectors))
+    cells = tuple(cell for cell, _ in vectors)
+    step = rows or max(count, 1)
+    for start in range(0, max(count, 1), step):
+        stop = min(start + step, count)
+        values = {cell: stored.read(array, start, stop) for cell, array in vectors}
+        yield RawTable(stored.path.name, cells, values, facts, named_from(start), findings)
 
 
 def no_samples(file: str) -> InputError:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -11,7 +10,8 @@ from fogml.errors import InputError, listed, quoted
 from fogml.runs.assemble import Assembler, run_from_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
-from fogml.runs.raw_table import RawTable, wanted_cells
+from fogml.runs.raw_table import RawTable
+from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 
@@ -40,7 +40,13 @@ _FOREIGN = {
 }
 
 
-def read_run(path: str | Path, *, repair: bool = False, name: str | None = None) -> Run:
+def read_run(
+    path: str | Path,
+    *,
+    repair: bool = False,
+    name: str | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Run:
     """Read a run from CSV, Parquet, HDF5 or MATLAB, told by content and suffix.
 
     Set-up facts come from the side file of the same stem, else from the file itself.
@@ -54,6 +60,8 @@ def read_run(path: str | Path, *, repair: bool = False, name: str | None = None)
         or infinite values; what was done is counted in the run's findings.
     name
         Name of the run; the file's base name by default.
+    limits
+        What reading may take before the file counts as damaged.
 
     Returns
     -------
@@ -68,17 +76,21 @@ def read_run(path: str | Path, *, repair: bool = False, name: str | None = None)
     path = Path(path)
     with unchanged(*run_sources(path)):
         kind = file_format(path)
-        run = run_from_table(_read_table(path, kind, repair), path, repair=repair, name=name)
+        run = run_from_table(_read_table(path, kind, repair, limits), path, repair=repair, name=name)
     return run.with_findings(check_run(run))
 
 
 def read_blocks(
-    path: str | Path, *, columns: Collection[str] | None = None, block_rows: int = BLOCK_ROWS
+    path: str | Path,
+    *,
+    columns: Collection[str] | None = None,
+    block_rows: int = BLOCK_ROWS,
+    limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Iterator[Run]:
     """Read a run in blocks of at most `block_rows` rows, in bounded memory.
 
-    Blocks share name and facts. Order of time is checked across their borders. MATLAB files are
-    read whole and then cut.
+    Blocks share name and facts. Order of time is checked across their borders. MATLAB files of
+    version 5 are held whole while they are read.
 
     Parameters
     ----------
@@ -89,6 +101,8 @@ def read_blocks(
         not met.
     block_rows
         Most rows of a block.
+    limits
+        What reading may take before the file counts as damaged.
 
     Yields
     ------
@@ -107,7 +121,7 @@ def read_blocks(
     with unchanged(*run_sources(path)):
         kind = file_format(path)
         assembler = Assembler(path)
-        for table in _table_blocks(path, kind, block_rows, columns):
+        for table in _table_blocks(path, kind, block_rows, columns, limits):
             held = [parse_header(cell)[0] for cell in table.columns]
             missing = [column for column in columns or () if column not in held]
             if missing:
@@ -128,7 +142,7 @@ def read_table(path: Path) -> RawTable:
         Naming the fault.
     """
     with unchanged(path):
-        return _read_table(path, file_format(path), repair=False)
+        return _read_table(path, file_format(path), False, DEFAULT_LIMITS)
 
 
 def file_format(path: Path) -> Format:
@@ -180,39 +194,31 @@ def _format_of_content(path: Path) -> Format:
     return "csv"
 
 
-def _read_table(path: Path, kind: Format, repair: bool) -> RawTable:
-    # Each format's reader, and the package behind it, is loaded only where it is used.
+def _read_table(path: Path, kind: Format, repair: bool, limits: ReadingLimits) -> RawTable:
     if kind == "csv":
         from fogml.runs.csv_files import read_csv
 
         return read_csv(path, repair=repair)
-    if kind == "parquet":
-        from fogml.runs.parquet_files import read_parquet
-
-        return read_parquet(path)
-    if kind == "hdf5":
-        from fogml.runs.hdf5_files import read_hdf5
-
-        return read_hdf5(path)
-    from fogml.runs.mat_files import read_mat
-
-    return read_mat(path)
+    (table,) = _table_blocks(path, kind, None, None, limits)
+    return table
 
 
-def _table_blocks(path: Path, kind: Format, rows: int, columns: Collection[str] | None) -> Iterator[RawTable]:
+def _table_blocks(
+    path: Path, kind: Format, rows: int | None, columns: Collection[str] | None, limits: ReadingLimits
+) -> Iterator[RawTable]:
+    # Each format's reader, and the package behind it, is loaded only where it is used.
     if kind == "csv":
         from fogml.runs.csv_files import csv_blocks
 
-        yield from csv_blocks(path, rows, columns)
-    elif kind == "parquet":
+        return csv_blocks(path, rows or BLOCK_ROWS, columns)
+    if kind == "parquet":
         from fogml.runs.parquet_files import parquet_blocks
 
-        yield from parquet_blocks(path, rows, columns)
-    elif kind == "hdf5":
+        return parquet_blocks(path, rows, columns, limits)
+    if kind == "hdf5":
         from fogml.runs.hdf5_files import hdf5_blocks
 
-        yield from hdf5_blocks(path, rows, columns)
-    else:
-        table = _read_table(path, kind, repair=False)
-        wanted = wanted_cells(table.columns, columns)
-        yield from replace(table, columns={cell: table.columns[cell] for cell in wanted}).blocks(rows)
+        return hdf5_blocks(path, rows, columns, limits)
+    from fogml.runs.mat_files import mat_blocks
+
+    return mat_blocks(path, rows, columns, limits)

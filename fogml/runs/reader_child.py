@@ -1,0 +1,274 @@
+"""Reads HDF5 and MATLAB files for `fogml.runs.reader_process`, in a process of its own, as a script.
+
+The libraries behind these formats are written for sound files: a damaged one may end the process, hang it
+or take all memory. Here that ends no more than this process. It needs the standard library, NumPy and the
+format's own package alone, so that it starts quickly. Requests come as lines of JSON on standard input; each
+is answered by a line of JSON on standard output, and for samples by their bytes after it.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sys
+import warnings
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+_PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
+_MOST_NAMES = 10_000
+_MOST_TEXT = 1 << 20
+_DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
+_HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
+_USER_BLOCK = 512
+_RESERVED = ("units", "facts")
+
+
+class Refused(Exception):
+    """What a file may not hold."""
+
+
+def described(name: str, array: Any, unit: Any = None, fault: str | None = None) -> dict[str, Any]:
+    """What the parent is told of an array."""
+    told: dict[str, Any] = {"name": name[:1000], "unit": unit, "fault": fault}
+    if fault is None:
+        told |= {"kind": array.dtype.kind, "type": str(array.dtype)[:60]}
+        told |= {"shape": [int(size) for size in array.shape]}
+    return told
+
+
+class Hdf5:
+    """An HDF5 file: datasets of its root or of the group ``run``."""
+
+    def __init__(self, path: str, keys: list[str]) -> None:
+        import h5py
+
+        self.h5py = h5py
+        self.file = h5py.File(path, "r")
+        self.seen = 0
+        link = self.file.get("run", getlink=True)
+        is_group = isinstance(link, h5py.HardLink) and isinstance(self.file["run"], h5py.Group)
+        group = self.file["run"] if is_group else self.file
+        self.arrays: list[Any] = []
+        told = []
+        for name, item, fault in self.datasets(group):
+            unit = None if fault else item.attrs.get("unit")
+            self.arrays.append(item)
+            told.append(described(name, item, None if unit is None else text_of(unit), fault))
+        stated = {key: plain(group.attrs[key]) for key in keys if key in group.attrs}
+        self.told = {"arrays": told, "facts": stated}
+
+    def datasets(self, group: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, str | None]]:
+        """Datasets by name, also where the unit holds a slash, with what keeps them from being read."""
+        for name in group:
+            self.seen += 1
+            if self.seen > _MOST_NAMES:
+                raise Refused(f"more than {_MOST_NAMES} names")
+            full = above + name
+            if not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
+                yield full, None, "is a link to another place"
+                continue
+            item = group[name]
+            if isinstance(item, self.h5py.Dataset):
+                yield full, item, self.fault_of(item)
+            elif isinstance(item, self.h5py.Group) and "[" in full and depth < _DEEPEST:
+                yield from self.datasets(item, full + "/", depth + 1)
+
+    def fault_of(self, dataset: Any) -> str | None:
+        """Why a dataset is not read: its samples lie elsewhere, or other code would unpack them."""
+        if dataset.is_virtual or dataset.external:
+            return "refers to samples in another file"
+        if dataset.dtype.kind not in "fiub":
+            return None
+        creation = dataset.id.get_create_plist()
+        filters = [creation.get_filter(i)[0] for i in range(creation.get_nfilters())]
+        strange = [number for number in filters if number not in _PLAIN_FILTERS]
+        return f"is packed by a plug-in (filter {strange[0]})" if strange else None
+
+    def close(self) -> None:
+        self.file.close()
+
+
+class Mat:
+    """A MATLAB file: variables at the top or in the struct ``run``."""
+
+    def __init__(self, path: str, keys: list[str]) -> None:
+        with open(path, "rb") as file:
+            head = file.read(_USER_BLOCK + len(_HDF5_MAGIC))
+        is_hdf5 = head.startswith(_HDF5_MAGIC) or head[_USER_BLOCK:].startswith(_HDF5_MAGIC)
+        self.opened = Hdf5(path, []) if is_hdf5 else None
+        variables = self.members(self.opened.file) if self.opened else self.loaded(path)
+        run = variables.get("run")
+        held: Mapping[str, Any] = run if isinstance(run, dict) else variables
+        units = held.get("units", variables.get("units", {}))
+        facts = held.get("facts", variables.get("facts"))
+        names = [name for name in held if name not in _RESERVED]
+        self.arrays = [self.array(held[name]) for name in names]
+        told = [
+            described(name, array, fault=self.fault_of(array))
+            for name, array in zip(names, self.arrays, strict=True)
+        ]
+        self.told = {
+            "arrays": told,
+            "units": {str(k): text_of(v) for k, v in units.items()} if isinstance(units, dict) else None,
+            "facts": plain_struct(facts),
+        }
+
+    @staticmethod
+    def loaded(path: str) -> dict[str, Any]:
+        from scipy.io import loadmat
+
+        found = loadmat(path, simplify_cells=True, mat_dtype=False, chars_as_strings=True)
+        return {name: value for name, value in found.items() if not name.startswith("__")}
+
+    def fault_of(self, array: Any) -> str | None:
+        """As `Hdf5.fault_of`; what is in memory has none."""
+        return self.opened.fault_of(array) if self.opened and is_dataset(array) else None
+
+    def members(self, group: Any, depth: int = 0) -> dict[str, Any]:
+        """Variables of a version 7.3 file: groups are structs, text is read, samples are not yet."""
+        assert self.opened is not None
+        h5py = self.opened.h5py
+        found: dict[str, Any] = {}
+        for name in group:
+            is_member = isinstance(group.get(name, getlink=True), h5py.HardLink) and not name.startswith("#")
+            item = group[name] if is_member else None
+            if isinstance(item, h5py.Group) and depth < _DEEPEST:
+                found[name] = self.members(item, depth + 1)
+            elif isinstance(item, h5py.Dataset):
+                is_text = text_of(item.attrs.get("MATLAB_class", b"")) == "char"
+                found[name] = self.text(item) if is_text else item
+        return found
+
+    def text(self, item: Any) -> str:
+        if item.size > _MOST_TEXT or self.opened is None or self.opened.fault_of(item):
+            raise Refused("a text that is too long, or stands elsewhere")
+        return "".join(chr(int(code)) for code in np.asarray(item).T.reshape(-1))
+
+    @staticmethod
+    def array(value: Any) -> Any:
+        return value if is_dataset(value) else np.asarray(value)
+
+    def close(self) -> None:
+        self.arrays.clear()
+        if self.opened:
+            self.opened.close()
+
+
+def is_dataset(value: Any) -> bool:
+    """Whether samples still lie in the file."""
+    return hasattr(value, "is_virtual")
+
+
+def samples(array: Any, start: int, stop: int) -> np.ndarray[Any, Any]:
+    """Samples of a vector along its only long axis, float64."""
+    along = max(range(array.ndim), key=lambda axis: array.shape[axis])
+    part = tuple(slice(start, stop) if axis == along else 0 for axis in range(array.ndim))
+    return np.ascontiguousarray(array[part], dtype=np.float64)
+
+
+def text_of(value: Any) -> str:
+    """A text of an attribute or a variable."""
+    text = value.decode("utf-8", errors="replace") if isinstance(value, bytes) else str(value)
+    return text[:_MOST_TEXT]
+
+
+def plain(value: Any) -> Any:
+    """A value of one element as Python's own type, None for an array."""
+    if isinstance(value, str | bytes):
+        return text_of(value)
+    if getattr(value, "size", 1) != 1:
+        return None
+    value = value.item() if hasattr(value, "item") else value
+    return value if isinstance(value, bool | int | float) else text_of(value)
+
+
+def plain_struct(value: Any) -> Any:
+    """A text, or a struct of plain values; others as what they are called."""
+    if isinstance(value, dict):
+        return {str(key): plain_struct(item) for key, item in value.items()}
+    if is_dataset(value):
+        return plain(np.asarray(value)) if value.size == 1 else None
+    return None if value is None else plain(value)
+
+
+def limit_memory(more: int) -> None:
+    """Let the process take so many bytes more than it has, where the system can tell."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        with open("/proc/self/statm", encoding="ascii") as file:
+            held = int(file.read().split()[0]) * resource.getpagesize()
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        resource.setrlimit(resource.RLIMIT_AS, (held + more, hard))
+
+
+def limit_time(more_s: float) -> None:
+    """Let the process compute so much longer; the system ends it then, whatever it is in."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        used = sum(os.times()[:2])
+        hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (int(used + more_s) + 1, hard))
+
+
+def end_with_parent(parent: int) -> None:
+    """Be ended by the system when the parent is gone; elsewhere than on Linux the closed input ends it."""
+    if sys.platform == "linux":
+        import ctypes
+        import signal
+
+        with contextlib.suppress(OSError, AttributeError):
+            ctypes.CDLL(None).prctl(1, signal.SIGKILL)  # PR_SET_PDEATHSIG
+        if os.getppid() != parent:
+            raise SystemExit
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, Any], bytes | memoryview]:
+    """The answer to a request, and the bytes after it."""
+    number = int(request["file"])
+    limit_time(request["cpu_s"])
+    if request["do"] == "close":
+        files.pop(number).close()
+        return {}, b""
+    if request["do"] == "open":
+        kind = {"hdf5": Hdf5, "mat": Mat}[request["kind"]]
+        # What a reader needs is loaded before memory is limited.
+        __import__("h5py" if kind is Hdf5 else "scipy.io")
+        limit_memory(request["memory"])
+        files[number] = kind(request["path"], request["keys"])
+        return files[number].told, b""
+    found = samples(files[number].arrays[request["array"]], request["start"], request["stop"])
+    return {"count": len(found)}, found.data.cast("B") if len(found) else b""
+
+
+def main(parent: int) -> None:
+    """Answer requests until the input ends."""
+    end_with_parent(parent)
+    warnings.simplefilter("ignore")
+    files: dict[int, Any] = {}
+    output = sys.stdout.buffer
+    sys.stdout = sys.stderr  # whatever a library prints is no answer
+    for line in sys.stdin.buffer:
+        try:
+            told, content = answer(json.loads(line), files)
+        except MemoryError:
+            told, content = {"memory": True}, b""
+        except Exception as error:  # libraries raise whatever the damage leads to
+            reason = next(iter(str(error).splitlines()), type(error).__name__)
+            told, content = {"fault": reason[:500]}, b""
+        output.write(json.dumps(told).encode() + b"\n")
+        output.write(content)
+        output.flush()
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]))

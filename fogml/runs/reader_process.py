@@ -1,0 +1,307 @@
+"""HDF5 and MATLAB files, read in a process of its own with limits on time and memory.
+
+What a file holds is parsed by `fogml.runs.reader_child`; here come its names and samples, and where it ends
+without an answer, a message that names the file.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import weakref
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import count
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError, printable
+
+CHILD = Path(__file__).with_name("reader_child.py")
+_LONGEST_ANSWER = 1 << 26
+_LABELS = {"hdf5": "HDF5 file of numbers", "mat": "MATLAB file"}
+
+
+@dataclass(frozen=True)
+class ReadingLimits:
+    """What reading a file may take before it counts as damaged.
+
+    Attributes
+    ----------
+    cpu_s
+        Time of computing for one answer [s]: a catalogue, or one column's samples of a block. A million
+        samples take 0.1 s; ten slow machines' worth of that is spared.
+    cpu_s_per_mb
+        More of it for each megabyte of the file [s]; MATLAB files are unpacked whole, at over 50 MB/s.
+    wall_s
+        Time for one answer by the clock [s], for a drive that does not answer.
+    memory_mb
+        Memory beside that of the program itself [MB]: a block of a million rows of 30 columns takes 240.
+    memory_per_byte
+        More of it for each byte of the file: MATLAB files are held whole, and recorded noise does not pack
+        to less than a tenth.
+    expansion
+        Most bytes that a byte of the file stands for; deflate's own limit is 1032 (zlib technical details).
+    spare_mb
+        What a file may stand for in any case [MB].
+    """
+
+    cpu_s: float = 10.0
+    cpu_s_per_mb: float = 0.2
+    wall_s: float = 600.0
+    memory_mb: float = 1024.0
+    memory_per_byte: float = 20.0
+    expansion: float = 1032.0
+    spare_mb: float = 16.0
+
+    def check_size(self, path: Path, values: float) -> None:
+        """Refuse a file that states more values of 8 bytes than it can hold.
+
+        Raises
+        ------
+        InputError
+            Naming the file.
+        """
+        if 8.0 * values > self.expansion * path.stat().st_size + 1e6 * self.spare_mb:
+            raise InputError(
+                f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "
+                "hold; copy or export it again"
+            )
+
+
+@dataclass(frozen=True)
+class StoredArray:
+    """An array of a file: its place in the catalogue, name, unit if one is stated beside it, and shape.
+
+    `fault` says why it can't be read, if so.
+    """
+
+    index: int
+    name: str
+    unit: str | None
+    kind: str
+    type_name: str
+    shape: tuple[int, ...]
+    fault: str | None
+
+    @property
+    def is_vector(self) -> bool:
+        """Whether it has one axis alone that is longer than 1."""
+        return bool(self.shape) and sum(size != 1 for size in self.shape) <= 1
+
+
+DEFAULT_LIMITS = ReadingLimits()
+
+
+class StoredFile:
+    """A file that is open in the other process.
+
+    Attributes
+    ----------
+    arrays
+        What it holds.
+    told
+        Facts and units beside the arrays, plain values.
+    """
+
+    def __init__(self, path: Path, process: ReaderProcess, number: int, limits: ReadingLimits) -> None:
+        self.path, self._process, self._number, self.limits = path, process, number, limits
+        self.arrays: tuple[StoredArray, ...] = ()
+        self.told: Mapping[str, Any] = {}
+
+    def read(self, array: StoredArray, start: int, stop: int) -> NDArray[np.float64]:
+        """Samples `start` to `stop` of a vector, shape (stop - start,).
+
+        Raises
+        ------
+        InputError
+            If the file is damaged there.
+        """
+        values = np.empty(stop - start, dtype=np.float64)
+        self.ask({"do": "read", "array": array.index, "start": start, "stop": stop}, values)
+        return values
+
+    def ask(self, request: Mapping[str, Any], into: NDArray[np.float64] | None = None) -> dict[str, Any]:
+        """The answer to a request."""
+        megabytes = self.path.stat().st_size / 1e6 if self.path.exists() else 0.0
+        cpu_s = self.limits.cpu_s + self.limits.cpu_s_per_mb * megabytes
+        request = {**request, "file": self._number, "cpu_s": cpu_s}
+        told = self._process.ask(request, into, self.limits.wall_s)
+        if told is None:
+            raise InputError(f"{self.path.name}: damaged: {self._process.end()}; copy or export it again")
+        if "memory" in told:
+            raise InputError(
+                f"{self.path.name}: damaged, or too large: reading it takes more than "
+                f"{self.memory / 1e6:.0f} MB; copy or export it again"
+            )
+        if "fault" in told:
+            raise _Fault(str(told["fault"]))
+        return told
+
+    @property
+    def memory(self) -> int:
+        """Bytes that reading it may take."""
+        size = self.path.stat().st_size if self.path.exists() else 0
+        return int(1e6 * self.limits.memory_mb + self.limits.memory_per_byte * size)
+
+
+class _Fault(Exception):
+    """What the format's library says of a file."""
+
+
+@contextlib.contextmanager
+def stored_file(
+    path: Path, kind: Literal["hdf5", "mat"], keys: Sequence[str], limits: ReadingLimits
+) -> Iterator[StoredFile]:
+    """A file opened in the other process; `keys` are the attributes that are read.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, takes longer or more memory than `limits`, or its reader ends.
+    """
+    process = _processes.of_thread()
+    stored = StoredFile(path, process, next(_numbers), limits)
+    try:
+        request = {"do": "open", "path": os.path.abspath(path), "kind": kind, "keys": list(keys)}
+        stored.told = stored.ask({**request, "memory": stored.memory})
+        stored.arrays = tuple(_array(i, told) for i, told in enumerate(stored.told["arrays"]))
+        yield stored
+    except _Fault as fault:
+        told = printable(str(fault), 120)
+        raise InputError(
+            f"{path.name}: damaged or no {_LABELS[kind]} ({told}); copy or export it again"
+        ) from None
+    finally:
+        if process.is_alive:
+            with contextlib.suppress(_Fault, InputError):
+                stored.ask({"do": "close"})
+
+
+def _array(index: int, told: Mapping[str, Any]) -> StoredArray:
+    unit = told["unit"]
+    return StoredArray(
+        index,
+        str(told["name"]),
+        None if unit is None else str(unit),
+        str(told.get("kind", "O")),
+        str(told.get("type", "")),
+        tuple(int(size) for size in told.get("shape", ())),
+        told["fault"],
+    )
+
+
+class ReaderProcess:
+    """The other process: it answers one request after another until one ends it.
+
+    Parameters
+    ----------
+    script
+        What it runs.
+    """
+
+    def __init__(self, script: Path = CHILD) -> None:
+        # Plug-ins of HDF5 are other people's code; arithmetic in several threads is of no use here.
+        environment = {**os.environ, "HDF5_PLUGIN_PRELOAD": "::", "OPENBLAS_NUM_THREADS": "1"}
+        environment.pop("HDF5_PLUGIN_PATH", None)
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-W", "ignore", str(script), str(os.getpid())],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
+        )  # fmt: skip
+        self.is_alive = True
+        self._timed_out = False
+        self._finish = weakref.finalize(self, _finish, self._process, os.getpid())
+
+    def is_ready(self) -> bool:
+        """Whether it can be asked."""
+        return self.is_alive and self._process.poll() is None
+
+    def ask(
+        self, request: Mapping[str, Any], into: NDArray[np.float64] | None, wall_s: float
+    ) -> dict[str, Any] | None:
+        """The answer to a request, its samples read into `into`; None where the process ended."""
+        assert self._process.stdin is not None and self._process.stdout is not None
+        self._timed_out = False
+        clock = threading.Timer(wall_s, self._give_up)
+        clock.daemon = True
+        clock.start()
+        done = False
+        try:
+            self._process.stdin.write(json.dumps(request).encode() + b"\n")
+            self._process.stdin.flush()
+            line = self._process.stdout.readline(_LONGEST_ANSWER)
+            told: dict[str, Any] = json.loads(line) if line.endswith(b"\n") else {}
+            done = bool(line.endswith(b"\n"))
+            if done and into is not None and "count" in told:
+                done = told["count"] == len(into) and self._fill(into)
+            return told if done else None
+        except (OSError, ValueError, RecursionError):
+            return None
+        finally:
+            clock.cancel()
+            self.is_alive = done
+            if not done:
+                self._end_now()
+
+    def _fill(self, into: NDArray[np.float64]) -> bool:
+        assert self._process.stdout is not None
+        rest = into.data.cast("B") if len(into) else memoryview(b"")
+        while len(rest) and (got := self._process.stdout.readinto(rest)):  # type: ignore[attr-defined]
+            rest = rest[got:]
+        return not len(rest)
+
+    def _end_now(self) -> None:
+        """End it: an interrupt leaves half an answer in the pipe. One that ended by itself says how."""
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            self._process.wait(0.2)
+        self._process.kill()
+
+    def _give_up(self) -> None:
+        self._timed_out = True
+        self._process.kill()
+
+    def end(self) -> str:
+        """How it ended, in words."""
+        code = -self._process.wait()
+        name = signal.Signals(code).name if code in set(signal.Signals) else f"status {-code}"
+        if self._timed_out or name == "SIGXCPU":
+            return "reading it came to no end and was stopped"
+        return f"its reader crashed ({name})"
+
+
+def _finish(process: subprocess.Popen[bytes], owner: int) -> None:
+    for pipe in (process.stdin, process.stdout):
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+    # A process forked from the owner has no say in it.
+    if os.getpid() == owner:
+        process.kill()
+        process.wait()
+    else:
+        process.returncode = 0
+
+
+class _Processes(threading.local):
+    """One process for each thread: it ends with the thread that began it."""
+
+    process: ReaderProcess | None = None
+    owner = 0
+
+    def of_thread(self) -> ReaderProcess:
+        """The thread's process, a new one if the last one ended."""
+        if self.process is None or not self.process.is_ready() or self.owner != os.getpid():
+            self.process, self.owner = ReaderProcess(), os.getpid()
+        return self.process
+
+
+_processes = _Processes()
+_numbers = count()
