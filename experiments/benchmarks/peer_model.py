@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.benchmarks.peers import Learner, Peer, Setting
+from fogml.features.atoms import AtomValues
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
@@ -18,7 +19,7 @@ from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_c
 from fogml.models.folds import time_folds
 from fogml.models.intervals import LEVELS, Intervals
 from fogml.models.table import TrainingTable, run_rows, table_of_rows
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 
 
 @dataclass(frozen=True)
@@ -103,13 +104,15 @@ class PeerModel(DriftModel):
         self.intervals_ = Intervals(0.0, (0.0,) * len(LEVELS), 0, "none")
         return self
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The peer's value of the features, atoms limited to the trained box."""
         features = self.features_
         assert features is not None
-        limited, outside = features.limit(atoms, full)
+        values, full, settled = atoms
+        limited, outside = features.limit(values, full)
         drift = self.learner_.along(features.compose(limited), run.time)
-        return Evaluation(drift, full, outside, partial(distance_outside, atoms, outside, features))
+        measure = partial(distance_outside, values, outside, features)
+        return Evaluation(drift, full, settled, outside, measure)
 
     @property
     def feature_names(self) -> list[str]:

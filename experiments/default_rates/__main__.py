@@ -72,7 +72,7 @@ def process_errors(runs: list[Run], tests: list[tuple[Run, np.ndarray]]) -> list
         process.fit((table.X - shift) / scale, table.y)
     found = []
     for run, truth in tests:
-        atoms, full = features.atom_values(run)
+        atoms, full, _ = features.atom_values(run)
         rows = np.flatnonzero(full)[::10]
         predicted = process.predict((features.compose(atoms[rows]) - shift) / scale)
         found.append(error(predicted, truth[rows], np.ones(len(rows), dtype=bool)))

@@ -196,7 +196,7 @@ def rate_quality(settings: Mapping[str, Any]) -> dict[str, Any]:
         found[name] = {}
         for n in told["windows"]:
             text = "diff(T)[first]" if n == 0 else f"diff(T)[block, {2**n} s]"
-            values, full = parse_features(text).atom_values(run)
+            values, full, _ = parse_features(text).atom_values(run)
             found[name][str(n)] = float(np.corrcoef(values[full, 0], rate[full])[0, 1])
     return found
 

@@ -95,7 +95,7 @@ def unlimited(train: Run, text: str) -> Drift:
     model = make_model("polynomial", text, parameters={"ridge": 0.0}).fit(train)
 
     def drift(run: Run) -> FloatArray:
-        atoms, full = features.atom_values(run)
+        atoms, full, _ = features.atom_values(run)
         values = model.regressor_.predict(features.compose(atoms))  # type: ignore[attr-defined]
         return np.where(full, values, np.nan)
 

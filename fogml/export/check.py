@@ -14,6 +14,7 @@ from fogml.export.c_program import CProgram
 from fogml.export.c_source import CSource
 from fogml.export.plan import Plan, chosen_model
 from fogml.export.points import POINTS, box_points, history
+from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel
 
 FloatArray = NDArray[np.float64]
@@ -70,10 +71,10 @@ def plan_error(plan: Plan, model: DriftModel, seed: int) -> float:
     """Largest difference between a plan and the model it was made of [deg/h], over a history."""
     past = history(plan, seed)
     run = past.run(plan)
-    atoms, full = past.atoms(plan)
-    value, _ = plan.compensated(atoms, full, past.gyro)
+    atoms = past.atoms(plan)
+    value, _ = plan.compensated(atoms, past.gyro)
     model = chosen_model(model)
-    evaluation = model.evaluate_atoms(run, atoms, full)
+    evaluation = model.evaluate_atoms(run, atoms)
     return float(np.max(np.abs(value - (run.gyro_deg_h - evaluation.drift))))
 
 
@@ -83,8 +84,7 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     gyro_step = float(fixed["gyro_value"]) if fixed else 0.0
     past = history(plan, seed)
     gyro = np.round(past.gyro / gyro_step) * gyro_step if fixed else past.gyro
-    atoms, full = past.atoms(plan)
-    expected, flags = plan.compensated(atoms, full, gyro)
+    expected, flags = plan.compensated(past.atoms(plan), gyro)
     if fixed:
         time = np.round(past.time * 1e6).astype(np.int64)
         temperatures = np.round(past.temperatures / fixed["temperature_value"])
@@ -114,7 +114,8 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
 def _atoms_off(plan: Plan, source: CSource, program: CProgram, atoms: FloatArray, gyro: float) -> FloatArray:
     fixed = source.numbers["fixed"]
     output = np.full(len(atoms), gyro)
-    expected, _ = plan.compensated(atoms, np.ones(len(atoms), dtype=np.bool_), output)
+    everywhere = np.ones(len(atoms), dtype=np.bool_)
+    expected, _ = plan.compensated(AtomValues(atoms, everywhere, everywhere), output)
     if fixed is None:
         out, _ = program.atoms(atoms, output)
         return np.abs(out.astype(np.float64) - expected)
@@ -146,8 +147,7 @@ def pipeline_difference(
     time = past.time[0] + plan.sample_s * np.arange(count)
     temperatures = np.column_stack([np.interp(time, past.time, path) for path in past.temperatures.T])
     whole = type(past)(time, temperatures, np.full(count, past.gyro[0]))
-    atoms, full = whole.atoms(plan)
-    expected, flags = plan.compensated(atoms, full, whole.gyro)
+    expected, flags = plan.compensated(whole.atoms(plan), whole.gyro)
     ends = np.linspace(length, count - 1, min(512, max(1, count - length))).astype(int)
     windows = np.stack([temperatures[end - length + 1 : end + 1] for end in ends])
     off = np.abs(whole.gyro[ends] - value(windows, whole.gyro[ends]) - expected[ends])

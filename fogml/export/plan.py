@@ -10,12 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.features.atoms import Atom
+from fogml.features.atoms import MEMORIES, Atom, AtomValues
 from fogml.features.box import OVERSHOOT, TOLERANCE, Box
 from fogml.features.features import Features
 from fogml.features.reach import reaching_box
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
+from fogml.runs.columns import is_temperature
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -145,6 +146,7 @@ class Plan:
         if features is None:
             arrays = {"constant": np.array([float(getattr(model, "bias_", 0.0))])}
             return cls(model.kind, "constant", (), (), (), (), Limits.none(), arrays, interval)
+        _check_exportable(model.kind, features)
         shared: dict[str, Any] = {
             "kind": model.kind,
             "sensors": features.sensors,
@@ -188,13 +190,12 @@ class Plan:
         """Limited atoms (n, a), and which rows lie outside the trained box (n,)."""
         return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :])
 
-    def compensated(
-        self, atoms: FloatArray, full: BoolArray, gyro: FloatArray
-    ) -> tuple[FloatArray, NDArray[np.int8]]:
+    def compensated(self, atoms: AtomValues, gyro: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
         """Compensated output [deg/h] and flags, each (n,), from atoms (n, a) and the output (n,)."""
-        limited, outside = self.limited(atoms, full)
+        values, full, settled = atoms
+        limited, outside = self.limited(values, full)
         value = self.value(self.compose(limited), gyro)
-        flag = np.where(full, outside.astype(np.int8), np.int8(2))
+        flag = np.where(full & settled, outside.astype(np.int8), np.int8(2))
         return (value if self.form == "joint" else gyro - value), flag
 
     def value(self, columns: FloatArray, gyro: FloatArray | None = None) -> FloatArray:
@@ -233,6 +234,17 @@ class Plan:
         drawn = columns.copy()
         drawn[:, where] = rates * share[:, None]
         return drawn
+
+
+def _check_exportable(kind: str, features: Features) -> None:
+    """Refuse features that no export computes, naming the first."""
+    for atom in features.atoms:
+        if atom.operator in MEMORIES or not all(is_temperature(name) for name in atom.signal.sensors):
+            raise InputError(
+                f"export: the model '{kind}' takes {atom.text}; what is exported computes values, "
+                "differences and rates of temperatures; train with features of these, "
+                'e.g. --features "T^1..3, dT, T*dT"'
+            )
 
 
 def chosen_model(model: DriftModel) -> DriftModel:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
+from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
@@ -61,10 +62,11 @@ class History:
         nominal = ScaleFactor(value=1.0 / float(plan.arrays["scale"][0]))
         return Run("history", columns, Facts(scale_factor=nominal), "count")
 
-    def atoms(self, plan: Plan) -> tuple[FloatArray, NDArray[np.bool_]]:
-        """Atom values (n, a) and where all windows are full, as the library works them out."""
+    def atoms(self, plan: Plan) -> AtomValues:
+        """Values of a plan's atoms, as the library works them out."""
         if not plan.atoms:
-            return np.empty((len(self.time), 0)), np.ones(len(self.time), dtype=np.bool_)
+            everywhere = np.ones(len(self.time), dtype=np.bool_)
+            return AtomValues(np.empty((len(self.time), 0)), everywhere, everywhere)
         return Features(", ".join(plan.names)).atom_values(self.run(plan), plan.sample_s)
 
 

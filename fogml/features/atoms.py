@@ -4,23 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.features.signal import Signal, number_text
+from fogml.features.signal import TIME_ON, Signal, number_text
+from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals import windows
 from fogml.signals.clock import EXPONENTIAL_SPAN, Clock
+from fogml.signals.memory import Decay, Lag, MemoryOperator, Play
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-Operator = Literal["value", "diff", "d", "sign"]
+Operator = Literal["value", "lag", "play", "since_on", "diff", "d", "sign"]
 Method = Literal["block", "slope", "exp", "first"]
 
 OPERATORS: tuple[Operator, ...] = get_args(Operator)
+MEMORIES: tuple[Operator, ...] = ("lag", "play", "since_on")
+"""Operators that remember more than a window holds."""
+WINDOWED: tuple[Operator, ...] = ("diff", "d", "sign")
+"""Operators over a window."""
+HYSTERESIS_DEGC = (4.0, 10.0, 20.0)
+"""Half widths of the plays that ``hysteresis(x)`` stands for [degC]: loops of 8 to 40 degC."""
 METHODS: tuple[Method, ...] = get_args(Method)
 RATE_UNIT_S = 60.0
 """Rates of temperature are per minute."""
@@ -85,25 +93,42 @@ class Atom:
     Attributes
     ----------
     operator
-        ``value`` [degC]; ``diff`` difference [degC]; ``d`` rate [degC/min]; ``sign`` direction of
-        the rate: -1, 0 or +1, with a dead band of 0.05 degC/min.
+        ``value``; ``lag`` first-order lag; ``play`` play operator; ``since_on`` exponential decay
+        since power-on; ``diff`` difference; ``d`` rate per minute; ``sign`` direction of a
+        temperature's rate: -1, 0 or +1, with a dead band of 0.05 degC/min.
     signal
         What it works on.
     window
-        How differences and rates are taken; None for ``value``.
+        How differences and rates are taken; None for the others.
+    memory
+        Time constant of ``lag`` and ``since_on`` [s], half width of ``play`` [unit of the signal];
+        0 for the others.
     """
 
     operator: Operator
     signal: Signal
     window: Window | None = None
+    memory: float = 0.0
 
     def __post_init__(self) -> None:
         if self.operator not in OPERATORS:
             raise InputError(f"atom: no operator '{self.operator}'; known are {', '.join(OPERATORS)}")
-        if self.operator == "value":
+        if self.operator not in WINDOWED:
             object.__setattr__(self, "window", None)
         elif self.window is None:
             object.__setattr__(self, "window", DEFAULT_WINDOW)
+        if self.operator == "sign" and self.signal.unit != "degC":
+            raise InputError(
+                f"atom: sign(d({self.signal.text})) is not of a temperature; its dead band is not known"
+            )
+        object.__setattr__(self, "memory", float(self.memory))
+        if self.operator == "since_on" and self.signal.sensors != (TIME_ON,):
+            raise InputError(f"atom: since_on of {self.signal.text}; it is of {TIME_ON}")
+        if (self.operator in MEMORIES) != (0.0 < self.memory < np.inf):
+            expected = "a positive number" if self.operator in MEMORIES else "none"
+            raise InputError(
+                f"atom: {self.operator} with a memory of {self.memory:g}; {expected} was expected"
+            )
 
     def __str__(self) -> str:
         return self.text
@@ -112,28 +137,50 @@ class Atom:
     def text(self) -> str:
         """Text form, e.g. ``dT[slope, 60 s]``."""
         signal = self.signal.text
+        if self.operator == "since_on":
+            return f"since_on({number_text(self.memory)} s)"
+        if self.operator in MEMORIES:
+            unit = "s" if self.operator == "lag" else self.signal.written_unit
+            return f"{self.operator}({signal}, {f'{number_text(self.memory)} {unit}'.rstrip()})"
         if self.window is None:
             return signal
         if self.operator == "diff":
             return f"diff({signal}){self.window.text}"
-        rate = (f"d{signal}" if self.signal.is_sensor else f"d({signal})") + self.window.text
+        plain = self.signal.is_sensor and is_temperature(signal)
+        rate = (f"d{signal}" if plain else f"d({signal})") + self.window.text
         return f"sign({rate})" if self.operator == "sign" else rate
 
     @property
     def factor_text(self) -> str:
         """Text form as a factor of a product or under a power: sums stand in parentheses."""
-        plain = self.window is not None or self.signal.is_sensor
+        plain = self.operator != "value" or self.signal.is_sensor
         return self.text if plain else f"({self.text})"
 
     @property
     def unit(self) -> str:
         """Unit of its values; empty for a direction."""
-        return {"value": "degC", "diff": "degC", "d": "degC/min", "sign": ""}[self.operator]
+        if self.operator in ("since_on", "sign"):
+            return ""
+        return f"{self.signal.unit}/min" if self.operator == "d" else self.signal.unit
 
     @property
     def order(self) -> tuple[Any, ...]:
-        """Sort key among the factors of a term: values, differences, rates, directions."""
+        """Sort key among the factors of a term: values, memories, differences, rates, directions."""
         return OPERATORS.index(self.operator), self.signal.order, self.text
+
+    def memory_operator(self, sample_s: float) -> MemoryOperator | None:
+        """A fresh operator of what it remembers, for samples `sample_s` seconds apart; None without memory.
+
+        Raises
+        ------
+        InputError
+            If a time constant is shorter than the sample interval.
+        """
+        if self.operator == "lag":
+            return Lag(self.memory, sample_s)
+        if self.operator == "play":
+            return Play(self.memory)
+        return Decay(self.memory) if self.operator == "since_on" else None
 
 
 def windowed_values(
@@ -152,10 +199,38 @@ def direction(rate: FloatArray) -> FloatArray:
     return np.subtract(rate > band, rate < -band, dtype=np.float64)
 
 
+Memories = dict[Atom, MemoryOperator]
+"""Operators with what they remember, by the atoms that they are of."""
+
+
+class AtomValues(NamedTuple):
+    """Values of a atoms at n samples.
+
+    Attributes
+    ----------
+    values
+        Shape (n, a), column by column contiguous. Where `full` is False every windowed atom is 0, so
+        that of the composed features only the static part is left.
+    full
+        Where all windows are full, shape (n,).
+    settled
+        Where all memories are settled, shape (n,): what was before the run no longer matters.
+    """
+
+    values: FloatArray
+    full: BoolArray
+    settled: BoolArray
+
+
 def evaluate(
-    atoms: tuple[Atom, ...], run: Run, sample_s: float | None, columns: Sequence[FloatArray]
-) -> BoolArray:
-    """Put values of atoms over a run into `columns`; tell where all their windows are full.
+    atoms: tuple[Atom, ...],
+    run: Run,
+    sample_s: float | None,
+    columns: Sequence[FloatArray],
+    memories: Memories | None = None,
+    skip: int = 0,
+) -> tuple[BoolArray, BoolArray]:
+    """Put values of atoms over a run into `columns`; tell where they mean something.
 
     Parameters
     ----------
@@ -168,42 +243,61 @@ def evaluate(
     columns
         Where the values go, an array (n,) per atom. Where a window is not full all windowed atoms
         are 0.
+    memories
+        Operators to go on with, and to leave for the next block; fresh ones if None.
+    skip
+        The first rows that memories have taken already; their values there are 0.
 
     Returns
     -------
-    (n,) bool array
+    full, settled : (n,) bool arrays
+        As in `AtomValues`.
 
     Raises
     ------
     InputError
-        If a temperature is missing, or a window is shorter than the sample interval.
+        If a column is missing, or a window is shorter than the sample interval.
     """
     try:
-        return _evaluated(atoms, run, sample_s, columns)
+        return _evaluated(atoms, run, sample_s, columns, {} if memories is None else memories, skip)
     except InputError as error:
         message = str(error)
         raise InputError(message if message.startswith(run.name) else f"{run.name}: {message}") from error
 
 
 def _evaluated(
-    atoms: tuple[Atom, ...], run: Run, sample_s: float | None, columns: Sequence[FloatArray]
-) -> BoolArray:
+    atoms: tuple[Atom, ...],
+    run: Run,
+    sample_s: float | None,
+    columns: Sequence[FloatArray],
+    memories: Memories,
+    skip: int,
+) -> tuple[BoolArray, BoolArray]:
     clock = run.clock if sample_s is None else Clock(run.time, sample_s)
-    full = np.ones(len(run), dtype=np.bool_)
+    full, settled = np.ones(len(run), dtype=np.bool_), np.ones(len(run), dtype=np.bool_)
     signals: dict[Signal, FloatArray] = {}
     # Values first: a combination of sensors is then made once, in its own column.
     for atom, column in zip(atoms, columns):
-        if atom.window is None:
+        if atom.operator == "value":
             signals[atom.signal] = values = atom.signal.values(run, out=column)
             if values is not column:
                 column[:] = values
     rates: dict[tuple[Signal, Window], FloatArray] = {}
     for atom, column in zip(atoms, columns):
-        if atom.window is None:
+        if atom.operator == "value":
             continue
         if atom.signal not in signals:
             signals[atom.signal] = atom.signal.values(run)
-        signal, key = signals[atom.signal], (atom.signal, atom.window)
+        signal = signals[atom.signal]
+        if atom.window is None:
+            memory = memories.get(atom) or atom.memory_operator(clock.sample_s)
+            assert memory is not None
+            memories[atom] = memory
+            column[:skip] = 0.0
+            column[skip:], atom_settled = memory.push(clock.time[skip:], np.ascontiguousarray(signal[skip:]))
+            settled[skip:] &= atom_settled
+            continue
+        key = (atom.signal, atom.window)
         if atom.operator == "diff":
             _, atom_full = windowed_values(signal, clock, atom.window, None, column)
             full &= atom_full
@@ -221,4 +315,4 @@ def _evaluated(
         for atom, column in zip(atoms, columns):
             if atom.window is not None:
                 column[partial] = 0.0
-    return full
+    return full, settled

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.features.atoms import AtomValues, Memories
 from fogml.features.features import Features
 from fogml.runs.run import Run
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class FeatureBlocks:
     """Atom values of consecutive blocks of one recording, equal to those of the whole.
 
-    Between blocks it keeps as much history as the longest memory of the windows needs.
+    Between blocks it keeps as much history as the longest window needs, and the states of memory operators.
 
     Parameters
     ----------
@@ -30,14 +27,15 @@ class FeatureBlocks:
         self._features = features
         self._sample_s = sample_s
         self._history: Run | None = None
+        self._memories: Memories = {}
 
-    def push(self, block: Run) -> tuple[FloatArray, BoolArray]:
-        """Atom values (n, a) and full mask (n,) of the next block, as `Features.atom_values` gives.
+    def push(self, block: Run) -> AtomValues:
+        """Atom values of the next block, as `Features.atom_values` gives them for the whole.
 
         Raises
         ------
         InputError
-            If the block does not begin after the last one's end, or lacks a temperature.
+            If the block does not begin after the last one's end, or lacks a column.
         """
         history = self._history
         if history is not None and len(block) and len(history) and not block.time[0] > history.time[-1]:
@@ -46,16 +44,22 @@ class FeatureBlocks:
                 f"{history.time[-1]} s; give the blocks in time order"
             )
         joined = block if history is None else _joined(history, block)
-        values, full = self._features.atom_values(joined, self._sample_s)
         added = len(joined) - len(block)
+        values, full, settled = self._features.atom_values(
+            joined, self._sample_s, memories=self._memories, skip=added
+        )
         if len(joined):
             # Two intervals more than the memory, so that no window's edge can fall off.
             oldest = joined.time[-1] - self._features.memory_s - 2.0 * self._sample_s
             kept = min(int(np.searchsorted(joined.time, oldest)), len(joined) - 1)
-            names = ("time", "gyro", *joined.temperature_columns)
-            columns = {name: joined.columns[name][kept:].copy() for name in names}
-            self._history = Run(name=block.name, columns=columns)
-        return values[added:], full[added:]
+            columns = {name: joined.columns[name][kept:].copy() for name in self._kept(joined)}
+            self._history = Run(name=block.name, columns=columns, facts=joined.facts)
+        return AtomValues(values[added:], full[added:], settled[added:])
+
+    def _kept(self, run: Run) -> tuple[str, ...]:
+        """Columns that the features may be made of."""
+        own = [name for name in self._features.sensors if name in run.columns]
+        return tuple(dict.fromkeys(("time", "gyro", *run.temperature_columns, *own)))
 
 
 def _joined(history: Run, block: Run) -> Run:
@@ -65,4 +69,4 @@ def _joined(history: Run, block: Run) -> Run:
     columns = {
         name: np.concatenate([values, block.columns[name]]) for name, values in history.columns.items()
     }
-    return Run(name=block.name, columns=columns)
+    return Run(name=block.name, columns=columns, facts=block.facts)

@@ -1,4 +1,4 @@
-"""Features of a run's temperatures, as a scikit-learn style transformer over runs."""
+"""Features of a run's temperatures and other columns, as a scikit-learn style transformer over runs."""
 
 from __future__ import annotations
 
@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
-from fogml.features.atoms import Atom, evaluate
+from fogml.features.atoms import Atom, AtomValues, Memories, evaluate
 from fogml.features.box import Box
 from fogml.features.grammar import parse_terms
 from fogml.features.reach import reaching_box
+from fogml.features.signal import check_holds
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.runs.run import Run
 
@@ -113,7 +114,7 @@ class Features:
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Temperatures needed, by their names in formulas."""
+        """Temperatures and other columns needed, by their names in formulas."""
         return tuple(dict.fromkeys(name for atom in self._atoms for name in atom.signal.sensors))
 
     @property
@@ -123,7 +124,10 @@ class Features:
 
     @property
     def memory_s(self) -> float:
-        """History [s] beyond which samples no longer change the values at float64."""
+        """History [s] beyond which samples no longer change a window's value at float64.
+
+        Memory operators carry a state instead (`atom_values`).
+        """
         return max((atom.window.memory_s for atom in self._atoms if atom.window is not None), default=0.0)
 
     def get_params(self, deep: bool = True) -> dict[str, Any]:
@@ -164,7 +168,7 @@ class Features:
             If a run lacks a temperature, or no row has a full window.
         """
         group = [runs] if isinstance(runs, Run) else runs
-        self._box = Box.around(self.atom_values(run) for run in group)
+        self._box = Box.around(self.atom_values(run)[:2] for run in group)
         return self
 
     @property
@@ -205,30 +209,31 @@ class Features:
             raise InputError("features: no box was learned yet; fit them to training runs first")
         return self._box
 
-    def atom_values(self, run: Run, sample_s: float | None = None) -> tuple[FloatArray, BoolArray]:
-        """Values of the atoms, and where all their windows are full.
+    def atom_values(
+        self, run: Run, sample_s: float | None = None, *, memories: Memories | None = None, skip: int = 0
+    ) -> AtomValues:
+        """Values of the atoms, and where they mean something.
 
         Parameters
         ----------
         run
-            A run with the temperatures in `sensors`.
+            A run with the columns in `sensors`.
         sample_s
             Nominal sample interval [s]; the run's median interval if None.
-
-        Returns
-        -------
-        values : (n, a) array
-            Column by column contiguous. Where `full` is False every windowed atom is 0, so that of
-            the composed features only the static part is left.
-        full : (n,) bool array
+        memories
+            What memory operators hold from the samples before, and are left with for those after; they
+            begin afresh if None.
+        skip
+            The first rows of the run that `memories` have seen already.
 
         Raises
         ------
         InputError
-            If a temperature is missing, or a window is shorter than the sample interval.
+            If a column is missing, or a window or time constant is shorter than the sample interval.
         """
+        check_holds(run, self.sensors, self._text)
         values = np.empty((len(run), len(self._atoms)), order="F")
-        return values, evaluate(self._atoms, run, sample_s, list(values.T))
+        return AtomValues(values, *evaluate(self._atoms, run, sample_s, list(values.T), memories, skip))
 
     def compose(self, atom_values: ArrayLike) -> FloatArray:
         """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
@@ -277,14 +282,16 @@ class Features:
         Parameters
         ----------
         run
-            A run with the temperatures in `sensors`.
+            A run with the columns in `sensors`.
         limited
             Whether atoms are limited to the learned box first.
         linear
             If so, as for a model that goes on linearly.
         """
         if limited:
-            return self.compose(self.limit(*self.atom_values(run), linear=linear)[0])
+            values, full, _ = self.atom_values(run)
+            return self.compose(self.limit(values, full, linear=linear)[0])
+        check_holds(run, self.sensors, self._text)
         columns = np.empty((len(run), len(self)), order="F")
         terms = list(columns.T)
         atoms = atom_columns(self._plan, terms, len(self._atoms))
@@ -296,21 +303,18 @@ class Features:
         """`fit` to one run, then its feature columns, shape (n, k)."""
         return self.fit(run).transform(run)
 
-    def stream(self, sample_s: float, *, limited: bool = False, linear: bool = False) -> FeatureStream:
-        """The same features sample by sample, in bounded memory.
-
-        Parameters
-        ----------
-        sample_s
-            Nominal sample interval [s].
-        limited
-            Whether atoms are limited to the learned box first.
-        linear
-            If so, as for a model that goes on linearly.
-        """
+    def stream(
+        self,
+        sample_s: float,
+        *,
+        limited: bool = False,
+        linear: bool = False,
+        powered_on_s: float | None = None,
+    ) -> FeatureStream:
+        """The same features sample by sample, in bounded memory; parameters are those of `FeatureStream`."""
         from fogml.features.stream import FeatureStream
 
-        return FeatureStream(self, sample_s, limited=limited, linear=linear)
+        return FeatureStream(self, sample_s, limited=limited, linear=linear, powered_on_s=powered_on_s)
 
     def blocks(self, sample_s: float) -> FeatureBlocks:
         """The same atom values block by block of a long run, in bounded memory.

@@ -6,45 +6,39 @@
     product    = factor { "*" factor }
     factor     = primary [ options ] [ "^" power [ ".." power ] ]    options and power in either order
     primary    = signal | "(" primary ")" | rate | "diff" "(" signal ")" | "sign" "(" rate [ options ] ")"
-    rate       = "d" sensor | "d" "(" signal ")"                     dT, dT_in, d(T_in-T_out)
-    signal     = [ "-" ] part { ("+" | "-") part }                   T, T_in-T_out, 0.5*T1+0.5*T3
-    part       = [ number "*" ] sensor
+               | memory
+    memory     = "lag" "(" signal "," time ")"                       lag(T, 600 s)
+               | "play" "(" signal "," number [ unit ] ")"           play(T, 4 degC)
+               | "hysteresis" "(" signal ")"                         play(T, 4 degC), play(T, 10 degC) ...
+               | "since_on" "(" time ")"                             since_on(400 s)
+    rate       = "d" temperature | "d" "(" signal ")"                dT, dT_in, d(T_in-T_out), d(power)
+    signal     = [ "-" ] part { ("+" | "-") part }                   T, T_in-T_out, 0.5*T1+0.5*T3, power
+    part       = [ number "*" ] column
     options    = "[" method [ "," window ] "]" | "[" window "]"
     window     = number unit
 
-Sums and differences of sensors bind tighter than products and powers, because a feature can be no
+A column is a temperature or any other that runs record, by its name; ``time_on`` is the time since
+power-on. Sums and differences of columns bind tighter than products and powers, because a feature can be no
 other sum: ``T_in-T_out^2`` is ``(T_in-T_out)^2``. Spaces do not matter.
 """
 
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from itertools import product as all_products
-from typing import NoReturn, cast
 
 from fogml.errors import InputError
-from fogml.features.atoms import DEFAULT_WINDOW, METHODS, Atom, Method, Window
-from fogml.features.signal import Signal, known_temperatures
+from fogml.features.atoms import DEFAULT_WINDOW, HYSTERESIS_DEGC, METHODS, Atom, Method, Window
+from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal
 from fogml.features.terms import Term
+from fogml.features.tokens import Token, TokenReader
 from fogml.runs.columns import is_temperature
 
 HIGHEST_POWER = 20
+FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on")
 WINDOW_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
-_TOKEN = re.compile(
-    r"\s*(?:(?P<number>(?:\d+(?:\.(?!\.)\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
-    r"|(?P<name>[A-Za-z_]\w*)|(?P<range>\.\.)|(?P<sign>[-+*^,()\[\]]))"
-)
-_SPACE = re.compile(r"\s*")
 _RATE_NAME = re.compile(r"d(T\w*)\Z")
-
-
-@dataclass(frozen=True)
-class _Token:
-    kind: str
-    text: str
-    at: int
 
 
 def parse_terms(text: str) -> tuple[Term, ...]:
@@ -59,54 +53,8 @@ def parse_terms(text: str) -> tuple[Term, ...]:
     return _Parser(text).features()
 
 
-class _Parser:
+class _Parser(TokenReader):
     """Recursive descent over the tokens, one method per rule of the grammar."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self.tokens: list[_Token] = []
-        at = _SPACE.match(text).end()  # type: ignore[union-attr]  # matches always
-        while at < len(text):
-            match = _TOKEN.match(text, at)
-            if match is None:
-                self.fail(f"unexpected '{text[at]}'", at, self.known())
-            kind = cast(str, match.lastgroup)
-            self.tokens.append(_Token(kind, match[kind], match.start(kind)))
-            at = _SPACE.match(text, match.end()).end()  # type: ignore[union-attr]
-        self.tokens.append(_Token("end", "", len(text.rstrip())))
-        self.next = 0
-
-    def fail(self, message: str, at: int, hint: str = "") -> NoReturn:
-        shown = re.sub(r"\s", " ", self.text)
-        lines = [f"feature text: {message}", f"  {shown}", f"  {' ' * at}^"]
-        raise InputError("\n".join([*lines, hint] if hint else lines))
-
-    @staticmethod
-    def known() -> str:
-        return (
-            f"known: temperatures {known_temperatures()}; differences T_in-T_out, diff(x); rates d(x), dT; "
-            "directions sign(dT); products x*y, powers x^3, x^1..5; "
-            f"options [method, window], method {', '.join(METHODS)}, window e.g. 64 s"
-        )
-
-    @property
-    def token(self) -> _Token:
-        return self.tokens[self.next]
-
-    def take(self, *texts: str) -> _Token | None:
-        """The next token if it is one of these signs, else None."""
-        token = self.token
-        if token.kind in ("sign", "range") and token.text in texts:
-            self.next += 1
-            return token
-        return None
-
-    def expect(self, text: str, why: str) -> None:
-        if self.take(text) is None:
-            self.fail(f"'{text}' expected {why}, found {self.found()}", self.token.at)
-
-    def found(self) -> str:
-        return f"'{self.token.text}'" if self.token.kind != "end" else "the end"
 
     def features(self) -> tuple[Term, ...]:
         terms: dict[Term, None] = {}
@@ -129,6 +77,10 @@ class _Parser:
 
     def factor(self) -> list[tuple[Atom, int]]:
         at = self.token.at
+        if self.calls("hysteresis"):
+            atoms = self.hysteresis()
+            spread = self.powers() if self.token.text == "^" else range(1, 2)
+            return [(atom, power) for atom in atoms for power in spread]
         atom = self.primary()
         powers = None
         windowed = False
@@ -140,8 +92,69 @@ class _Parser:
             else:
                 return [(atom, power) for power in powers or (1,)]
 
+    def calls(self, function: str) -> bool:
+        """Whether a call of a function comes next."""
+        return self.token.kind == "name" and self.token.text == function
+
+    def hysteresis(self) -> list[Atom]:
+        at = self.token.at
+        self.next += 1
+        signal = self.signal_in_parentheses("hysteresis")
+        if signal.unit != "degC":
+            self.fail(
+                f"hysteresis({signal.text}) is not of a temperature",
+                at,
+                "write play(x, 0.5) with half widths",
+            )
+        return [Atom("play", signal, memory=half_width) for half_width in HYSTERESIS_DEGC]
+
+    def memory(self) -> Atom:
+        """A lag, a play or a decay since power-on."""
+        function = self.token.text
+        self.next += 1
+        self.expect("(", f"after {function}")
+        if function == "since_on":
+            atom = Atom("since_on", Signal.of(TIME_ON), memory=self.length())
+        else:
+            signal = self.signal()
+            self.expect(
+                ",", f"before the {'time constant' if function == 'lag' else 'half width'} of {function}"
+            )
+            if function == "lag":
+                atom = Atom("lag", signal, memory=self.length())
+            else:
+                atom = Atom("play", signal, memory=self.half_width(signal))
+        self.expect(")", f"to close {function}(")
+        return atom
+
+    def half_width(self, signal: Signal) -> float:
+        token = self.token
+        if token.kind != "number":
+            self.fail(
+                f"a half width above 0 expected, found {self.found()}", token.at, "e.g. play(T, 4 degC)"
+            )
+        self.next += 1
+        units = {"degC": ("degC", "K"), "": ()}.get(signal.written_unit, (signal.written_unit,))
+        if self.token.kind == "name":
+            if self.token.text not in units:
+                told = f"'{units[0]}'" if units else "no unit"
+                self.fail(f"{told} expected after the half width, found {self.found()}", self.token.at)
+            self.next += 1
+        elif signal.unit == "degC":
+            self.fail(
+                f"the half width's unit expected, found {self.found()}", self.token.at, "e.g. play(T, 4 degC)"
+            )
+        half_width = float(token.text)
+        if not 0.0 < half_width < float("inf"):
+            self.fail("the half width must be more than 0", token.at)
+        return half_width
+
     def primary(self) -> Atom:
         token = self.token
+        if token.kind == "name" and token.text in ("lag", "play", "since_on"):
+            return self.memory()
+        if self.calls("hysteresis"):
+            self.fail("hysteresis(...) stands for several features; parentheses hold one", token.at)
         if token.kind == "name" and token.text == "diff":
             self.next += 1
             return Atom("diff", self.signal_in_parentheses("diff"))
@@ -158,8 +171,11 @@ class _Parser:
         return Atom("value", self.signal())
 
     @staticmethod
-    def is_rate(token: _Token) -> bool:
-        return token.kind == "name" and (token.text == "d" or _RATE_NAME.match(token.text) is not None)
+    def is_rate(token: Token) -> bool:
+        if token.kind != "name":
+            return False
+        # A column may have a name such as duty: only dT... is a rate without parentheses.
+        return token.text == "d" or _RATE_NAME.match(token.text) is not None
 
     def rate(self) -> Atom:
         token = self.token
@@ -177,7 +193,7 @@ class _Parser:
     def no_sum_of_rates(self) -> None:
         if self.token.text in ("+", "-"):
             hint = "write the rate of a difference as d(T_in-T_out)"
-            self.fail("only temperatures can be added or subtracted", self.token.at, hint)
+            self.fail("only columns can be added or subtracted", self.token.at, hint)
 
     def direction(self) -> Atom:
         self.expect("(", "after sign")
@@ -188,6 +204,8 @@ class _Parser:
         if self.token.text == "[":
             rate = self.with_options(rate, at)
         self.expect(")", "to close sign(")
+        if rate.signal.unit != "degC":
+            self.fail("the direction of a temperature only is known", at, "write sign(dT)")
         return Atom("sign", rate.signal, rate.window)
 
     def signal_in_parentheses(self, function: str) -> Signal:
@@ -212,16 +230,17 @@ class _Parser:
         if self.token.kind == "number":
             coefficient = float(self.token.text)
             self.next += 1
-            self.expect("*", "between a number and the temperature that it scales")
+            self.expect("*", "between a number and the column that it scales")
         token = self.token
-        if token.kind == "name" and is_temperature(token.text):
+        if token.kind == "name" and (token.text in FUNCTIONS or self.is_rate(token)):
+            hint = "write the rate of a difference as d(T_in-T_out)"
+            self.fail(f"a column expected, found '{token.text}'", token.at, hint)
+        if token.kind == "name" and token.text in NOT_INPUTS:
+            self.fail(f"'{token.text}' is no input of a drift model", token.at, self.known())
+        if token.kind == "name":
             self.next += 1
             return token.text, sign * coefficient
-        if token.kind == "name" and (token.text in ("d", "diff", "sign") or self.is_rate(token)):
-            hint = "write the rate of a difference as d(T_in-T_out)"
-            self.fail(f"a temperature expected, found '{token.text}'", token.at, hint)
-        what = f"unknown name '{token.text}'" if token.kind == "name" else f"found {self.found()}"
-        self.fail(f"a temperature or a function of it expected, {what}", token.at, self.known())
+        self.fail(f"a column or a function of it expected, found {self.found()}", token.at, self.known())
 
     def powers(self) -> range:
         self.next += 1
@@ -248,7 +267,7 @@ class _Parser:
         opening = self.token.at
         self.next += 1
         if atom.window is None:
-            hint = f"options belong to rates and differences: d({atom.text})[...]"
+            hint = "options belong to rates and differences, as in d(x)[slope, 60 s]"
             self.fail(f"{atom.text} takes no options", opening, hint)
         if atom.window != DEFAULT_WINDOW:
             self.fail(f"{atom.text} has its options already", opening)

@@ -1,7 +1,8 @@
-"""Signals: linear combinations of a run's temperatures, such as ``T`` or ``T_in-T_out``."""
+"""Signals: linear combinations of a run's columns, such as ``T``, ``T_in-T_out`` or ``power``."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -9,24 +10,29 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.runs.columns import KNOWN, coil_sensor_number, is_temperature
+from fogml.runs.columns import KNOWN, coil_sensor_number, column_spec, is_temperature
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
 
+TIME_ON = "time_on"
+"""Time since power-on [s]: a column of that name, else from the fact ``powered_on``."""
+NOT_INPUTS = ("time", "gyro")
+"""Columns that no feature may be made of."""
 _ORDER = ["T", *(name for name in KNOWN if name != "T")]
 
 
 @dataclass(frozen=True)
 class Signal:
-    """A linear combination of temperatures [degC].
+    """A linear combination of a run's columns, temperatures above all.
 
     Equal combinations are equal objects, in whatever order they were written.
 
     Attributes
     ----------
     parts
-        Pairs of a temperature's name in formulas and its coefficient, positive ones first.
+        Pairs of a name and its coefficient, positive ones first. A name is that of a temperature in
+        formulas (`fogml.runs.run.Run.temperature`), of any other column, or ``time_on``.
     """
 
     parts: tuple[tuple[str, float], ...]
@@ -34,14 +40,20 @@ class Signal:
     def __post_init__(self) -> None:
         coefficients: dict[str, float] = {}
         for name, coefficient in self.parts:
-            if not is_temperature(name):
-                raise InputError(f"signal: '{name}' is not a temperature; known are {known_temperatures()}")
+            if name in NOT_INPUTS or not name.isidentifier():
+                raise InputError(
+                    f"signal: '{name}' can't be an input; inputs are columns other than time and gyro"
+                )
             if not np.isfinite(coefficient):
                 raise InputError(f"signal: {name} has the coefficient {coefficient}; a number was expected")
             coefficients[name] = coefficients.get(name, 0.0) + float(coefficient)
         kept = [(name, coefficient) for name, coefficient in coefficients.items() if coefficient != 0.0]
         if not kept:
-            raise InputError("signal: nothing is left of the temperatures; they cancel")
+            raise InputError("signal: nothing is left of the columns; they cancel")
+        units = {unit_of(name) for name, _ in kept}
+        if len(units) > 1:
+            told = ", ".join(f"{name} [{unit_of(name) or 'own unit'}]" for name, _ in kept)
+            raise InputError(f"signal: columns of different units can't be added: {told}")
         object.__setattr__(self, "parts", tuple(sorted(kept, key=_sort_key)))
 
     @classmethod
@@ -54,17 +66,27 @@ class Signal:
 
     @property
     def is_sensor(self) -> bool:
-        """Whether it is one temperature as it stands."""
+        """Whether it is one column as it stands."""
         return len(self.parts) == 1 and self.parts[0][1] == 1.0
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Names in formulas of the temperatures it takes."""
+        """Names of what it takes."""
         return tuple(name for name, _ in self.parts)
 
     @property
-    def order(self) -> tuple[tuple[bool, int, int, float], ...]:
-        """Sort key among signals: by sensor, coil sensors by number."""
+    def unit(self) -> str:
+        """Unit of its values; empty for a column of one's own."""
+        return unit_of(self.parts[0][0])
+
+    @property
+    def written_unit(self) -> str:
+        """Unit as feature text writes it beside a number; empty where it is no word (%, 0/1)."""
+        return self.unit if self.unit.isidentifier() else ""
+
+    @property
+    def order(self) -> tuple[tuple[bool, int, int, str, float], ...]:
+        """Sort key among signals: by column, coil sensors by number, columns of one's own last."""
         return tuple((*_sort_key(part), part[1]) for part in self.parts)
 
     @property
@@ -78,7 +100,9 @@ class Signal:
         return "".join(pieces)
 
     def values(self, run: Run, out: FloatArray | None = None) -> FloatArray:
-        """The signal [degC] of a run, shape (n,); a view where it is one recorded column.
+        """The signal of a run in the run format's internal units, shape (n,).
+
+        A view where it is one recorded column.
 
         Parameters
         ----------
@@ -90,22 +114,22 @@ class Signal:
         Raises
         ------
         InputError
-            If the run lacks a temperature.
+            If the run lacks a column.
         """
         (name, coefficient), *others = self.parts
-        total = run.temperature(name)
+        total = input_of(run, name)
         if coefficient != 1.0:
             total = np.multiply(coefficient, total, out=out)
         for name, coefficient in others:
             if abs(coefficient) == 1.0:
-                part = run.temperature(name)
+                part = input_of(run, name)
             else:
-                part = abs(coefficient) * run.temperature(name)
+                part = abs(coefficient) * input_of(run, name)
             total = np.add(total, part, out=out) if coefficient > 0 else np.subtract(total, part, out=out)
         return total
 
     def weights(self, recorded: Iterable[str]) -> dict[str, float]:
-        """Weights of the recorded temperature columns that make the signal.
+        """Weights of the recorded columns that make the signal.
 
         What a name stands for where it is not recorded itself (T for T_in, T_in for the mean of
         the odd sensors) is asked of `Run`, so that the rule is written once.
@@ -113,14 +137,75 @@ class Signal:
         Raises
         ------
         InputError
-            If a temperature is neither recorded nor stood in for.
+            If a column is neither recorded nor stood in for.
         """
-        names = [name for name in recorded if is_temperature(name)]
+        names = [name for name in recorded if name not in NOT_INPUTS]
         unit = np.eye(len(names))
         index = np.arange(float(len(names)))
         columns = {"time": index, "gyro": index, **{name: unit[i] for i, name in enumerate(names)}}
-        probed = self.values(Run(name="temperatures", columns=columns))
+        probed = self.values(Run(name="inputs", columns=columns))
         return {name: float(weight) for name, weight in zip(names, probed) if weight != 0.0}
+
+
+def unit_of(name: str) -> str:
+    """Unit of a name in formulas: the run format's, s for ``time_on``, empty for a column of one's own."""
+    if name == TIME_ON:
+        return "s"
+    spec = column_spec(name)
+    return spec.internal if spec else ""
+
+
+def held_by(run: Run, name: str) -> bool:
+    """Whether a run holds what a name in formulas stands for."""
+    if is_temperature(name):
+        return bool(run.sensors(name))
+    return name in run.columns or (name == TIME_ON and run.facts.powered_on is not None)
+
+
+def input_of(run: Run, name: str) -> FloatArray:
+    """What a name in formulas stands for in a run, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If the run does not hold it.
+    """
+    if is_temperature(name):
+        return run.temperature(name)
+    if name in run.columns and name not in NOT_INPUTS:
+        return run.columns[name]
+    if name == TIME_ON and run.facts.powered_on is not None:
+        return run.time - run.facts.powered_on
+    if name == TIME_ON:
+        raise InputError(
+            f"{run.name}: time since power-on is not known; state 'powered_on' [s] in the side file"
+        )
+    from difflib import get_close_matches
+
+    held = [column for column in run.columns if column not in NOT_INPUTS]
+    near = get_close_matches(name, held, n=1)
+    hint = f"did you mean '{near[0]}'?" if near else f"the run holds {', '.join(held) or 'none'}"
+    raise InputError(f"{run.name}: no column '{name}'; {hint}")
+
+
+def check_holds(run: Run, names: Iterable[str], text: str) -> None:
+    """Refuse a run that lacks one of the names in a feature text.
+
+    Raises
+    ------
+    InputError
+        Pointing at the first such name's place in the text.
+    """
+    lacking = next((name for name in names if not held_by(run, name)), None)
+    if lacking is None:
+        return
+    try:
+        input_of(run, lacking)
+    except InputError as error:
+        written = lacking if lacking in text else "since_on"
+        place = re.search(rf"(?<!\w)d?(?={re.escape(written)}\b)", text)
+        at = place.end() if place else 0
+        raise InputError(f"{error}\n  {text}\n  {' ' * at}^") from error
 
 
 def known_temperatures() -> str:
@@ -135,9 +220,11 @@ def number_text(value: float) -> str:
     return repr(float(value)).removesuffix(".0")
 
 
-def _sort_key(part: tuple[str, float]) -> tuple[bool, int, int]:
+def _sort_key(part: tuple[str, float]) -> tuple[bool, int, int, str]:
     name, coefficient = part
     number = coil_sensor_number(name)
-    if number is None:
-        return coefficient < 0, 0, _ORDER.index(name)
-    return coefficient < 0, 1, number
+    if number is not None:
+        return coefficient < 0, 1, number, name
+    if name in _ORDER:
+        return coefficient < 0, 0, _ORDER.index(name), name
+    return coefficient < 0, 2, 0, name

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window, direction
 from fogml.features.features import Features
-from fogml.features.signal import Signal
+from fogml.features.signal import TIME_ON, Signal
 from fogml.signals import window_streams
 
 FloatArray = NDArray[np.float64]
@@ -28,6 +28,8 @@ class StreamStep(NamedTuple):
         Atom values before any limit, shape (a,); windowed atoms are 0 where not full.
     full
         Whether all windows are full.
+    settled
+        Whether all memories are settled.
     outside
         Whether an atom is outside the learned box; False where none was learned.
     """
@@ -35,6 +37,7 @@ class StreamStep(NamedTuple):
     values: FloatArray
     atoms: FloatArray
     full: bool
+    settled: bool
     outside: bool
 
 
@@ -51,6 +54,9 @@ class FeatureStream:
         Whether atoms are limited to the learned box before features are composed.
     linear
         If so, as for a model that goes on linearly.
+    powered_on_s
+        Time of power-on on the clock of the samples [s]; None where no feature needs it, or ``time_on``
+        comes with the samples.
 
     Raises
     ------
@@ -59,8 +65,15 @@ class FeatureStream:
     """
 
     def __init__(
-        self, features: Features, sample_s: float, *, limited: bool = False, linear: bool = False
+        self,
+        features: Features,
+        sample_s: float,
+        *,
+        limited: bool = False,
+        linear: bool = False,
+        powered_on_s: float | None = None,
     ) -> None:
+        self._powered_on_s = powered_on_s
         self._features = features
         self._limited = limited
         self._linear = linear
@@ -74,6 +87,9 @@ class FeatureStream:
             for key in map(_operator_key, features.atoms)
             if key is not None
         }
+        self._memories = {
+            atom: memory for atom in features.atoms if (memory := atom.memory_operator(sample_s)) is not None
+        }
 
     def step(self, time_s: float, temperatures: Mapping[str, float]) -> StreamStep:
         """Take one sample.
@@ -83,15 +99,18 @@ class FeatureStream:
         time_s
             Its time [s], later than the last one's.
         temperatures
-            Recorded temperatures [degC] by column name; the same columns at every step.
+            Recorded temperatures [degC], and other columns that features are made of, by column name;
+            the same columns at every step.
 
         Raises
         ------
         InputError
-            If time does not go up, or a temperature is missing.
+            If time does not go up, or a column is missing.
         """
         if not time_s > self._last_s:
             raise InputError(f"feature stream: time {time_s} s after {self._last_s} s; it must go up")
+        if self._powered_on_s is not None and TIME_ON not in temperatures:
+            temperatures = {**temperatures, TIME_ON: time_s - self._powered_on_s}
         if self._weights is None:
             signals = {atom.signal for atom in self._features.atoms}
             self._weights = {signal: signal.weights(temperatures) for signal in signals}
@@ -101,16 +120,23 @@ class FeatureStream:
                 for signal, weights in self._weights.items()
             }
         except KeyError as error:
-            raise InputError(f"feature stream: no temperature {error} at {time_s} s") from error
+            raise InputError(f"feature stream: no column {error} at {time_s} s") from error
         self._last_s = time_s
         steps = {
             key: operator.step(time_s, signal_values[key[0]]) for key, operator in self._operators.items()
         }
         full = all(step[1] for step in steps.values())
+        settled = True
+        now = np.array([time_s])
         atoms = np.zeros((1, len(self._features.atoms)))
         for column, atom in enumerate(self._features.atoms):
             key = _operator_key(atom)
-            if key is None:
+            if atom in self._memories:
+                signal = np.array([float(signal_values[atom.signal])])
+                remembered, is_settled = self._memories[atom].push(now, signal)
+                atoms[0, column] = remembered[0]
+                settled &= bool(is_settled[0])
+            elif key is None:
                 atoms[0, column] = signal_values[atom.signal]
             elif full:
                 value = steps[key][0]
@@ -119,7 +145,7 @@ class FeatureStream:
         if self._judged:
             heeded, outside = self._features.limit(atoms, [full], linear=self._linear)
         values = self._features.compose(heeded if self._limited else atoms)
-        return StreamStep(values[0], atoms[0], full, bool(outside[0]))
+        return StreamStep(values[0], atoms[0], full, settled, bool(outside[0]))
 
 
 def _operator_key(atom: Atom) -> tuple[Signal, Window, float | None] | None:

@@ -17,13 +17,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
 from fogml.models.intervals import Intervals
 from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.score import choose
 from fogml.models.trial import Trial, fit_candidate
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import Run
 
 Progress = Callable[[int, int, str], None]
 
@@ -118,9 +119,9 @@ class AutoModel(DriftModel):
     def intervals_(self, intervals: Intervals) -> None:
         self.chosen_.intervals_ = intervals
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The chosen model's drift, fullness and distance from the trained box."""
-        return self.chosen_.evaluate_atoms(run, atoms, full)
+        return self.chosen_.evaluate_atoms(run, atoms)
 
     @property
     def feature_names(self) -> list[str]:

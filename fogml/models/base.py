@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
+from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.intervals import Intervals
@@ -32,6 +33,8 @@ class Evaluation:
         What is to be subtracted from the output [deg/h], shape (n,).
     full
         Whether every feature window was full; elsewhere the drift is the static part, shape (n,).
+    settled
+        Whether every memory had settled, shape (n,); elsewhere the drift starts from what the run tells.
     outside
         Whether the sample lies outside the trained box, shape (n,).
     measure
@@ -40,6 +43,7 @@ class Evaluation:
 
     drift: FloatArray
     full: BoolArray
+    settled: BoolArray
     outside: BoolArray
     measure: Callable[[], FloatArray]
 
@@ -53,9 +57,9 @@ class Evaluation:
 
     @property
     def flag(self) -> NDArray[np.int8]:
-        """0 good, 1 outside what the model was trained on, 2 window not full; shape (n,)."""
+        """0 good, 1 outside what the model was trained on, 2 window not full or memory not settled; (n,)."""
         flag = np.where(self.outside, np.int8(OUTSIDE), np.int8(GOOD))
-        flag[~self.full] = NOT_FULL
+        flag[~(self.full & self.settled)] = NOT_FULL
         return flag
 
 
@@ -122,20 +126,19 @@ class DriftModel(BaseEstimator, ABC):
         """Drift with window fullness and distance from the trained box, at every sample."""
         self._check_fitted()
         if self.features_ is None:
-            return self.evaluate_atoms(run, np.empty((len(run), 0)), np.ones(len(run), dtype=np.bool_))
-        return self.evaluate_atoms(run, *self.features_.atom_values(run))
+            everywhere = np.ones(len(run), dtype=np.bool_)
+            return self.evaluate_atoms(run, AtomValues(np.empty((len(run), 0)), everywhere, everywhere))
+        return self.evaluate_atoms(run, self.features_.atom_values(run))
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
-        """As `evaluate`, from the values of the features' atoms and where their windows are full.
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
+        """As `evaluate`, from the values of the features' atoms.
 
         Parameters
         ----------
         run
             A run, or a block of one.
         atoms
-            Values of the atoms of ``features_``, shape (n, a).
-        full
-            Where every window is full, shape (n,).
+            Values of the atoms of ``features_`` at the n samples.
         """
         raise NotImplementedError(f"{type(self).__name__} does not evaluate atoms")
 
@@ -170,7 +173,7 @@ class DriftModel(BaseEstimator, ABC):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Temperatures that the model needs, by their names in formulas."""
+        """Temperatures and other columns that the model needs, by their names in formulas."""
         return () if self.features_ is None else tuple(self.features_.sensors)
 
     def predict(self, run: Run) -> FloatArray:

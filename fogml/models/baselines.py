@@ -9,11 +9,12 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, row_count, usable_rows
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import FloatArray, Run
 
 
 class _ConstantModel(DriftModel):
@@ -38,11 +39,12 @@ class _ConstantModel(DriftModel):
         self.intervals_ = out_of_fold_intervals(interval_table(rows), self._out_of_fold)
         return self
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The constant at every sample; it has no windows and no box."""
         count = len(run)
         inside = np.zeros(count, dtype=np.bool_)
-        return Evaluation(np.full(count, self.bias_), full, inside, partial(np.zeros, count))
+        drift = np.full(count, self.bias_)
+        return Evaluation(drift, atoms.full, atoms.settled, inside, partial(np.zeros, count))
 
     def _bias(self, error: FloatArray) -> float:
         raise NotImplementedError

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from sklearn.base import clone
 
 from fogml.errors import InputError
+from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.stream import FeatureStream
@@ -43,7 +44,7 @@ from fogml.models.table import (
 from fogml.models.tall_least_squares import Part
 from fogml.models.threads import one_thread
 from fogml.runs.columns import coil_sensor_number
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import FloatArray, Run
 
 _EACH_SENSOR = "{sensor}"
 _PREDICTED_VALUES = 1 << 19
@@ -141,18 +142,20 @@ class FeatureModel(DriftModel):
         """What the regressor tells of its fit, for the card."""
         return list(getattr(self.regressor_, "notes_", ()))
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """The regressor's value of the features, atoms limited to the trained box."""
         linear = goes_on_linearly(self.regressor_)
-        limited, outside = self.features_.limit(atoms, full, linear=linear)
-        drift = np.empty(len(atoms))
+        values, full, settled = atoms
+        limited, outside = self.features_.limit(values, full, linear=linear)
+        drift = np.empty(len(values))
         step = max(1, _PREDICTED_VALUES // len(self.features_))
         # Products of a matrix this narrow with a vector gain nothing from threads, but wait for them.
         with one_thread("blas") if isinstance(self.regressor_, LinearRegressor) else nullcontext():
-            for start in range(0, len(atoms), step):
+            for start in range(0, len(values), step):
                 piece = slice(start, start + step)
                 drift[piece] = predict_rows(self.regressor_, self.features_.compose(limited[piece]))
-        return Evaluation(drift, full, outside, partial(distance_outside, atoms, outside, self.features_))
+        measure = partial(distance_outside, values, outside, self.features_)
+        return Evaluation(drift, full, settled, outside, measure)
 
     def stream(self, sample_s: float) -> FeatureStream:
         """The features sample by sample, limited as `evaluate` limits them.

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.signal import number_text
@@ -36,7 +37,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, row_count
 from fogml.models.tall_least_squares import Part
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import FloatArray, Run
 from fogml.runs.transitions import transition_mask
 
 _LEAST_TURN_DEG_S = 0.1
@@ -119,12 +120,13 @@ class JointModel(DriftModel):
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
         return self
 
-    def evaluate_atoms(self, run: Run, atoms: FloatArray, full: BoolArray) -> Evaluation:
+    def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
         """Drift: output as rate less the model's rate; with distance from the trained box."""
-        limited, outside = self.features_.limit(atoms, full, linear=True)
+        values, full, settled = atoms
+        limited, outside = self.features_.limit(values, full, linear=True)
         rate = self.regressor_.predict_unchecked(self._columns(np.column_stack((run.gyro, limited))))
-        measure = partial(distance_outside, atoms, outside, self.features_)
-        return Evaluation(run.gyro_deg_h - rate, full, outside, measure)
+        measure = partial(distance_outside, values, outside, self.features_)
+        return Evaluation(run.gyro_deg_h - rate, full, settled, outside, measure)
 
     def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
         """As for every model; besides, the output must be in the unit of training.
@@ -207,7 +209,7 @@ class JointModel(DriftModel):
         return ", ".join(terms)
 
     def _rows(self, run: Run) -> RunRows:
-        atoms, used = self.features_.atom_values(run)
+        atoms, used, _ = self.features_.atom_values(run)
         notes = []
         if "rate" in run.columns:
             cut = transition_mask(run)

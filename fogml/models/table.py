@@ -101,7 +101,7 @@ def run_rows(run: Run, features: Features) -> RunRows:
     run both stands and turns, rows at which the table turns: the error there is mostly the scale
     factor's, 10 ppm of 10 deg/s being 0.36 deg/h, and a drift model does not know the rate.
     """
-    atoms, full = features.atom_values(run)
+    atoms, full, _ = features.atom_values(run)
     used, notes = usable_rows(run, full)
     first, stop = _ends(used)
     if used[first:stop].all():

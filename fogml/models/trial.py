@@ -186,7 +186,7 @@ def fit_candidate(candidate: Candidate, runs: Sequence[Run], seed: int) -> Drift
 
 def _temperatures_and_rates(runs: Sequence[Run]) -> tuple[FloatArray, FloatArray]:
     """Temperature [degC] and its rate [degC/min] over all rows with full windows."""
-    rows = [atoms[full] for atoms, full in (_MOTION.atom_values(run) for run in runs)]
+    rows = [values[full] for values, full, _ in (_MOTION.atom_values(run) for run in runs)]
     temperature, rate = np.concatenate(rows).T
     return temperature, rate
 

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.signal import NOT_INPUTS, TIME_ON
+from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
@@ -57,6 +59,7 @@ def synthetic_runs(features: Features, seed: int = 0) -> list[Run]:
     """A regular run, and an irregular one with short and long gaps, long enough for the windows."""
     rng = np.random.default_rng(seed)
     windows = [atom.window.length_s for atom in features.atoms if atom.window is not None]
+    windows += [atom.memory for atom in features.atoms if atom.operator == "lag"]
     sample_s = min([length for length in windows if length > 0.0], default=16.0) / 8.0
     count = int(np.ceil(4.0 * features.window_s / sample_s)) + 400
     regular = sample_s * np.arange(count)
@@ -73,7 +76,13 @@ def _run(features: Features, name: str, time: NDArray[Any], rng: np.random.Gener
     for sensor in features.sensors:
         lag, noise = rng.uniform(0.0, 0.5), 0.01 * rng.standard_normal(len(time))
         columns[sensor] = 20.0 + 25.0 * np.sin(2.0 * np.pi * share - lag) + 5.0 * share + noise
-    return Run(name=name, columns=columns)
+    # Time since power-on comes from the facts, unless the features take it as a column.
+    columns.pop(TIME_ON, None)
+    return Run(name=name, columns=columns, facts=Facts(powered_on=float(time[0]) - 30.0))
+
+
+def _inputs(run: Run) -> tuple[str, ...]:
+    return tuple(name for name in run.columns if name not in NOT_INPUTS)
 
 
 def _same(left: FloatArray, right: FloatArray, what: str) -> None:
@@ -106,35 +115,37 @@ def _check_columns(features: Features, run: Run) -> None:
 
 def _check_causality(features: Features, run: Run) -> None:
     half = len(run) // 2
-    values, full = features.atom_values(run, run.sample_s)
-    cut_values, cut_full = features.atom_values(run[:half], run.sample_s)
+    values, full, settled = features.atom_values(run, run.sample_s)
+    cut_values, cut_full, cut_settled = features.atom_values(run[:half], run.sample_s)
+    assert np.array_equal(settled[:half], cut_settled), "whether a memory is settled depends on later samples"
     assert np.array_equal(full[:half], cut_full), "whether a window is full depends on later samples"
     _same(values[:half], cut_values, "a value depends on whether later samples exist")
     later = {
         name: np.concatenate([run.columns[name][:half], 2.0 * run.columns[name][half:] + 7.0])
-        for name in run.temperature_columns
+        for name in _inputs(run)
     }
-    changed, _ = features.atom_values(run.with_columns(**later), run.sample_s)
+    changed = features.atom_values(run.with_columns(**later), run.sample_s).values
     _same(values[:half], changed[:half], "a value depends on later samples")
 
 
 def _check_streaming(features: Features, run: Run) -> None:
-    values, full = features.atom_values(run)
-    stream = features.stream(run.sample_s)
-    names = run.temperature_columns
+    values, full, settled = features.atom_values(run)
+    stream = features.stream(run.sample_s, powered_on_s=run.facts.powered_on)
+    names = _inputs(run)
     rows = zip(*(run.columns[name].tolist() for name in ("time", *names)))
     steps = [stream.step(time, dict(zip(names, temperatures))) for time, *temperatures in rows]
     assert np.array_equal(full, [step.full for step in steps]), "streaming finds other windows full"
+    assert np.array_equal(settled, [step.settled for step in steps]), "streaming finds other memories settled"
     _same(values, np.array([step.atoms for step in steps]), "streaming and the whole run")
     composed = np.array([step.values for step in steps])
     _same(features.transform(run), composed, "streaming and the whole run, composed")
     blocks = features.blocks(run.sample_s)
     edges = [0, len(run) // 7, len(run) // 7 + 1, len(run) // 2, len(run)]
     pieces = [blocks.push(run[low:high]) for low, high in pairwise(edges)]
-    assert np.array_equal(full, np.concatenate([piece[1] for piece in pieces])), (
-        "blocks find other windows full"
-    )
-    _same(values, np.concatenate([piece[0] for piece in pieces]), "blocks and the whole run")
+    in_blocks = [np.concatenate(parts) for parts in zip(*pieces)]
+    assert np.array_equal(full, in_blocks[1]), "blocks find other windows full"
+    assert np.array_equal(settled, in_blocks[2]), "blocks find other memories settled"
+    _same(values, in_blocks[0], "blocks and the whole run")
 
 
 def _check_gap(features: Features, run: Run) -> None:
@@ -144,7 +155,7 @@ def _check_gap(features: Features, run: Run) -> None:
     half = len(run) // 2
     shift = features.window_s + 100.0 * run.sample_s
     time = np.concatenate([run.time[:half], run.time[half:] + shift])
-    values, full = features.atom_values(run.with_columns(time=time), run.sample_s)
+    values, full, _ = features.atom_values(run.with_columns(time=time), run.sample_s)
     assert not full[half], "a window is full right after a gap longer than itself"
     assert not full[0], "a window is full at the first sample"
     assert full.any(), "no window ever becomes full"
@@ -155,7 +166,7 @@ def _check_box(features: Features, runs: Sequence[Run]) -> None:
     train, test = runs[0], runs[1]
     fitted = type(features)(**features.get_params()).fit([train])
     box = dict(fitted.box)
-    values, full = fitted.atom_values(train)
+    values, full, _ = fitted.atom_values(train)
     low, high = np.array(list(box.values())).T
     assert np.array_equal(low, values[full].min(axis=0)), (
         "the box is not that of the training run's full rows"

@@ -151,7 +151,7 @@ class HeldOut:
         features = parse_features(text)
         rows = []
         for run, used in zip(self.runs, self._used, strict=True):
-            atoms, _ = features.atom_values(run)
+            atoms = features.atom_values(run).values
             rows.append(RunRows(atoms[used], run.error_deg_h[used], run.time[used]))
         return np.concatenate([part.atoms for part in averaged_rows(rows)])
 
@@ -165,5 +165,5 @@ def _rows_of_all(run: Run, space: Space) -> BoolArray:
     """Rows of a run at which every window of the space is full."""
     full = np.ones(len(run), dtype=np.bool_)
     for text in space.extreme_texts():
-        full &= parse_features(text).atom_values(run)[1]
+        full &= parse_features(text).atom_values(run).full
     return usable_rows(run, full)[0]

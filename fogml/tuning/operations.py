@@ -10,6 +10,7 @@ from fogml.features.terms import composition_plan
 from fogml.models.regressors import parameter_count
 
 _WINDOWS = {"block": 6, "slope": 10, "exp": 4, "first": 1}
+_MEMORIES = {"lag": 5, "play": 4, "since_on": 2}
 # Block: four running sums, a difference, a scale. Slope: two moments kept up. Exp: one recursion.
 
 
@@ -41,5 +42,5 @@ def operations_per_sample(features: Features, regressor: Any) -> int:
 def _of_atom(atom: Atom) -> int:
     signal = 2 * (len(atom.signal.sensors) - 1)
     if atom.window is None:
-        return signal
+        return signal + _MEMORIES.get(atom.operator, 0)
     return signal + _WINDOWS[atom.window.method] + (2 if atom.operator == "sign" else 0)

@@ -17,6 +17,7 @@ from fogml.export.export import ExportSettings, export_model
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, history
 from fogml.export.storage import FILE_DTYPES, stored_array
+from fogml.features.atoms import AtomValues
 from fogml.models.card import TrainingRun
 from fogml.models.names import make_model
 from tests.export.conftest import NAMES, training_run
@@ -30,10 +31,11 @@ def test_the_plain_form_is_the_model(model_of, name):
     model = model_of(name)
     plan, run = Plan.of(model), disturbed(3)
     if model.features_ is None:
-        atoms, full = np.empty((len(run), 0)), np.ones(len(run), dtype=bool)
+        everywhere = np.ones(len(run), dtype=bool)
+        atoms = AtomValues(np.empty((len(run), 0)), everywhere, everywhere)
     else:
-        atoms, full = model.features_.atom_values(run)
-    value, flag = plan.compensated(atoms, full, run.gyro)
+        atoms = model.features_.atom_values(run)
+    value, flag = plan.compensated(atoms, run.gyro)
     expected = model.compensate(run)
     np.testing.assert_allclose(value, expected.compensated, rtol=1e-12, atol=1e-9)
     np.testing.assert_array_equal(flag, expected.flag)
@@ -43,7 +45,7 @@ def test_the_plain_form_is_the_model(model_of, name):
 def test_histories_go_through_the_trained_box(model_of, name):
     plan = Plan.of(model_of(name))
     past = history(plan, 0)
-    _, flag = plan.compensated(*past.atoms(plan), past.gyro)
+    _, flag = plan.compensated(past.atoms(plan), past.gyro)
     assert np.mean(flag == 0) > 0.1
     assert np.any(flag == 1) and np.any(flag == 2)
 

@@ -36,7 +36,7 @@ def test_a_fit_sees_only_the_training_runs() -> None:
     before = dict(features.box)
     for test in (ramp(5.0, -80.0), ramp(-5.0, 200.0)):
         features.transform(test, limited=True)
-        features.limit(*features.atom_values(test))
+        features.limit(*features.atom_values(test)[:2])
         assert dict(features.box) == before
         assert dict(parse_features("T, dT").fit([train]).box) == before
 
@@ -87,7 +87,7 @@ def test_the_limit_is_the_identity_inside_and_levels_off_beyond(
 def test_rows_without_a_full_window_keep_the_static_part() -> None:
     features = parse_features("T, dT").fit([ramp(1.0)])
     test = ramp(1.0, start=100.0)
-    values, full = features.atom_values(test)
+    values, full, _ = features.atom_values(test)
     limited, outside = features.limit(values, full)
     assert not limited[~full, 1].any()
     high, span = features.box["T"][1], features.box["T"][1] - features.box["T"][0]
@@ -99,7 +99,7 @@ def test_rows_without_a_full_window_keep_the_static_part() -> None:
 
 def test_nothing_is_copied_or_changed_inside_the_box() -> None:
     features = parse_features("T, dT").fit([ramp(1.0)])
-    values, full = features.atom_values(ramp(1.0))
+    values, full, _ = features.atom_values(ramp(1.0))
     trained = values[full]
     assert features.limit(trained)[0] is trained
     far = np.full((3, 2), 1e6)
@@ -117,7 +117,7 @@ def test_an_atom_that_never_moved_is_outside_at_any_other_value() -> None:
 def test_streams_tell_and_limit_what_is_outside() -> None:
     features = parse_features("T, dT, T*dT").fit([ramp(1.0)])
     test = ramp(3.0)
-    values, full = features.atom_values(test)
+    values, full, _ = features.atom_values(test)
     _, outside = features.limit(values, full)
     stream = features.stream(1.0, limited=True)
     steps = [stream.step(t, {"T": v}) for t, v in zip(test.time.tolist(), test.columns["T"].tolist())]
@@ -134,7 +134,7 @@ def test_streams_refuse_wrong_input() -> None:
     assert stream.step(0.0, columns).values[0] == pytest.approx(0.0)
     with pytest.raises(InputError, match="it must go up"):
         stream.step(0.0, columns)
-    with pytest.raises(InputError, match="no temperature 'T3'"):
+    with pytest.raises(InputError, match="no column 'T3'"):
         stream.step(1.0, {"T1": 20.0, "T2": 21.0})
     with pytest.raises(InputError, match="no temperature 'T_out'"):
         parse_features("T_out").stream(1.0).step(0.0, {"T1": 20.0})

@@ -21,6 +21,10 @@ from fogml.testing import check_feature
         "dT[slope, 60 s], dT[exp, 120 s], dT[block, 30 s], diff(T), diff(T)[first]",
         "dT[first], diff(T)[slope, 20 s], diff(T)[exp, 30 s], sign(dT[exp, 200 s])",
         "d(0.5*T1+0.5*T3)*T2",
+        "T, lag(T, 600 s), lag(T_in-T_out, 100 s)*T",
+        "hysteresis(T), play(T, 0.5 degC)*dT",
+        "since_on(400 s), T*since_on(1 h), lag(T, 60 s)",
+        "power, d(power), supply^2, own_name*T, play(own_name, 2), lag(supply, 50 s)",
     ],
 )
 def test_shipped_features_keep_the_contract(text: str) -> None:
@@ -30,9 +34,9 @@ def test_shipped_features_keep_the_contract(text: str) -> None:
 class Ahead(Features):
     """Looks one sample ahead."""
 
-    def atom_values(self, run, sample_s=None):  # type: ignore[no-untyped-def]
-        values, full = super().atom_values(run, sample_s)
-        return np.roll(values, -1, axis=0), full
+    def atom_values(self, run, sample_s=None, **state):  # type: ignore[no-untyped-def]
+        found = super().atom_values(run, sample_s, **state)
+        return found._replace(values=np.roll(found.values, -1, axis=0))
 
 
 class Leaky(Features):
@@ -57,10 +61,17 @@ class Hard(Features):
 class Frozen(Features):
     """Keeps stale values where windows are not full."""
 
-    def atom_values(self, run, sample_s=None):  # type: ignore[no-untyped-def]
-        values, full = super().atom_values(run, sample_s)
-        values[~full] += 1.0
-        return values, full
+    def atom_values(self, run, sample_s=None, **state):  # type: ignore[no-untyped-def]
+        found = super().atom_values(run, sample_s, **state)
+        found.values[~found.full] += 1.0
+        return found
+
+
+class Forgetful(Features):
+    """Begins its memories anew with each block."""
+
+    def atom_values(self, run, sample_s=None, memories=None, skip=0):  # type: ignore[no-untyped-def]
+        return super().atom_values(run, sample_s, skip=skip)
 
 
 @pytest.mark.parametrize(
@@ -70,6 +81,11 @@ class Frozen(Features):
 def test_broken_builders_are_caught(broken: type[Features], message: str) -> None:
     with pytest.raises(AssertionError, match=message):
         check_feature(broken("T, dT"))
+
+
+def test_a_memory_that_ends_with_a_block_is_caught() -> None:
+    with pytest.raises(AssertionError, match="blocks"):
+        check_feature(Forgetful("T, lag(T, 600 s)"))
 
 
 def test_it_takes_features_and_text_alike() -> None:

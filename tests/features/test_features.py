@@ -58,7 +58,7 @@ def test_columns_are_the_products_of_powers(run: Run) -> None:
 def test_columns_made_in_place_are_those_of_the_atom_values(run: Run, text: str, begin: int) -> None:
     features, part = Features(text), run[begin:]
     before = {name: values.copy() for name, values in part.columns.items()}
-    values, _ = features.atom_values(part)
+    values = features.atom_values(part).values
     np.testing.assert_array_equal(features.transform(part), features.compose(values))
     for name, column in before.items():
         np.testing.assert_array_equal(part.columns[name], column)
@@ -91,7 +91,7 @@ def test_direction_has_a_dead_band(rate: float, wanted: float) -> None:
 
 def test_only_the_static_part_is_left_where_a_window_is_not_full(run: Run) -> None:
     features = parse_features("T1, T1*dT1, dT1[first], T1^2")
-    values, full = features.atom_values(run)
+    values, full, _ = features.atom_values(run)
     assert full.tolist() == [False] * 127 + [True] * (2000 - 127)
     columns = features.transform(run)
     inner = run.columns["T1"][:127]
@@ -187,8 +187,8 @@ def test_blocks_come_in_time_order(run: Run) -> None:
 def test_blocks_keep_bounded_history(run: Run) -> None:
     features = parse_features("dT1[block, 20 s]")
     blocks = features.blocks(1.0)
-    whole, _ = features.atom_values(run)
+    whole = features.atom_values(run).values
     for low in range(0, 2000, 10):
-        values, _ = blocks.push(run[low : low + 10])
+        values = blocks.push(run[low : low + 10]).values
         np.testing.assert_allclose(values, whole[low : low + 10], rtol=1e-9, atol=1e-12)
         assert blocks._history is not None and len(blocks._history) <= 43

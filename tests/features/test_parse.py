@@ -4,30 +4,37 @@ from __future__ import annotations
 
 import string
 
+import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.features.atoms import METHODS, OPERATORS, Atom, Window
+from fogml.features.atoms import METHODS, Atom, Window
 from fogml.features.features import Features
 from fogml.features.grammar import parse_terms
 from fogml.features.parse import parse_features
-from fogml.features.signal import Signal
+from fogml.features.signal import TIME_ON, Signal
 from fogml.features.terms import Term
+from fogml.runs.run import Run
 
 SENSORS = ["T", "T_in", "T_out", "T_chamber", "T_case", "T_electronics", "T1", "T2", "T12"]
 
-signals = st.dictionaries(
-    st.sampled_from(SENSORS),
-    st.sampled_from([1.0, -1.0, 0.5, -2.0, 1e-7, 3e20]) | st.floats(0.01, 100.0),
-    min_size=1,
-    max_size=3,
-).map(Signal.of)
+coefficients = st.sampled_from([1.0, -1.0, 0.5, -2.0, 1e-7, 3e20]) | st.floats(0.01, 100.0)
+temperatures = st.dictionaries(st.sampled_from(SENSORS), coefficients, min_size=1, max_size=3).map(Signal.of)
+others = st.dictionaries(
+    st.sampled_from(["detector", "light_2"]), coefficients, min_size=1, max_size=2
+) | st.sampled_from(["power", "supply", "compressor"])
+signals = temperatures | others.map(Signal.of)
 windows = st.builds(
     Window, st.sampled_from(METHODS), st.sampled_from([64.0, 60.0, 0.5]) | st.floats(1e-3, 1e6)
 )
-atoms = st.builds(Atom, st.sampled_from(OPERATORS), signals, windows)
+windowed = st.builds(Atom, st.sampled_from(["value", "diff", "d"]), signals, windows)
+directions = st.builds(Atom, st.just("sign"), temperatures, windows)
+sizes = st.sampled_from([600.0, 0.5]) | st.floats(1e-3, 1e6)
+memories = st.builds(Atom, st.sampled_from(["lag", "play"]), signals, st.none(), sizes)
+decays = st.builds(Atom, st.just("since_on"), st.just(Signal.of(TIME_ON)), st.none(), sizes)
+atoms = windowed | directions | memories | decays
 terms = st.lists(st.tuples(atoms, st.integers(1, 4)), min_size=1, max_size=3).map(lambda f: Term(tuple(f)))
 features = st.lists(terms, min_size=1, max_size=4, unique=True).map(Features.from_terms)
 
@@ -103,8 +110,20 @@ def test_any_text_parses_or_is_refused_with_a_caret_within_it(text: str) -> None
 @pytest.mark.parametrize(
     ("text", "at", "message"),
     [
-        ("T, q", 3, "unknown name 'q'"),
-        ("T, dT, T*dQ", 9, "unknown name 'dQ'"),
+        ("T, time", 3, "'time' is no input"),
+        ("T, dT, T*gyro", 9, "'gyro' is no input"),
+        ("T, power+T", 3, "different units can't be added: power [W], T [degC]"),
+        ("lag(T)", 5, "',' expected before the time constant"),
+        ("lag(T, 0 s)", 7, "more than 0"),
+        ("lag(T, 4)", 8, "unit expected"),
+        ("play(T, 4)", 9, "unit expected"),
+        ("play(T, -4 degC)", 8, "a half width above 0 expected"),
+        ("play(power, 4 degC)", 14, "'W' expected"),
+        ("play(own, 4 degC)", 12, "no unit expected"),
+        ("hysteresis(power)", 0, "not of a temperature"),
+        ("T*(hysteresis(T))", 3, "several features"),
+        ("sign(d(power))", 5, "direction of a temperature only"),
+        ("since_on(T)", 9, "length expected"),
         ("dTT", 1, "'TT' is not a temperature"),
         ("T,, dT", 2, "found ','"),
         ("T,", 2, "found the end"),
@@ -144,16 +163,47 @@ def test_errors_point_at_the_place(text: str, at: int, message: str) -> None:
     assert lines[2] == "  " + " " * at + "^"
 
 
-def test_unknown_names_list_what_is_known() -> None:
+def test_what_can_be_no_feature_lists_what_is_known() -> None:
     with pytest.raises(
-        InputError, match=r"T_in, T_out.*T1, T2.*d\(x\).*sign\(dT\).*block, slope, exp, first"
+        InputError, match=r"T_in, T_out.*T1, T2.*d\(x\).*sign\(dT\).*lag\(.*block, slope, exp, first"
     ):
-        parse_features("temperature")
+        parse_features("time")
+
+
+@pytest.mark.parametrize(
+    ("text", "at", "message"),
+    [
+        ("T, tempo", 3, "no column 'tempo'; the run holds T, power"),
+        ("T, d(pwer)", 5, "no column 'pwer'; did you mean 'power'"),
+        ("T*dT_out", 3, "no temperature 'T_out'"),
+        ("T, since_on(400 s)", 3, "state 'powered_on'"),
+    ],
+)
+def test_a_column_that_a_run_lacks_is_pointed_at(text: str, at: int, message: str) -> None:
+    columns = {"time": np.arange(300.0), "gyro": np.zeros(300), "T": np.zeros(300), "power": np.ones(300)}
+    features, run = parse_features(text), Run("a.csv", columns)
+    for use in (features.atom_values, features.transform):
+        with pytest.raises(InputError) as caught:
+            use(run)
+        lines = str(caught.value).split("\n")
+        assert lines[0].startswith("a.csv: ") and message in lines[0]
+        assert lines[1:] == [f"  {features.text}", "  " + " " * at + "^"]
+
+
+def test_hysteresis_stands_for_plays() -> None:
+    assert parse_features("hysteresis(T_in)^1..2*power").names()[:2] == [
+        "power*play(T_in, 4 degC)",
+        "power*play(T_in, 4 degC)^2",
+    ]
 
 
 def test_objects_refuse_what_text_cannot_say() -> None:
-    with pytest.raises(InputError, match="'humidity' is not a temperature"):
-        Signal.of("humidity")
+    with pytest.raises(InputError, match="'gyro' can't be an input"):
+        Signal.of("gyro")
+    with pytest.raises(InputError, match="a positive number was expected"):
+        Atom("lag", Signal.of("T"))
+    with pytest.raises(InputError, match="none was expected"):
+        Atom("value", Signal.of("T"), memory=4.0)
     with pytest.raises(InputError, match="cancel"):
         Signal((("T", 1.0), ("T", -1.0)))
     with pytest.raises(InputError, match="coefficient"):

@@ -32,7 +32,7 @@ def measured(temperature: np.ndarray, step: float, noise: float) -> Run:
 )
 def test_correlation_with_the_true_rate(text: str, noise: float, wanted: float, within: float) -> None:
     rate, temperature = steps_of_ten_degrees()
-    values, full = parse_features(text).atom_values(measured(temperature, 1.0 / 16.0, noise))
+    values, full, _ = parse_features(text).atom_values(measured(temperature, 1.0 / 16.0, noise))
     assert np.corrcoef(values[full, 0], rate[full])[0, 1] == pytest.approx(wanted, abs=within)
 
 
@@ -40,7 +40,7 @@ def test_a_first_difference_is_lost_in_noise_where_windows_are_not() -> None:
     """10 degC/h at 1 Hz is 0.0028 degC a sample; the sensor steps by 0.01 degC with 0.005 degC noise."""
     change = 10.0 / 3600.0
     run = measured(change * np.arange(20 * 3600.0), 0.01, 0.005)
-    values, full = parse_features("diff(T)[first], diff(T)").atom_values(run)
+    values, full, _ = parse_features("diff(T)[first], diff(T)").atom_values(run)
     signal, spread = values[full].mean(axis=0), values[full].std(axis=0)
     assert signal[0] == pytest.approx(change, rel=1e-3)
     assert signal[0] / spread[0] == pytest.approx(0.34, abs=0.01)

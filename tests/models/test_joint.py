@@ -91,7 +91,7 @@ def test_intercept_takes_the_static_residual_away(time_constants_s):
     # The same columns and reference without the intercept.
     rows = joint._rows(run)
     bare = LinearRegressor(fit_intercept=False).fit(joint._columns(rows.atoms), rows.y)
-    atoms, _ = joint.features_.atom_values(run)
+    atoms = joint.features_.atom_values(run).values
     without = bare.predict(joint._columns(np.column_stack((run.gyro, atoms))))
     assert 0.12 < static_residual(run, without) < 0.74
     assert scale_factor_ppm(run, without) < 1.0

@@ -22,7 +22,7 @@ def run_at(rates: tuple[float, ...], seed: int = 1, noise_seed: int = 2) -> tupl
 
 
 def rates_of(run: Run) -> tuple[np.ndarray, np.ndarray]:
-    atoms, full = parse_features("T, dT").atom_values(run)
+    atoms, full, _ = parse_features("T, dT").atom_values(run)
     return atoms[full, 1], atoms[full, 0]
 
 

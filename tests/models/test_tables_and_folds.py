@@ -23,7 +23,7 @@ def run():
 def test_rows_are_those_with_full_windows(run):
     features = parse_features(FEATURES)
     table = training_table([run], features)
-    _, full = features.atom_values(run)
+    _, full, _ = features.atom_values(run)
     np.testing.assert_array_equal(table.X, features.transform(run)[full])
     np.testing.assert_array_equal(table.y, run.error_deg_h[full])
     assert len(table) == len(run) - 127 and table.averaging_s == 0.0
