@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -14,7 +13,8 @@ from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
-from fogml.outputs import whole_folder
+from fogml.json_files import write_json
+from fogml.outputs import whole_file, whole_folder
 
 if TYPE_CHECKING:
     from fogml.gap.blind.scoring.marks_file import Marks
@@ -150,8 +150,9 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
                 settings.workers,
                 lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
             )
-    config = settings.in_full().yaml("blind make")
-    (folder.path / "make.yaml").write_text(config, encoding="utf-8")
+    config = settings.in_full().yaml("blind make", "make.yaml")
+    with whole_file(folder.path / "make.yaml") as partial:
+        partial.write_text(config, encoding="utf-8")
     terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})
     terminal.say(
         f"{settings.count} cases in {folder.cases}, {made} of them new; answer them: fogml blind run"
@@ -168,7 +169,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     if len(methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
     told = {}
-    config = settings.in_full().yaml("blind run")
+    config = settings.in_full().yaml("blind run", "run.yaml")
     for method in methods:
         plan = RunPlan(
             folder=settings.folder(),
@@ -188,7 +189,8 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
                 work.advance(doing=f"{method}: {case}")
 
             answered, failed = (run_oracle if method == ORACLE else run_cases)(plan, progress)
-        (plan.answers / "run.yaml").write_text(config, encoding="utf-8")
+        with whole_file(plan.answers / "run.yaml") as partial:
+            partial.write_text(config, encoding="utf-8")
         told[plan.name] = {"answered": answered, "failed": failed}
         terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
     terminal.result(told)
@@ -214,7 +216,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
         draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
     out = Path(settings.out) if settings.out else folder.path
     link_reports(values, [folder.path], out)
-    _write(out, values, marks, settings.in_full().yaml("blind score"))
+    _write(out, values, marks, settings.in_full().yaml("blind score", "score.yaml"))
     _tell(out, values, judged, terminal)
     return all(one["met"] for one in values["gates"])
 
@@ -230,7 +232,7 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     values = score_values(marks, Path(settings.ledger) if settings.final else None)
     out = Path(settings.out)
     link_reports(values, [Path(path).parent for path in settings.marks], out)
-    _write(out, values, marks, settings.in_full().yaml("blind merge"))
+    _write(out, values, marks, settings.in_full().yaml("blind merge", "score.yaml"))
     _tell(out, values, next(iter(marks.methods)), terminal)
 
 
@@ -238,9 +240,8 @@ def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str) -> N
     from fogml.gap.blind.scoring.marks_file import MARKS, write_marks
     from fogml.report.blind_page import blind_page
 
-    with whole_folder(out) as staging:
-        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
-        (staging / "score.json").write_text(text + "\n", encoding="utf-8")
+    with whole_folder(out, shared=True) as staging:
+        write_json(staging / "score.json", values, indent=1)
         (staging / "score.yaml").write_text(config, encoding="utf-8")
         (staging / "score.html").write_text(blind_page(values), encoding="utf-8")
         write_marks(staging / MARKS, marks)

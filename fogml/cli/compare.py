@@ -41,7 +41,7 @@ def compare(
 ) -> None:
     """Judge every model and baseline on the same split, in one table.
 
-    Writes compare.json, compare.html and config.yaml. A model that can't be fitted to these runs is
+    Writes compare.json, compare.html and compare.config.yaml. A model that can't be fitted to these runs is
     reported with its reason. Exit status 1 if the design index or a limit is stated and no model
     meets it.
     """

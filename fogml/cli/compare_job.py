@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import ClassVar
@@ -14,6 +13,7 @@ from fogml.cli.settings import LimitSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import check_settings
 from fogml.errors import InputError
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.validation.compare import Comparison, compare
 from fogml.validation.report_json import comparison_json
@@ -51,14 +51,13 @@ def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:
     with whole_folder(settings.out) as folder:
         comparison = _compare(settings, makers, terminal)
         values = comparison_json(comparison)
-        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-        (folder / "compare.json").write_text(text + "\n", encoding="utf-8")
+        write_json(folder / "compare.json", values)
         with terminal.work("drawing"):
             from fogml.report import compare_page
 
             page = compare_page(comparison.judgements, comparison.failed)
         (folder / "compare.html").write_text(page, encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("compare"), encoding="utf-8")
+        settings.write_into(folder, "compare")
     _print(comparison, terminal)
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'compare.html'}")

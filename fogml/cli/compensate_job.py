@@ -15,7 +15,6 @@ from fogml.cli.runs import open_blocks
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
-from fogml.outputs import whole_file
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -49,10 +48,12 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
         raise InputError(f"{out}: is the run itself; choose another --out")
     model = load_model(settings.model)
-    with whole_file(out.with_suffix(".config.yaml")) as config:
-        config.write_text(settings.in_full().yaml("compensate"), encoding="utf-8")
-        with terminal.work(f"compensating {settings.run}", total=_expected_rows(settings.run)) as work:
-            counts = _compensate(model, open_blocks(settings.run), out, settings.any_unit, work)
+    total = _expected_rows(settings.run)
+    with (
+        settings.written_beside(out, "compensate"),
+        terminal.work(f"compensating {settings.run}", total=total) as work,
+    ):
+        counts = _compensate(model, open_blocks(settings.run), out, settings.any_unit, work)
     _print(settings, model.kind, counts, terminal)
 
 

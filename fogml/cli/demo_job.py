@@ -41,7 +41,7 @@ def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:
 
         page = index_page(judgements, title="A chamber cycle, three axes", beside={CUBIC: cubics})
         (folder / "index.html").write_text(page, encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("demo"), encoding="utf-8")
+        settings.write_into(folder, "demo")
     _print(judgements, settings, terminal)
     terminal.result(
         {

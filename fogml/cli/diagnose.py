@@ -38,8 +38,8 @@ def diagnose(
 ) -> None:
     """Where the gap between twin and recordings lies, which effect causes it, how far it closes.
 
-    Writes gap.json, gap.html, twin.yaml (the twin with the effect added), config.yaml and, where a further
-    run would tell more, next-run.yaml (its programme, for fogml simulate).
+    Writes gap.json, gap.html, twin.yaml (the twin with the effect added), diagnose.config.yaml and, where a
+    further run would tell more, next-run.yaml (its programme, for fogml simulate).
     """
     from fogml.cli.diagnose_job import DiagnoseSettings, diagnose_and_write
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import ClassVar
 
@@ -12,6 +11,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import as_model, diagnose
 from fogml.gap.result import Diagnosis
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.twin.twin_file import load_twin, twin_names
 
@@ -69,10 +69,9 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
 def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
     from fogml.report import gap_page
 
-    text = json.dumps(found.as_dict(), indent=2, allow_nan=False, ensure_ascii=False)
-    (folder / "gap.json").write_text(text + "\n", encoding="utf-8")
+    write_json(folder / "gap.json", found.as_dict())
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
-    (folder / "config.yaml").write_text(settings.in_full().yaml("diagnose"), encoding="utf-8")
+    settings.write_into(folder, "diagnose")
     if found.separating_run is not None:
         (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 

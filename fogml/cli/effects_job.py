@@ -39,7 +39,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
         from fogml.twin.card import card_values, pictures
 
         cards = []
-        with whole_folder(out) as folder:
+        with whole_folder(out, shared=True) as folder:
             with terminal.work("drawing", total=len(found)) as work:
                 for declared in found.values():
                     work.doing(declared.id)
@@ -79,7 +79,7 @@ def _card(id: str, out: str | None, terminal: Terminal) -> None:
     declared = effect(id)
     values = card_values(declared)
     if out is not None:
-        with whole_folder(out) as folder, terminal.work("drawing"):
+        with whole_folder(out, shared=True) as folder, terminal.work("drawing"):
             from fogml.report.effect_card import effect_page
 
             drawn = pictures(declared, STANDARD_PROGRAMMES)

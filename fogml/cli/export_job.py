@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any, ClassVar
 
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import Settings, absolute
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
 
@@ -54,9 +54,8 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
         )
         with terminal.work(f"exporting {model.kind} to {settings.to}"):
             report = export_model(model, folder, wanted, train)
-        text = json.dumps(report, indent=2, ensure_ascii=False, allow_nan=False)
-        (folder / "export.json").write_text(text + "\n", encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("export"), encoding="utf-8")
+        write_json(folder / "export.json", report)
+        settings.write_into(folder, "export")
     _print(settings, report, terminal)
     terminal.result(report)
     return report

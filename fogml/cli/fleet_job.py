@@ -19,8 +19,8 @@ from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
 from fogml.fleet.tasks import DONE, Task, full_disk
+from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
-from fogml.validation.report_json import finite_json
 
 _SHOWN = 40
 
@@ -77,12 +77,11 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     values = finite_json(fleet_json(outcomes, settings.for_units()))
     page = fleet_page(values, Path(settings.manifest).name)
     try:
-        with whole_folder(settings.out) as folder:
-            text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
-            (folder / "fleet.json").write_text(text + "\n", encoding="utf-8")
+        with whole_folder(settings.out, shared=True) as folder:
+            write_json(folder / "fleet.json", values, indent=1)
             (folder / "fleet.html").write_text(page, encoding="utf-8")
             fleet_spreadsheet(values, folder / "fleet.xlsx")
-            (folder / "config.yaml").write_text(settings.in_full().yaml("fleet"), encoding="utf-8")
+            settings.write_into(folder, "fleet")
     except OSError as error:
         raise full_disk(settings.out, error) from error
     _print(values, terminal)

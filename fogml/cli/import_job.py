@@ -39,7 +39,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     if not settings.out:
         raise InputError("no --out is given; name the folder for the runs")
     written = []
-    with whole_folder(settings.out) as folder:
+    with whole_folder(settings.out, shared=True) as folder:
         with terminal.work(f"reading {settings.file}") as work:
             runs = import_recording(settings.file, settings.profile, settings.axis)
             _check_apart(settings.file, settings.out, [run.name for run in runs])
@@ -59,7 +59,7 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
                     "findings": [finding.as_dict() for finding in run.findings],
                 }
             )
-        (folder / "config.yaml").write_text(settings.in_full().yaml("import"), encoding="utf-8")
+        settings.write_into(folder, "import")
     rows = [[run.name, str(len(run)), f"{run.span_s:.6g}"] for run in runs]
     terminal.table(f"Written to {settings.out}", ["run", "rows", "span [s]"], rows)
     terminal.result({"schema": "fogml.import/1", "runs": written})

@@ -25,7 +25,7 @@ def inspect(
 ) -> None:
     """Say what is in a run: columns, span, gaps, soaks and ramps, faults.
 
-    With --out, writes inspect.json, inspect.html and config.yaml.
+    With --out, writes inspect.json, inspect.html and inspect.config.yaml.
     """
     from fogml.cli.inspect_job import InspectSettings, inspect_and_write
 

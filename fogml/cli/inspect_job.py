@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,6 +9,7 @@ from fogml.cli.runs import open_runs
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
@@ -35,13 +35,12 @@ def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
     else:
         with whole_folder(settings.out) as folder:
             runs, values = _inspect(settings, terminal)
-            text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-            (folder / "inspect.json").write_text(text + "\n", encoding="utf-8")
+            write_json(folder / "inspect.json", values)
             with terminal.work("drawing"):
                 from fogml.report import inspect_page
 
                 (folder / "inspect.html").write_text(inspect_page(runs), encoding="utf-8")
-            (folder / "config.yaml").write_text(settings.in_full().yaml("inspect"), encoding="utf-8")
+            settings.write_into(folder, "inspect")
     for run in values["runs"]:
         _print(run, terminal)
     terminal.result(values)

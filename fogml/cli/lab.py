@@ -52,7 +52,7 @@ def misalignment(
 
     In state 2 the gyro is turned clockwise in its mounting plane, seen from +z, by 180 deg, for state 3 by 90
     deg more, for state 4 by 180 deg more; other turns are stated. Turns the data contradict are an error.
-    With --out, writes misalignment.json, misalignment.html and config.yaml.
+    With --out, writes misalignment.json, misalignment.html and lab-misalignment.config.yaml.
     """
     from fogml.cli.lab_misalignment_job import MisalignmentSettings, misalignment_and_write
 
@@ -130,7 +130,7 @@ def north(
     """North from several positions, and what a drift does to it: the error, and where it is nothing.
 
     Either from a recorded run (--positions) or simulated (--azimuth and --latitude). With --out, writes
-    north.json, north.html and config.yaml.
+    north.json, north.html and lab-north.config.yaml.
     """
     from fogml.cli.lab_north_job import NorthSettings, north_and_write
 

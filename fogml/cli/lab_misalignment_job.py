@@ -10,9 +10,9 @@ from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.settings import Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import finite_json
 from fogml.lab.misalignment_input import read_measurements
 from fogml.lab.misalignment_json import misalignment_json
-from fogml.validation.report_json import finite_json
 
 
 class MisalignmentSettings(Settings):

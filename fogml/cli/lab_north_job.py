@@ -11,9 +11,9 @@ from fogml.cli.runs import open_run
 from fogml.cli.settings import Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import finite_json
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
-from fogml.validation.report_json import finite_json
 
 _COLUMNS = ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "se")
 WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
 
@@ -20,16 +20,15 @@ def tell(
     out: str | None,
     terminal: Terminal,
 ) -> dict[str, Any]:
-    """Make the values and, where a folder is named, write ``name.json``, ``name.html``, ``config.yaml``."""
+    """Make the values and, where a folder is named, write ``name.json``, ``name.html`` and the settings."""
     if out is None:
         return make()
     with whole_folder(out) as folder:
         values = make()
-        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-        (folder / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        write_json(folder / f"{name}.json", values)
         with terminal.work("drawing"):
             (folder / f"{name}.html").write_text(page(values), encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.yaml(f"lab {name}"), encoding="utf-8")
+        settings.write_into(folder, f"lab {name}")
     return values
 
 

@@ -1,12 +1,14 @@
 """The command line ``fogml``: finds the command, runs it, and turns errors into exit statuses.
 
 Command modules load on use, so that ``fogml --help`` stays quick. Exit 0: done. 1: done, and a
-stated limit was not met. 2: bad input or usage. 130: interrupted.
+stated limit was not met. 2: bad input or usage. 3: an error that nobody expected, told in a report
+file. 130, 143: interrupted, terminated.
 """
 
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from importlib import import_module
 from typing import Annotated, Any
 
@@ -17,6 +19,7 @@ from fogml import __version__
 from fogml.errors import FogmlError
 from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
+from fogml.processes import end_as_interrupted, quiet_libraries
 
 COMMANDS = {
     "demo": ("fogml.cli.demo", "Train and judge on a real recording that ships, then say what to open."),
@@ -48,7 +51,7 @@ COMMANDS = {
 }
 """Name of each command: its module, and its help in one line."""
 
-DONE, LIMIT_NOT_MET, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, LIMIT_NOT_MET, BAD_INPUT, UNEXPECTED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
 class LazyGroup(TyperGroup):
@@ -78,6 +81,16 @@ class LazyGroup(TyperGroup):
             fail(f"no such command '{args[0]}'.{hint}")
         return super().resolve_command(ctx, args)
 
+    def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
+        """As click's, with the last net: what nobody expected is one line, and not the status of a limit."""
+        try:
+            return super().main(args, *more, **named)
+        except Exception as error:
+            from fogml.cli.unexpected import report_unexpected
+
+            typer.echo(report_unexpected(error, sys.argv[1:] if args is None else args), err=True)
+            sys.exit(UNEXPECTED)
+
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
@@ -89,11 +102,11 @@ class LazyGroup(TyperGroup):
             fail(_system_message(error))
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as interrupt:
             # Jobs of many units keep those that were finished, and go on from there.
             told = "what is finished is kept, nothing is half written; run the same command again"
             typer.echo(f"fogml: interrupted: {told}", err=True)
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(getattr(interrupt, "status", INTERRUPTED)) from None
 
 
 def fail(message: str) -> None:
@@ -136,8 +149,10 @@ def fogml(
 
 def main() -> None:
     """Entry point of the program ``fogml``."""
+    end_as_interrupted()
+    quiet_libraries()
     for stream in (sys.stdout, sys.stderr):
-        # A terminal that can't show a character must not end a long job.
+        # A terminal that can't show a character must not end a long job; a file's name need not be text.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
     app(prog_name="fogml")

@@ -29,7 +29,7 @@ def noise(
 ) -> None:
     """Allan deviation and the IEEE 952 noise terms with intervals.
 
-    With --out, writes noise.json, noise.html and config.yaml.
+    With --out, writes noise.json, noise.html and noise.config.yaml.
     """
     from fogml.cli.noise_job import NoiseSettings, noise_and_write
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -10,9 +9,9 @@ from fogml.cli.runs import open_run
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.noise_of_run import noise_report
-from fogml.validation.report_json import finite_json
 
 
 class NoiseSettings(Settings):
@@ -34,13 +33,12 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
     else:
         with whole_folder(settings.out) as folder:
             values = _noise(settings.run, settings, terminal)
-            text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-            (folder / "noise.json").write_text(text + "\n", encoding="utf-8")
+            write_json(folder / "noise.json", values)
             with terminal.work("drawing"):
                 from fogml.report import noise_page
 
                 (folder / "noise.html").write_text(noise_page(values), encoding="utf-8")
-            (folder / "config.yaml").write_text(settings.in_full().yaml("noise"), encoding="utf-8")
+            settings.write_into(folder, "noise")
     _print(values, terminal)
     terminal.result(values)
     if settings.out is not None:

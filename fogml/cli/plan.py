@@ -77,7 +77,7 @@ def plan(
     """Programmes that make wanted parameters identifiable, with expected standard errors.
 
     Searches rates, limits, soaks, a minor loop, table rates, power steps, fan and yaw. Writes
-    programme.yaml for fogml simulate, plan.json, plan.html and config.yaml.
+    programme.yaml for fogml simulate, plan.json, plan.html and plan.config.yaml.
     """
     from fogml.cli.plan_job import PlanSettings, plan_and_write
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -13,6 +12,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.gap.plan import plan_runs
 from fogml.gap.plan_json import plan_values, programme_file, simulation_file
 from fogml.gap.plan_result import Plan
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.simulate import DEFAULT_FACTS
@@ -94,10 +94,9 @@ def _write(folder: Path, settings: PlanSettings, plan: Plan, values: dict[str, A
         (folder / programme_file(place)).write_text(run.programme.as_yaml(), encoding="utf-8")
         simulation = _simulation(place, full.twin, run.facts)
         (folder / simulation_file(place)).write_text(simulation, encoding="utf-8")
-    text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-    (folder / "plan.json").write_text(text + "\n", encoding="utf-8")
+    write_json(folder / "plan.json", values)
     (folder / "plan.html").write_text(plan_page(values), encoding="utf-8")
-    (folder / "config.yaml").write_text(full.yaml("plan"), encoding="utf-8")
+    full.write_into(folder, "plan")
 
 
 def _simulation(place: int, twin: str, facts: Facts) -> str:

@@ -11,7 +11,6 @@ from fogml.cli.runs import open_run
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
-from fogml.outputs import whole_file
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.writing import BlockWriter, header_cells
 from fogml.twin.replay import replay
@@ -54,8 +53,7 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
         work.doing("replaying")
         replayed = replay(twin, run, only=settings.only, truth=truth)
         work.doing(f"writing {out.name}")
-        with whole_file(out.with_suffix(".config.yaml")) as config:
-            config.write_text(settings.in_full().yaml("replay"), encoding="utf-8")
+        with settings.written_beside(out, "replay"):
             _write(run, replayed, out)
     _print(settings, twin, run, replayed, terminal)
 

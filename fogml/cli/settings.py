@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -11,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from fogml import __version__
 from fogml.errors import InputError, quoted
+from fogml.outputs import sole_writer, whole_file
 from fogml.yaml_text import parse_yaml, read_yaml, yaml_text
 
 SHIPPED = "shipped:"
@@ -25,6 +27,8 @@ class Settings(BaseModel):
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ("out",)
     """Settings that name files or folders to write."""
+    config_option: ClassVar[str] = "--config "
+    """What stands before a configuration file on the command line."""
     seed: int = Field(0, ge=0)
 
     @classmethod
@@ -62,10 +66,47 @@ class Settings(BaseModel):
         """Whether a value of a path's setting names something that ships rather than a file."""
         return value.startswith(SHIPPED)
 
-    def yaml(self, command: str) -> str:
-        """The settings in full as the text of a configuration file."""
-        head = f"# fogml {__version__}: run it again with  fogml {command} --config config.yaml\n"
-        return head + yaml_text(self.model_dump(mode="json"))
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file."""
+        return self.model_dump(mode="json")
+
+    def yaml(self, command: str, name: str | None = None) -> str:
+        """The settings as the text of a configuration file.
+
+        Parameters
+        ----------
+        command
+            What takes it.
+        name
+            Name of the file; that of `config_file` if None.
+        """
+        again = f"fogml {command} {self.config_option}{name or config_file(command)}"
+        head = f"# fogml {__version__}: run it again with  {again}\n"
+        return head + yaml_text(self.as_written())
+
+    def write_into(self, folder: Path, command: str) -> None:
+        """Write the settings in full into a folder of results, named after the command."""
+        text = self.in_full().yaml(command)
+        (folder / config_file(command)).write_text(text, encoding="utf-8")
+
+    @contextmanager
+    def written_beside(self, out: Path, command: str) -> Iterator[None]:
+        """Write a file in the block, and then the settings in full beside it, named after file and command.
+
+        Raises
+        ------
+        InputError
+            If another process writes the file.
+        """
+        name = f"{out.stem}.{config_file(command)}"
+        with sole_writer(out), whole_file(out.with_name(name)) as config:
+            config.write_text(self.in_full().yaml(command, name), encoding="utf-8")
+            yield
+
+
+def config_file(command: str) -> str:
+    """Name of the file that a command's settings are written to: two commands may share a folder."""
+    return f"{command.replace(' ', '-')}.config.yaml"
 
 
 class LimitSettings(Settings):

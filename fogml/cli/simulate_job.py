@@ -7,18 +7,15 @@ from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
-from fogml import __version__
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
-from fogml.outputs import whole_file
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.programme import Programme, load_programme, programme_names
 from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file
 from fogml.twin.timeline import timeline
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
-from fogml.yaml_text import yaml_text
 
 
 class SimulateSettings(Settings):
@@ -26,6 +23,7 @@ class SimulateSettings(Settings):
 
     path_keys: ClassVar[tuple[str, ...]] = ("programme", "twin")
     written_keys: ClassVar[tuple[str, ...]] = ("out", "truth")
+    config_option: ClassVar[str] = ""
     schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
     sample_s: float = 1.0
     programme: str | list[Any] | dict[str, Any] | None = None
@@ -40,11 +38,9 @@ class SimulateSettings(Settings):
         known = {"programme": programme_names, "twin": twin_names}.get(key, tuple)()
         return super()._ships(key, value) or value in known or isinstance(getattr(self, key), list)
 
-    def yaml(self, command: str) -> str:
-        """The settings in full as the text of a configuration file."""
-        head = f"# fogml {__version__}: run it again with  fogml {command} config.yaml\n"
-        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
-        return head + yaml_text(values)
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file."""
+        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
 
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
@@ -58,8 +54,7 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
         raise InputError(f"{out}: is the run and the truth; choose another --truth")
     programme, twin = load_programme(settings.programme), load_twin(settings.twin)
     facts = DEFAULT_FACTS if settings.facts is None else facts_from(settings.facts, "facts")
-    with whole_file(out.with_suffix(".config.yaml")) as config:
-        config.write_text(settings.in_full().yaml("simulate"), encoding="utf-8")
+    with settings.written_beside(out, "simulate"):
         rows = _simulate(settings, programme, twin, facts, out, terminal)
     _print(settings, programme, twin, rows, terminal)
 

@@ -43,7 +43,7 @@ def sweep(
 
     The same command goes on with a study that was interrupted, and with --storage joins it from
     another machine. Writes best.yaml (a configuration of fogml train), sweep.json, sweep.html and
-    config.yaml; the study itself is kept in --out unless --storage names a database.
+    sweep.config.yaml; the study itself is kept in --out unless --storage names a database.
     """
     from fogml.cli.sweep_job import SweepSettings, sweep_and_write
     from fogml.errors import InputError

@@ -2,23 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from fogml import __version__
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.tuning.plan import OBJECTIVES, Plan
 from fogml.tuning.space import Space
-from fogml.yaml_text import parse_yaml, yaml_text
+from fogml.yaml_text import parse_yaml
 
 if TYPE_CHECKING:
     import optuna
@@ -30,6 +29,7 @@ class SweepSettings(Settings):
     """Settings of ``fogml sweep``: a file of schema ``fogml.sweep/1``."""
 
     path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
+    config_option: ClassVar[str] = ""
     schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
     name: str = "sweep"
     runs: list[str] = []
@@ -69,15 +69,12 @@ class SweepSettings(Settings):
             reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
             raise ValueError(f"{place}: {reason}" if place else reason) from None
 
-    def yaml(self, command: str) -> str:
-        """The settings in full as the text of a configuration file; a password is never written."""
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file; a password is never written."""
         from fogml.tuning.storage import without_password
 
-        head = f"# fogml {__version__}: run it again with  fogml {command} config.yaml\n"
         values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
-        if self.storage is not None:
-            values["storage"] = without_password(self.storage)
-        return head + yaml_text(values)
+        return values if self.storage is None else {**values, "storage": without_password(self.storage)}
 
     def plan(self, runs: list[Run]) -> Plan:
         """What workers are told."""
@@ -125,7 +122,7 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
             settings.workers,
             lambda done, what: work.reached(done, settings.trials, f"tried {what}"),
         )
-    with whole_folder(settings.out) as folder:
+    with whole_folder(settings.out, shared=True) as folder:
         best = best_settings(settings, study)
         judgement = _judge(settings, best, runs, test_runs, terminal)
         values = study_json(
@@ -138,10 +135,9 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
             storage=settings.storage,
             judgement=judgement,
         )
-        text = json.dumps(values, indent=2, allow_nan=False, ensure_ascii=False)
-        (folder / "sweep.json").write_text(text + "\n", encoding="utf-8")
+        write_json(folder / "sweep.json", values)
         (folder / "best.yaml").write_text(best, encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("sweep"), encoding="utf-8")
+        settings.write_into(folder, "sweep")
         with terminal.work("drawing"):
             page = sweep_page(values, judgement)
         (folder / "sweep.html").write_text(page, encoding="utf-8")
@@ -165,7 +161,7 @@ def best_settings(settings: SweepSettings, study: optuna.Study) -> str:
         out=str(Path(settings.out) / "best"),
         **train_settings(chosen),
     )
-    return train.in_full().yaml("train").replace("config.yaml", "best.yaml")
+    return train.in_full().yaml("train", "best.yaml")
 
 
 def _judge(

@@ -48,7 +48,7 @@ def train(
 ) -> None:
     """Fit a drift model on some runs and judge it on others.
 
-    Writes model/, report.json, report.html, report.xlsx and config.yaml; certificate.html where
+    Writes model/, report.json, report.html, report.xlsx and train.config.yaml; certificate.html where
     limits are given. Exit status 1 if the design index or a limit is not met.
     """
     from fogml.cli.train_job import TrainSettings, train_and_write

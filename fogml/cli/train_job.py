@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -12,11 +11,12 @@ from fogml.cli.runs import open_runs
 from fogml.cli.settings import LimitSettings, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
+from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.validation.judge import judge
 from fogml.validation.limits import check_design_index, check_limits
-from fogml.validation.report_json import finite_json, judgement_json
+from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement
 from fogml.validation.strict import hold_strict
 from fogml.validation.turn_on import check_turn_on_band
@@ -172,13 +172,12 @@ def write_results(
     with terminal.work("writing"):
         save_model(model, folder / "model")
         report = _report(settings, judgement)
-        text = json.dumps(report, indent=2, allow_nan=False, ensure_ascii=False)
-        (folder / "report.json").write_text(text + "\n", encoding="utf-8")
+        write_json(folder / "report.json", report)
         (folder / "report.html").write_text(train_page(judgement, report.get("navigation")), encoding="utf-8")
         spreadsheet(judgement, folder / "report.xlsx")
         if judgement.limits or judgement.design_index:
             (folder / "certificate.html").write_text(certificate(judgement), encoding="utf-8")
-        (folder / "config.yaml").write_text(settings.in_full().yaml("train"), encoding="utf-8")
+        settings.write_into(folder, "train")
 
 
 def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:

@@ -5,17 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError
 from fogml.fleet.tasks import Task, finished, lost, run_task
+from fogml.outputs import settle
+from fogml.processes import worker_pool
 
 Outcome = dict[str, Any]
 Progress = Callable[[Outcome], None]
 _ANSWER_S = 10
 _BROKEN_POOLS = 2
 # Pools that may break before units are run one by one, to find the one that breaks them.
-_THREADS = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
 
 
 def run_tasks(
@@ -76,10 +78,9 @@ def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Out
     left = {task.unit.folder: task for task in tasks}
 
     def run(some: Sequence[Task], processes: int) -> bool:
-        from joblib.externals.loky import ProcessPoolExecutor
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
-        with ProcessPoolExecutor(max_workers=processes, env=_THREADS) as pool:
+        with worker_pool(processes) as pool:
             futures = {pool.submit(run_task, task): task for task in some}
             try:
                 for future in as_completed(futures):
@@ -93,19 +94,22 @@ def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Out
                 # What others are writing comes to its end: killed, they would leave it half-written.
                 for future in futures:
                     future.cancel()
-                raise
-            except BaseException:
-                pool.shutdown(wait=True, kill_workers=True)
+                pool.shutdown(wait=True)
                 raise
         return True
 
-    for _ in range(_BROKEN_POOLS):
-        if not left or run(list(left.values()), workers):
-            return
-    for task in list(left.values()):
-        if not run([task], 1):
-            del left[task.unit.folder]
-            keep(task, lost(task, "ended its process: out of memory, or killed"))
+    try:
+        for _ in range(_BROKEN_POOLS):
+            if not left or run(list(left.values()), workers):
+                return
+        for task in list(left.values()):
+            if not run([task], 1):
+                del left[task.unit.folder]
+                keep(task, lost(task, "ended its process: out of memory, or killed"))
+    finally:
+        # What workers that were ended had begun to write.
+        for place in {Path(task.home) for task in tasks} | {task.folder for task in tasks}:
+            settle(place)
 
 
 def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outcome], None]) -> None:

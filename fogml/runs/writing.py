@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fogml.errors import InputError
-from fogml.outputs import whole_file
+from fogml.outputs import whole_file, whole_files
 from fogml.runs.columns import header
 from fogml.runs.facts import SIDE_SUFFIXES, Facts, read_side_file, side_file, side_file_text
 from fogml.runs.raw_table import FACTS_KEY
@@ -164,13 +164,14 @@ class BlockWriter:
 
 @contextmanager
 def _with_side_file(path: Path, facts: Facts | None) -> Iterator[Path]:
-    """A partial file for `path`; the side file, where one is needed, appears just before it."""
-    with ExitStack() as stack:
-        partial = stack.enter_context(whole_file(path))
-        if facts is not None:
-            side = check_side_file(path, facts)
-            if side is not None:
-                stack.enter_context(whole_file(side)).write_text(side_file_text(facts), encoding="utf-8")
+    """A partial file for `path`; the side file, where one is needed, appears with it."""
+    side = None if facts is None else check_side_file(path, facts)
+    if facts is None or side is None:
+        with whole_file(path) as partial:
+            yield partial
+        return
+    with whole_files(path, side) as (partial, beside):
+        beside.write_text(side_file_text(facts), encoding="utf-8")
         yield partial
 
 

@@ -11,39 +11,7 @@ from typing import Any
 
 from optuna.storages.journal import JournalFileBackend, JournalFileOpenLock
 
-try:
-    import fcntl
-except ImportError:  # not a POSIX system
-    fcntl = None  # type: ignore[assignment]
-
-
-class FileLock:
-    """A lock that the system takes back from a process that ends, however it ends.
-
-    Optuna's own locks are files that a killed process leaves behind.
-
-    Parameters
-    ----------
-    path
-        File that is locked, made if it is missing.
-    """
-
-    def __init__(self, path: str) -> None:
-        self._path = path
-        self._held: int | None = None
-
-    def acquire(self) -> bool:
-        """Wait for the lock."""
-        handle = os.open(self._path, os.O_RDWR | os.O_CREAT, 0o666)
-        fcntl.flock(handle, fcntl.LOCK_EX)
-        self._held = handle
-        return True
-
-    def release(self) -> None:
-        """Give it back."""
-        if self._held is not None:
-            os.close(self._held)
-            self._held = None
+from fogml.locks import ARE_KNOWN, FileLock
 
 
 class WholeLines(JournalFileBackend):
@@ -55,10 +23,11 @@ class WholeLines(JournalFileBackend):
 
     def __init__(self, file_path: str) -> None:
         path = Path(file_path)
-        if fcntl is None:
+        if not ARE_KNOWN:
+            # Optuna's own locks are files that a killed process leaves behind.
             lock: Any = JournalFileOpenLock(file_path)
         else:
-            lock = FileLock(str(path.with_name(f".{path.name}.lock")))
+            lock = FileLock(path.with_name(f".{path.name}.lock"))
         self._journal, self._guard = path, lock
         super().__init__(file_path, lock_obj=lock)
 

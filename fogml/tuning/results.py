@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fogml.json_files import finite_json
 from fogml.tuning.plan import OBJECTIVES
 from fogml.tuning.storage import shown
 from fogml.tuning.study import is_finished
 from fogml.tuning.winner import command_line, figure, importance, pareto, winner
-from fogml.validation.report_json import finite_json, judgement_json
+from fogml.validation.report_json import judgement_json
 
 if TYPE_CHECKING:
     import optuna

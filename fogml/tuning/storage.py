@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 import warnings
 import weakref
@@ -182,25 +181,3 @@ def _closing(storage: Any) -> BaseStorage:
     """The storage, its connections closed once nobody holds it any more."""
     weakref.finalize(storage, storage.engine.dispose)
     return cast("BaseStorage", storage)
-
-
-def process_is_alive(pid: int, started: str) -> bool:
-    """Whether a process of this machine still runs, and is the one that was meant."""
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        pass
-    return process_start(pid) == started
-
-
-def process_start(pid: int) -> str:
-    """What tells a process from a later one of the same number; empty where the system does not say."""
-    try:
-        fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii", errors="replace").rpartition(")")[2]
-    except OSError:
-        return ""
-    state, *rest = fields.split()
-    # A process that has ended but was not waited for runs no trial.
-    return "ended" if state == "Z" else rest[18]

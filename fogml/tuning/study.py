@@ -11,9 +11,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError
+from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
-from fogml.tuning.storage import import_optuna, open_storage, process_is_alive, process_start, shown
+from fogml.tuning.storage import import_optuna, open_storage, shown
 
 if TYPE_CHECKING:
     import optuna

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import os
 import time
 from collections.abc import Callable
 from multiprocessing.connection import Connection
@@ -10,6 +11,7 @@ from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
 
 from fogml.errors import FogmlError, InputError
+from fogml.processes import begin_worker
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.plan import Plan
 from fogml.tuning.storage import storage_errors
@@ -73,8 +75,9 @@ def _work_alone(study: optuna.Study, plan: Plan, held_out: HeldOut, progress: Pr
         work(study, plan, held_out, progress)
 
 
-def _worker_process(plan: Plan, told: Connection) -> None:
+def _worker_process(plan: Plan, told: Connection, parent: int) -> None:
     """What a worker's process does; bad input is told to the one that started it."""
+    begin_worker(parent)
     try:
         with storage_errors(plan.storage):
             _work_alone(open_study(plan), plan, _held_out(plan), None)
@@ -105,7 +108,7 @@ class _Crew:
                 self._members = [member for old in self._members for member in self._look_after(old)]
         finally:
             for process, _ in self._members:
-                process.terminate()
+                process.kill()
                 process.join()
 
     def _count(self) -> None:
@@ -136,7 +139,9 @@ class _Crew:
 
     def _start(self) -> tuple[BaseProcess, Connection]:
         receiver, sender = self._context.Pipe(duplex=False)
-        process = self._context.Process(target=_worker_process, args=(self._plan, sender), daemon=True)
+        process = self._context.Process(
+            target=_worker_process, args=(self._plan, sender, os.getpid()), daemon=True
+        )
         process.start()
         sender.close()
         return process, receiver

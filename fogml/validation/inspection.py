@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from fogml.json_files import finite_json
 from fogml.runs.columns import column_spec
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
-from fogml.validation.report_json import finite_json
 
 INSPECT_SCHEMA = "fogml.inspect/1"
 RATE_WINDOW_S = 60.0

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
+from fogml.json_files import finite_json
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
 
 if TYPE_CHECKING:
@@ -88,16 +88,3 @@ def _metrics(metrics: Metrics) -> dict[str, float]:
 
 def _limit(outcome: LimitOutcome) -> dict[str, Any]:
     return asdict(outcome)
-
-
-def finite_json(value: Any) -> Any:
-    """The value with numpy's scalars and arrays as Python's, tuples as lists, NaN and infinities as None."""
-    if isinstance(value, dict):
-        return {str(key): finite_json(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [finite_json(item) for item in value]
-    if hasattr(value, "tolist"):
-        return finite_json(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

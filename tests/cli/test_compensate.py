@@ -62,7 +62,7 @@ def test_the_configuration_gives_the_same_file(invoke, model, run_files, tmp_pat
     out = tmp_path / "out.csv"
     invoke("compensate", run_files[1], "--model", model, "-o", out)
     first = out.read_bytes()
-    config = tmp_path / "out.config.yaml"
+    config = tmp_path / "out.compensate.config.yaml"
     assert yaml.safe_load(config.read_text())["model"] == str(model)
     out.unlink()
     invoke("compensate", "--config", config)

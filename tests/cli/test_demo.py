@@ -25,9 +25,10 @@ def names(folder):
 
 def test_writes_three_axes_as_train_does(demo):
     out, _ = demo
-    assert names(out) == {"x", "y", "z", "index.html", "config.yaml"}
+    assert names(out) == {"x", "y", "z", "index.html", "demo.config.yaml"}
     for axis in "xyz":
-        assert names(out / axis) == {"model", "report.json", "report.html", "report.xlsx", "config.yaml"}
+        reports = {"report.json", "report.html", "report.xlsx"}
+        assert names(out / axis) == {"model", "train.config.yaml", *reports}
         (judged,) = json.loads((out / axis / "report.json").read_text())["test"]
         assert (judged["run"], judged["axis"]) == (f"thermal-cycle-3-{axis}", axis)
 
@@ -48,6 +49,6 @@ def test_says_what_to_open_and_what_the_unit_is(demo):
 
 
 def test_an_axis_is_trained_again_from_its_configuration(demo, invoke_json, tmp_path):
-    config = demo[0] / "y" / "config.yaml"
+    config = demo[0] / "y" / "train.config.yaml"
     again = invoke_json("train", "--config", config, "-o", tmp_path / "again")
     assert again == json.loads((demo[0] / "y" / "report.json").read_text())

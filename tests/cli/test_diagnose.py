@@ -79,7 +79,7 @@ def gap(diagnosed) -> dict:
 
 def test_what_is_written(diagnosed):
     written = sorted(path.name for path in diagnosed.iterdir())
-    assert written == ["config.yaml", "gap.html", "gap.json", "next-run.yaml", "twin.yaml"]
+    assert written == ["diagnose.config.yaml", "gap.html", "gap.json", "next-run.yaml", "twin.yaml"]
     assert re.search("<h1>(Explained|Ambiguous)", (diagnosed / "gap.html").read_text(encoding="utf-8"))
 
 
@@ -173,10 +173,10 @@ def test_the_written_twin_replays_to_the_figures_after(diagnosed, gap, runs, tmp
 
 
 def test_the_written_settings_repeat_the_diagnosis(diagnosed, tmp_path, invoke):
-    settings = yaml.safe_load((diagnosed / "config.yaml").read_text())
+    settings = yaml.safe_load((diagnosed / "diagnose.config.yaml").read_text())
     assert settings["twin"] == "nominal" and len(settings["runs"]) == 2
     out = tmp_path / "again"
-    invoke("diagnose", "--config", diagnosed / "config.yaml", "--out", out)
+    invoke("diagnose", "--config", diagnosed / "diagnose.config.yaml", "--out", out)
     assert (out / "gap.json").read_bytes() == (diagnosed / "gap.json").read_bytes()
 
 

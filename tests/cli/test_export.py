@@ -38,9 +38,9 @@ def test_the_configuration_gives_the_same_files(invoke, model, tmp_path):
     out = tmp_path / "firmware"
     invoke("export", model, "--dtype", "q31", "--bytes", "400", "-o", out)
     first = {path.name: path.read_bytes() for path in out.iterdir()}
-    assert yaml.safe_load((out / "config.yaml").read_text())["bytes"] == 400
+    assert yaml.safe_load((out / "export.config.yaml").read_text())["bytes"] == 400
     again = tmp_path / "again.yaml"
-    shutil.move(out / "config.yaml", again)
+    shutil.move(out / "export.config.yaml", again)
     invoke("export", "--config", again)
     assert {path.name: path.read_bytes() for path in out.iterdir()} == first
 

@@ -62,9 +62,10 @@ def test_misalignment(turns: Path, tmp_path: Path, invoke, invoke_json) -> None:
     out = tmp_path / "out"
     printed = invoke("lab", "misalignment", turns, "--out", out).stdout
     assert "four states" in printed and "misalignment.html" in printed
-    assert sorted(p.name for p in out.iterdir()) == ["config.yaml", "misalignment.html", "misalignment.json"]
+    files = ["lab-misalignment.config.yaml", "misalignment.html", "misalignment.json"]
+    assert sorted(p.name for p in out.iterdir()) == files
     assert json.loads((out / "misalignment.json").read_text()) == told
-    assert invoke_json("lab", "misalignment", "--config", out / "config.yaml") == told
+    assert invoke_json("lab", "misalignment", "--config", out / "lab-misalignment.config.yaml") == told
 
 
 def test_misalignment_without_constant(turns: Path, invoke_json) -> None:
@@ -80,7 +81,7 @@ def test_north_of_a_recording(positions: Path, tmp_path: Path, invoke, invoke_js
     assert told["quiet_azimuth_deg"] == pytest.approx([135.0, 315.0])
     out = tmp_path / "north"
     assert "azimuth 77.0" in invoke("lab", "north", "--positions", positions, "-o", out).stdout
-    assert sorted(p.name for p in out.iterdir()) == ["config.yaml", "north.html", "north.json"]
+    assert sorted(p.name for p in out.iterdir()) == ["lab-north.config.yaml", "north.html", "north.json"]
 
 
 def test_north_simulated(tmp_path: Path, invoke, invoke_json) -> None:
@@ -100,8 +101,9 @@ def test_north_simulated(tmp_path: Path, invoke, invoke_json) -> None:
     more = ("--transient", "0.2,600", "--transient", "0.1,120", "--noise", 0.002, "--way", "coarse-fine")
     first = invoke_json("lab", "north", *asked, *more, "-o", out)
     assert first["se"] > 0.0 and first["way"] == "coarse-fine"
-    assert yaml.safe_load((out / "config.yaml").read_text())["transients"] == [[0.2, 600.0], [0.1, 120.0]]
-    assert invoke_json("lab", "north", "--config", out / "config.yaml") == first
+    config = out / "lab-north.config.yaml"
+    assert yaml.safe_load(config.read_text())["transients"] == [[0.2, 600.0], [0.1, 120.0]]
+    assert invoke_json("lab", "north", "--config", config) == first
 
 
 def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:

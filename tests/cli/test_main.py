@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import signal
 import subprocess
 import sys
 from importlib import import_module
@@ -15,6 +16,7 @@ from typer.testing import CliRunner
 import fogml
 from fogml.cli import main
 from fogml.errors import InputError
+from fogml.processes import Terminated
 
 runner = CliRunner()
 
@@ -121,13 +123,48 @@ def test_an_interrupt_is_status_130(monkeypatch):
     assert runner.invoke(main.app, ["train"]).exit_code == 130
 
 
-def test_a_defect_is_not_hidden(monkeypatch):
-    def action():
+@pytest.mark.parametrize(
+    ("error", "told"),
+    [
+        (AssertionError("a defect"), "AssertionError: a defect"),
+        (TypeError("x" * 500 + "\nsecond line"), "TypeError: xxx"),
+        (RecursionError("too deep"), "RecursionError: too deep"),
+        (UnicodeEncodeError("utf-8", "\udcff", 0, 1, "surrogates not allowed"), "UnicodeEncodeError"),
+    ],
+)
+def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp_path, error, told):
+    def action(out: str = typer.Option("")):
+        raise error
+
+    use_command(monkeypatch, action)
+    result = runner.invoke(main.app, ["train", "--out", str(tmp_path / "out")])
+    assert result.exit_code == 3
+    assert result.stdout == ""
+    (line,) = result.stderr.splitlines()
+    assert line.startswith(f"fogml: unexpected error ({told}")
+    (report,) = tmp_path.iterdir()
+    assert f"report written to {report};" in line
+    text = report.read_text()
+    assert "Traceback" in text and fogml.__version__ in text and "command: fogml train --out" in text
+
+
+def test_a_report_that_finds_no_room_beside_the_output_goes_to_the_temporary_files(monkeypatch, tmp_path):
+    def action(out: str = typer.Option("")):
         raise AssertionError("a defect")
 
     use_command(monkeypatch, action)
-    result = runner.invoke(main.app, ["train"])
-    assert isinstance(result.exception, AssertionError)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    result = runner.invoke(main.app, ["train", "--out=missing/folder/out"])
+    assert result.exit_code == 3
+    assert [path.suffix for path in tmp_path.iterdir()] == [".txt"]
+
+
+def test_termination_is_status_143(monkeypatch):
+    def action():
+        raise Terminated(signal.SIGTERM)
+
+    use_command(monkeypatch, action)
+    assert runner.invoke(main.app, ["train"]).exit_code == 143
 
 
 def test_the_program_runs():

@@ -33,7 +33,7 @@ def test_inspect_says_what_is_in_a_run(invoke_json, invoke, run_files, tmp_path)
     assert names(tmp_path) == {"a.csv", "a.yaml", "b.csv", "b.yaml"}
     out = tmp_path / "out"
     result = invoke("inspect", *run_files, "-o", out)
-    assert names(out) == {"inspect.json", "inspect.html", "config.yaml"}
+    assert names(out) == {"inspect.json", "inspect.html", "inspect.config.yaml"}
     assert "a.csv: 1500 rows" in result.stdout
     assert json.loads((out / "inspect.json").read_text()) == values
 
@@ -61,14 +61,14 @@ def test_noise_of_the_ring_laser(invoke_json, flag, expected):
 def test_noise_keys_and_files(invoke_json, tmp_path):
     out = tmp_path / "out"
     values = invoke_json("noise", "shipped:ring-laser-x", "-o", out)
-    assert names(out) == {"noise.json", "noise.html", "config.yaml"}
+    assert names(out) == {"noise.json", "noise.html", "noise.config.yaml"}
     assert (values["schema"], values["unit"]) == ("fogml.noise/1", "deg/h")
     assert len(values["taus_s"]) == len(values["adev"]) == len(values["ci"])
     assert set(values["terms"]) == {"N", "B", "K", "Q", "R"}
     assert set(values["minimum"]) == {"adev", "tau_s"}
     for (low, high), deviation in zip(values["ci"], values["adev"], strict=True):
         assert low <= deviation <= high
-    assert invoke_json("noise", "--config", out / "config.yaml") == values
+    assert invoke_json("noise", "--config", out / "noise.config.yaml") == values
 
 
 def test_noise_does_not_read_k_and_r_from_moving_temperature(invoke_json, run_files):
@@ -99,7 +99,7 @@ def test_import_writes_runs_that_can_be_inspected(invoke, invoke_json, tmp_path)
     out = tmp_path / "runs"
     values = invoke_json("import", log, "--profile", profile, "-o", out)
     assert [run["run"] for run in values["runs"]] == ["log.csv"]
-    assert {"log.csv", "config.yaml"} <= names(out)
+    assert {"log.csv", "import.config.yaml"} <= names(out)
     (run,) = invoke_json("inspect", out / "log.csv")["runs"]
     assert run["rows"] == 50
     assert run["sample_s"] == pytest.approx(0.1)
@@ -132,7 +132,7 @@ def test_compare(invoke_json, invoke, run_files, tmp_path):
     train, test = run_files
     arguments = ("compare", train, "--test", test, "--models", "none,mean,polynomial,M3,joint", "-o", out)
     values = invoke_json(*arguments)
-    assert names(out) == {"compare.json", "compare.html", "config.yaml"}
+    assert names(out) == {"compare.json", "compare.html", "compare.config.yaml"}
     assert values["schema"] == "fogml.compare/1"
     assert list(values["models"]) == ["none", "mean", "polynomial"]
     # M3 wants T_in and T_out, joint wants turns: each is told with its reason.
@@ -140,7 +140,7 @@ def test_compare(invoke_json, invoke, run_files, tmp_path):
     assert "T_in" in values["failed"]["M3"]
     rms = {name: model["test"][0]["after"]["rms"] for name, model in values["models"].items()}
     assert rms["polynomial"] < 0.2 * rms["mean"]
-    assert invoke_json("compare", "--config", out / "config.yaml") == values
+    assert invoke_json("compare", "--config", out / "compare.config.yaml") == values
     printed = invoke(*arguments).stdout
     assert "polynomial" in printed
     assert "joint: not fitted" in printed

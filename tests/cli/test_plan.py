@@ -48,7 +48,8 @@ def test_the_configuration_gives_the_same_plan_again(tmp_path, invoke_json, invo
     config.write_text("want: [coil_expansion]\nhours: 3.8\nruns: 2\n")
     values = invoke_json("plan", "--config", config, "-o", tmp_path / "one")
     assert [run["programme"] for run in values["runs"]] == ["programme.yaml", "programme-2.yaml"]
-    assert values == invoke_json("plan", "--config", tmp_path / "one" / "config.yaml", "-o", tmp_path / "two")
+    written = tmp_path / "one" / "plan.config.yaml"
+    assert values == invoke_json("plan", "--config", written, "-o", tmp_path / "two")
     # It is k1 under another name, and the page says that it does not show.
     assert not values["wanted"][0]["shown"]
     assert "No programme within these hours shows" in (tmp_path / "one" / "plan.html").read_text()

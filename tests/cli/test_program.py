@@ -69,7 +69,10 @@ main()
 """
 
 
-def test_an_interrupt_leaves_nothing(run_files, tmp_path):
+@pytest.mark.parametrize(
+    ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+)
+def test_an_interrupt_leaves_nothing(run_files, tmp_path, number, status):
     arguments = ["train", "a.csv", "--test", "b.csv", "--model", "sklearn.svm.SVR", "-o", "out"]
     process = subprocess.Popen(
         [sys.executable, "-c", WAITING_IN_THE_FIT, *arguments],
@@ -81,13 +84,12 @@ def test_an_interrupt_leaves_nothing(run_files, tmp_path):
     deadline = time.monotonic() + 60
     while not (tmp_path / "fitting").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
-    os.kill(process.pid, signal.SIGINT)
+    os.kill(process.pid, number)
     _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
+    assert process.returncode == status
     assert "Traceback" not in errors
     assert "interrupted: what is finished is kept, nothing is half written" in errors
-    assert not (tmp_path / "out").exists()
-    assert not list(tmp_path.glob(".partial-*"))
+    assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "a.yaml", "b.csv", "b.yaml", "fitting"}
 
 
 def test_a_closed_pipe_is_no_traceback(run_files, tmp_path):

@@ -40,14 +40,14 @@ def sweep_config(tmp_path):
 def test_a_sweep_writes_its_winner_as_a_configuration_of_train(invoke_json, sweep_config, tmp_path):
     values = invoke_json("sweep", sweep_config)
     written = {path.name for path in (tmp_path / "out").iterdir() if not path.name.startswith(".")}
-    assert written == {"best.yaml", "config.yaml", "study.journal", "sweep.html", "sweep.json"}
+    assert written == {"best.yaml", "sweep.config.yaml", "study.journal", "sweep.html", "sweep.json"}
     assert values == json.loads((tmp_path / "out" / "sweep.json").read_text())
     assert values["schema"] == "fogml.study/1"
     assert values["counts"]["complete"] + values["counts"]["pruned"] == 6
     assert "dT" in values["winner"]["features"]
     report = invoke_json("train", "--config", tmp_path / "out" / "best.yaml", "--out", tmp_path / "best")
     assert report["test"] == values["winner"]["judged"]["test"]
-    again = invoke_json("sweep", tmp_path / "out" / "config.yaml")
+    again = invoke_json("sweep", tmp_path / "out" / "sweep.config.yaml")
     assert again == values
     more = invoke_json("sweep", sweep_config, "--trials", 8)
     assert [trial["rms"] for trial in more["trials"]][:6] == [trial["rms"] for trial in values["trials"]]

@@ -15,7 +15,7 @@ def test_writes_everything_and_prints_a_table(invoke, run_files, tmp_path):
     out = tmp_path / "out"
     result = invoke("train", train, "--test", test, *QUICK, "-o", out)
     written = {path.name for path in out.iterdir()}
-    assert written == {"model", "report.json", "report.html", "report.xlsx", "config.yaml"}
+    assert written == {"model", "report.json", "report.html", "report.xlsx", "train.config.yaml"}
     assert "b.csv after" in result.stdout
     assert "report.html" in result.stdout
     report = json.loads((out / "report.json").read_text())
@@ -68,7 +68,7 @@ def test_config_is_run_again_with_the_same_numbers(invoke_json, run_files, tmp_p
         *("--limit", "bias_stability=1"),
     )
     config = tmp_path / "again.yaml"
-    config.write_text((out / "config.yaml").read_text())
+    config.write_text((out / "train.config.yaml").read_text())
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     monkeypatch.chdir(elsewhere)

@@ -83,7 +83,7 @@ def test_the_written_settings_give_the_same_run(config, tmp_path, invoke):
     out = tmp_path / "run.parquet"
     invoke("simulate", config, "-o", out, "--seed", 8)
     first = read_run(out)
-    written = tmp_path / "run.config.yaml"
+    written = tmp_path / "run.simulate.config.yaml"
     assert yaml.safe_load(written.read_text())["schema"] == "fogml.simulate/1"
     other = tmp_path / "other.parquet"
     invoke("simulate", written, "-o", other)
@@ -121,7 +121,7 @@ def test_faults_of_a_simulation(config, tmp_path, invoke, change, message):
     out = tmp_path / "run.csv"
     result = invoke("simulate", config, "-o", out, status=2)
     assert message in result.stderr and result.stdout == ""
-    assert not out.exists() and not out.with_suffix(".config.yaml").exists()
+    assert not out.exists() and not list(tmp_path.glob("*.config.yaml"))
 
 
 def test_usage_faults(config, tmp_path, invoke):

@@ -6,6 +6,7 @@ import re
 
 import pytest
 
+from fogml.json_files import finite_json
 from fogml.lab.misalignment_json import misalignment_json
 from fogml.lab.misalignment_simulation import TableUnit, measurements
 from fogml.lab.navigation_cost import navigation_costs
@@ -13,7 +14,6 @@ from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.lab.north_positions import simulated_positions
 from fogml.report import misalignment_page, north_page, train_page
-from fogml.validation.report_json import finite_json
 from tests.report.judgements import judgement
 from tests.report.pages import Page
 

@@ -7,10 +7,11 @@ import json
 import numpy as np
 import pytest
 
+from fogml.json_files import finite_json
 from fogml.runs.run import Run
 from fogml.validation.compare import Comparison
 from fogml.validation.judge import judge
-from fogml.validation.report_json import comparison_json, finite_json, judgement_json
+from fogml.validation.report_json import comparison_json, judgement_json
 from tests.validation.known_drift import KnownDrift
 
 

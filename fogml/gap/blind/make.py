@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.plan import Plan, plans
 from fogml.gap.blind.truth import read_truth, write_sums
+from fogml.processes import in_processes
 
 
 def make_cases(
@@ -75,18 +77,15 @@ def make_cases(
     if progress:
         progress(done, count)
     if missing:
-        from joblib import Parallel, delayed
-
-        jobs = (delayed(_make)(folder.cases, folder.truth, plan, seed, sample_s) for plan in missing)
-        pool = Parallel(n_jobs=min(workers, len(missing)), backend="loky", return_as="generator_unordered")
-        for number, _ in enumerate(pool(jobs), start=1):
+        make = partial(_make, folder.cases, folder.truth, seed, sample_s)
+        for number, _ in enumerate(in_processes(make, missing, workers), start=1):
             if progress:
                 progress(done + number, count)
     write_sums(folder.truth)
     return len(missing)
 
 
-def _make(cases: Path, truth: Path, plan: Plan, seed: int, sample_s: float) -> None:
+def _make(cases: Path, truth: Path, seed: int, sample_s: float, plan: Plan) -> None:
     from threadpoolctl import threadpool_limits
 
     from fogml.gap.blind.case import make_case

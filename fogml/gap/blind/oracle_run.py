@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import json
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from multiprocessing import get_context
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,9 @@ from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import OUTCOME, BlindFolder
 from fogml.gap.blind.methods import ORACLE
 from fogml.gap.blind.run import Progress, RunPlan, count_samples, outcome_of
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.processes import in_processes
 
 
 def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
@@ -23,24 +23,22 @@ def run_oracle(plan: RunPlan, progress: Progress | None = None) -> tuple[int, in
     if not left:
         return 0, 0
     failed, code = 0, code_state(ORACLE)
-    with ProcessPoolExecutor(plan.workers, mp_context=get_context("spawn")) as pool:
-        waiting = [pool.submit(_one, plan.folder.path, plan.answers, name, code) for name in left]
-        for future in as_completed(waiting):
-            name, done = future.result()
-            failed += not done
-            if progress:
-                progress(name)
+    answer = partial(_one, plan.folder.path, plan.answers, code)
+    for name, done in in_processes(answer, left, plan.workers):
+        failed += not done
+        if progress:
+            progress(name)
     return len(left), failed
 
 
-def _one(path: Path, answers: Path, name: str, code: str) -> tuple[str, bool]:
+def _one(path: Path, answers: Path, code: str, name: str) -> tuple[str, bool]:
     from fogml.gap.blind.baselines.oracle import oracle
     from fogml.gap.blind.truth import read_truth
 
     folder = BlindFolder(path)
     began = time.perf_counter()
     answer: dict[str, Any] = {"done": True, "reason": None, "message": ""}
-    with whole_folder(answers) as staging:
+    with whole_folder(answers, shared=True) as staging:
         out = staging / name
         out.mkdir()
         try:
@@ -50,5 +48,5 @@ def _one(path: Path, answers: Path, name: str, code: str) -> tuple[str, bool]:
         answer["seconds"] = time.perf_counter() - began
         samples = count_samples(folder.cases / name)
         values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples, code)
-        (out / OUTCOME).write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(out / OUTCOME, values, indent=1)
     return name, bool(answer["done"])

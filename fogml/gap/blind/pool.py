@@ -7,13 +7,15 @@ import os
 import queue
 import subprocess
 import sys
-import tempfile
 import threading
+from collections.abc import Callable
+from contextlib import ExitStack
 from pathlib import Path
 from typing import IO, Any
 
 from fogml.errors import InputError
 from fogml.gap.blind.worker import READY
+from fogml.outputs import scratch_folder
 
 _KEPT = ("PATH", "LANG", "LC_ALL", "LD_LIBRARY_PATH", "PYTHONPATH", "SYSTEMROOT")
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
@@ -40,6 +42,8 @@ class Worker:
         Folder of the method's own code, where that is not installed.
     threads
         Threads that it may use.
+    begun
+        Called with the worker once its process runs, before the method has loaded.
 
     Raises
     ------
@@ -47,9 +51,15 @@ class Worker:
         If the method does not load.
     """
 
-    def __init__(self, method: str, code: Path | None = None, threads: int = 1) -> None:
-        self._folder = tempfile.TemporaryDirectory(prefix="fogml-blind-", ignore_cleanup_errors=True)
-        self.home = Path(os.path.realpath(self._folder.name))
+    def __init__(
+        self,
+        method: str,
+        code: Path | None = None,
+        threads: int = 1,
+        begun: Callable[[Worker], None] | None = None,
+    ) -> None:
+        self._folder = ExitStack()
+        self.home = Path(os.path.realpath(self._folder.enter_context(scratch_folder())))
         environment = {name: os.environ[name] for name in _KEPT if name in os.environ}
         environment |= dict.fromkeys(_THREADS, str(threads))
         environment |= {"HOME": str(self.home), "TMPDIR": str(self.home), "PYTHONUNBUFFERED": "1"}
@@ -67,6 +77,8 @@ class Worker:
         self._lines: queue.Queue[str | None] = queue.Queue()
         assert self._process.stdout is not None
         threading.Thread(target=_read, args=(self._process.stdout, self._lines), daemon=True).start()
+        if begun is not None:
+            begun(self)
         try:
             self.locks = str(self._next(_START_S)["locks"])
         except WorkerLost as lost:
@@ -89,14 +101,18 @@ class Worker:
             pass  # it has ended, which the reading below tells
         return self._next(limit_s)
 
+    def kill(self) -> None:
+        """End the process: whoever waits for its answer meets `WorkerLost`."""
+        self._process.kill()
+
     def end(self) -> None:
         """End the process and remove its folder."""
-        self._process.kill()
+        self.kill()
         self._process.wait()
         for stream in (self._process.stdin, self._process.stdout, self._log):
             if stream is not None:
                 stream.close()
-        self._folder.cleanup()
+        self._folder.close()
 
     def _next(self, limit_s: float) -> dict[str, Any]:
         try:

@@ -17,6 +17,7 @@ from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files
 from fogml.gap.blind.pool import Worker, WorkerLost
 from fogml.gap.blind.sealing import own_roots, within
+from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
 LIMIT_S = 600.0
@@ -102,6 +103,7 @@ class _Shared:
     waiting: queue.SimpleQueue[str]
     progress: Progress | None
     failed: int = 0
+    workers: list[Worker] = field(default_factory=list)
     stop: threading.Event = field(default_factory=threading.Event)
     error: BaseException | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
@@ -137,6 +139,11 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
             keeper.join()
     except KeyboardInterrupt:
         shared.stop.set()
+        # Their keepers then leave what they are at, unwritten.
+        for worker in list(shared.workers):
+            worker.kill()
+        for keeper in keepers:
+            keeper.join()
         raise
     if shared.error is not None:
         raise shared.error
@@ -199,7 +206,8 @@ def _keep(shared: _Shared) -> None:
                 name = shared.waiting.get_nowait()
             except queue.Empty:
                 return
-            worker = worker or Worker(plan.method, plan.code, plan.threads)
+            if worker is None:
+                worker = Worker(plan.method, plan.code, plan.threads, shared.workers.append)
             if not _one(shared, worker, name):
                 worker.end()
                 worker = None
@@ -226,12 +234,13 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         usable = False
         seconds = plan.limit_s if lost.reason == "timed out" else None
         answer = {"done": False, "reason": lost.reason, "message": str(lost), "seconds": seconds}
+    if shared.stop.is_set():
+        return False
     method, samples = plan.name or plan.method, count_samples(case)
     values = outcome_of(name, method, answer, worker.locks, samples, shared.code)
-    with whole_folder(plan.answers) as staging:
+    with whole_folder(plan.answers, shared=True) as staging:
         shutil.copytree(out, staging / name)
-        text = json.dumps(values, indent=1, allow_nan=False, ensure_ascii=False)
-        (staging / name / OUTCOME).write_text(text + "\n", encoding="utf-8")
+        write_json(staging / name / OUTCOME, values, indent=1)
     shutil.rmtree(case)
     shutil.rmtree(out)
     with shared.lock:

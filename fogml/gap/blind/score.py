@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from fogml.gap.blind.scoring.table import BY_KEY
 from fogml.gap.blind.scoring.values import score_values
 from fogml.gap.blind.seeds import check_use
 from fogml.gap.blind.truth import SUMS, Truth, check_sums, read_truth
+from fogml.processes import in_processes
 
 
 def score(
@@ -92,12 +94,9 @@ def marks_of(
     workers: int = 1,
 ) -> dict[str, list[Mark]]:
     """Each method's answers held against the truths, in their order."""
-    from joblib import Parallel, delayed
-
-    jobs = (delayed(_marks_of_case)(folder, tuple(methods), truth) for truth in truths)
+    marks_of_case = partial(_marks_of_case, folder, tuple(methods))
     found: dict[str, list[Mark]] = {method: [] for method in methods}
-    pool = Parallel(n_jobs=workers, return_as="generator")
-    for truth, marks in zip(truths, pool(jobs)):
+    for truth, marks in zip(truths, in_processes(marks_of_case, truths, workers, ordered=True)):
         for method, one in zip(methods, marks):
             found[method].append(one)
         if progress:

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from functools import partial
 
 from fogml.gap.blind.folders import BlindFolder, read_json
 from fogml.gap.blind.relatives import relatives_of
 from fogml.gap.blind.truth import Truth
 from fogml.outputs import whole_file
+from fogml.processes import in_processes
 
 OPTIONS = "options.json"
 RELATIVES = "relatives"
@@ -25,14 +27,9 @@ def leave_out_relatives(
 
     Cases that were seen before are left as they are.
     """
-    from joblib import Parallel, delayed
-
     names = [name for name in folder.names() if _is_open(folder, name)]
     changed = 0
-    jobs = Parallel(n_jobs=workers, return_as="generator_unordered")(
-        delayed(_leave_out)(folder, name) for name in names
-    )
-    for done, more in enumerate(jobs, 1):
+    for done, more in enumerate(in_processes(partial(_leave_out, folder), names, workers), 1):
         changed += bool(more)
         if progress:
             progress(done, len(names))
@@ -63,6 +60,6 @@ def _leave_out(folder: BlindFolder, name: str) -> list[str]:
     path = folder.cases / name / OPTIONS
     options = read_json(path)
     options |= {"without": [*options["without"], *found], RELATIVES: found}
-    with whole_file(path) as partial:
-        partial.write_text(json.dumps(options) + "\n", encoding="utf-8")
+    with whole_file(path) as beside:
+        beside.write_text(json.dumps(options) + "\n", encoding="utf-8")
     return found

@@ -15,12 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from fogml.gap.blind.sealing import seal
+from fogml.processes import begin_worker
 
 READY = "ready"
 
 
 def main(arguments: list[str]) -> int:
     """Seal the process, load the method, and answer until the input ends."""
+    begin_worker()
     home = Path.cwd()
     code = [Path(path) for path in arguments[1:]]
     # What a library prints must not end up among the answers.

@@ -1,0 +1,80 @@
+"""Folders as a whole: exchanged for another in one step, with what only the old one held."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import shutil
+import sys
+from pathlib import Path
+
+_AT_CWD, _RENAME_EXCHANGE = -100, 2  # of Linux
+
+
+def nearest_folder(path: Path) -> Path:
+    """The folder itself, or the nearest parent that is there."""
+    while not path.exists():
+        path = path.parent
+    return path
+
+
+def is_folder(path: Path) -> bool:
+    """Whether a folder is there itself, not a link to one."""
+    return path.is_dir() and not path.is_symlink()
+
+
+def has_to_stay(real: Path) -> bool:
+    """Whether a folder can't be exchanged for another one: a mount point, or one that people are in."""
+    parent = real.parent
+    if os.path.ismount(real) or not os.access(parent, os.W_OK | os.X_OK):
+        return True
+    here = Path(os.path.realpath(os.curdir))
+    return real == here or real in here.parents
+
+
+def exchange_whole(content: Path, real: Path) -> bool:
+    """Put a folder in another's place in one step, with what only the other holds; False if impossible."""
+    carried = [entry for entry in real.iterdir() if not os.path.lexists(content / entry.name)]
+    for entry in carried:
+        _carry_over(entry, content / entry.name)
+    shutil.copymode(real, content)
+    if not _exchange(content, real):
+        for entry in carried:
+            place = content / entry.name
+            if is_folder(place):
+                shutil.rmtree(place)
+            else:
+                place.unlink()
+        return False
+    # What somebody put there at this moment.
+    for entry in content.iterdir():
+        if not os.path.lexists(real / entry.name):
+            os.rename(entry, real / entry.name)
+    return True
+
+
+def _carry_over(entry: Path, target: Path) -> None:
+    if is_folder(entry):
+        shutil.copytree(entry, target, symlinks=True, copy_function=_link)
+    else:
+        _link(entry, target)
+
+
+def _link(source: str | Path, target: str | Path) -> None:
+    """The same file under a second name; a copy where there are no hard links."""
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(source, target, follow_symlinks=False)
+
+
+def _exchange(one: Path, other: Path) -> bool:
+    """Exchange two entries of a file system in one step (renameat2); False where that can't be done."""
+    if not sys.platform.startswith("linux"):
+        return False
+    try:
+        rename = ctypes.CDLL(None, use_errno=True).renameat2
+    except (AttributeError, OSError):
+        return False
+    names = os.fsencode(one), os.fsencode(other)
+    return bool(rename(_AT_CWD, names[0], _AT_CWD, names[1], ctypes.c_uint(_RENAME_EXCHANGE)) == 0)

@@ -1,0 +1,157 @@
+"""Processes that fogml starts: they end with the one that started them, and print no warnings."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, NoReturn, TypeVar
+
+Item = TypeVar("Item")
+Result = TypeVar("Result")
+THREADS = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+"""Environment of workers: one thread for linear algebra, so that sums come out the same on any machine."""
+_LOOK_EVERY_S = 0.2
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was asked to end by a signal other than that of the keyboard.
+
+    Attributes
+    ----------
+    status
+        Exit status: 128 plus the signal's number.
+    """
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.status = 128 + number
+
+
+def end_as_interrupted() -> None:
+    """Let SIGTERM and SIGHUP do what the keyboard's interrupt does, unless the caller had them ignored."""
+    for name in ("SIGTERM", "SIGHUP"):
+        number = getattr(signal, name, None)
+        if number is not None and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _interrupt)
+
+
+def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
+    raise Terminated(number)
+
+
+def quiet_libraries() -> None:
+    """Keep warnings of libraries from stderr, unless Python was started with some asked for.
+
+    What is wrong with a result is found in the result, see `fogml.results_file`.
+    """
+    if not sys.warnoptions:
+        warnings.simplefilter("ignore")
+    logging.getLogger().addHandler(logging.NullHandler())
+
+
+def begin_worker(parent: int | None = None) -> None:
+    """What a process that fogml started does first: it ends once its parent is gone.
+
+    Asked of the system again and again by a thread: the kernel's own message of a parent's death
+    (PR_SET_PDEATHSIG) comes with the end of the thread that started the process.
+
+    Parameters
+    ----------
+    parent
+        Number of the process that started this one; None for the present parent.
+    """
+    quiet_libraries()
+    # The keyboard's interrupt goes to all processes of a terminal: the parent ends its workers.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    expected = os.getppid() if parent is None else parent
+
+    def watch() -> None:
+        while os.getppid() == expected:
+            time.sleep(_LOOK_EVERY_S)
+        os._exit(1)
+
+    threading.Thread(target=watch, name="fogml parent watch", daemon=True).start()
+
+
+@contextmanager
+def worker_pool(count: int) -> Iterator[Any]:
+    """An executor of so many processes, with one thread of linear algebra each.
+
+    On an error or an interrupt the workers are ended at once, and what they were writing is removed on the
+    next start or by `fogml.outputs.settle`.
+    """
+    from joblib.externals.loky import ProcessPoolExecutor
+
+    pool = ProcessPoolExecutor(
+        max_workers=count, env=THREADS, initializer=begin_worker, initargs=(os.getpid(),)
+    )
+    try:
+        yield pool
+    except BaseException:
+        pool.shutdown(wait=True, kill_workers=True)
+        raise
+    pool.shutdown(wait=True)
+
+
+def in_processes(
+    function: Callable[[Item], Result], items: Iterable[Item], workers: int, *, ordered: bool = False
+) -> Iterator[Result]:
+    """Results of a function for each item, by so many processes; with one, in this process.
+
+    Parameters
+    ----------
+    function
+        Importable by name, or a `functools.partial` of such.
+    items
+        Its arguments.
+    workers
+        Processes.
+    ordered
+        Results in the order of the items; otherwise as they come.
+
+    Raises
+    ------
+    Exception
+        What the function raised; the rest is given up.
+    """
+    items = list(items)
+    if workers == 1 or len(items) < 2:
+        yield from map(function, items)
+        return
+    from concurrent.futures import as_completed
+
+    with worker_pool(min(workers, len(items))) as pool:
+        futures = [pool.submit(function, item) for item in items]
+        for future in futures if ordered else as_completed(futures):
+            yield future.result()
+
+
+def process_is_alive(pid: int, started: str) -> bool:
+    """Whether a process of this machine still runs, and is the one that was meant."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        pass
+    return process_start(pid) == started
+
+
+def process_start(pid: int) -> str:
+    """What tells a process from a later one of the same number; empty where the system does not say."""
+    try:
+        with open(f"/proc/{pid}/stat", encoding="ascii", errors="replace") as file:
+            fields = file.read().rpartition(")")[2]
+    except OSError:
+        return ""
+    state, *rest = fields.split()
+    # A process that has ended but was not waited for runs no trial.
+    return "ended" if state == "Z" else rest[18]

@@ -1,0 +1,285 @@
+"""Outputs appear whole or not at all, whoever else writes and whenever a writer is killed."""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fogml import folders, outputs
+from fogml.errors import InputError
+from fogml.outputs import scratch_folder, settle, sole_writer, whole_file, whole_files, whole_folder
+
+ROOT = Path(__file__).parents[2]
+
+
+def tree(folder: Path) -> dict[str, str]:
+    """Every file below a folder with what it holds."""
+    return {str(p.relative_to(folder)): p.read_text() for p in sorted(folder.rglob("*")) if p.is_file()}
+
+
+def write(folder: Path, **files: str) -> None:
+    for name, text in files.items():
+        path = folder / name.replace("__", "/")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+
+
+@pytest.fixture(params=["exchange", "one by one"])
+def way(request, monkeypatch):
+    """Both ways of replacing a folder that is there."""
+    if request.param == "one by one":
+        monkeypatch.setattr(folders, "_exchange", lambda one, other: False)
+    return request.param
+
+
+def test_a_folder_is_replaced_and_keeps_what_is_not_of_it(tmp_path, way):
+    out = tmp_path / "out"
+    write(out, report="old", model__a="old", model__b="old", mine="mine", notes__x="mine")
+    (out / "link").symlink_to("mine")
+    with whole_folder(out) as folder:
+        write(folder, report="new", model__a="new")
+    assert tree(out) == {
+        "report": "new",
+        "model/a": "new",
+        "mine": "mine",
+        "notes/x": "mine",
+        "link": "mine",
+    }
+    assert (out / "link").is_symlink()
+    assert os.listdir(tmp_path) == ["out"]
+
+
+def test_an_error_leaves_the_old_folder_as_it_was(tmp_path, way):
+    out = tmp_path / "out"
+    write(out, report="old", model__a="old")
+    with pytest.raises(RuntimeError), whole_folder(out) as folder:
+        write(folder, report="new")
+        raise RuntimeError
+    assert tree(tmp_path) == {"out/report": "old", "out/model/a": "old"}
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="renameat2 is Linux's")
+def test_a_reader_never_sees_parts_of_two_results(tmp_path):
+    out = tmp_path / "out"
+    write(out, a="0", b__c="0")
+    seen = set()
+    context = multiprocessing.get_context("spawn")
+    writer = context.Process(target=_replace_often, args=(out, 150))
+    writer.start()
+    while writer.is_alive():
+        handle = os.open(out, os.O_RDONLY)
+        try:
+            # Both names of one folder, whichever it is.
+            parts = []
+            for name in ("a", "b/c"):
+                with open(os.open(name, os.O_RDONLY, dir_fd=handle), encoding="ascii") as file:
+                    parts.append(file.read())
+            seen.add(tuple(parts))
+        except FileNotFoundError:
+            pass  # it was removed since it was opened
+        finally:
+            os.close(handle)
+    writer.join()
+    assert writer.exitcode == 0
+    assert seen <= {(str(n), str(n)) for n in range(151)}
+
+
+def _replace_often(out: Path, times: int) -> None:
+    for number in range(1, times + 1):
+        with whole_folder(out) as folder:
+            write(folder, a=str(number), b__c=str(number))
+
+
+class Killed(BaseException):
+    """Stands for a kill: nothing is cleaned up after it."""
+
+
+@pytest.mark.parametrize("place", range(12))
+def test_a_kill_between_two_renames_is_made_good_by_the_next_writer(tmp_path, monkeypatch, place):
+    out = tmp_path / "out"
+    write(out, a="old", model__w="old", model__x="old", mine="mine")
+    count = 0
+
+    def counted(rename):
+        def run(*words, **more):
+            nonlocal count
+            count += 1
+            if count == place:
+                raise Killed
+            return rename(*words, **more)
+
+        return run
+
+    monkeypatch.setattr(os, "rename", counted(os.rename))
+    monkeypatch.setattr(os, "replace", counted(os.replace))
+    monkeypatch.setattr(shutil, "rmtree", lambda *words, **more: None)
+    try:
+        with whole_folder(out, shared=True) as folder:
+            write(folder, a="new", b="new", model__w="new")
+    except Killed:
+        pass
+    monkeypatch.undo()
+    settle(out)
+    old = {"a": "old", "model/w": "old", "model/x": "old", "mine": "mine"}
+    new = {"a": "new", "b": "new", "model/w": "new", "mine": "mine"}
+    assert tree(out) in ([new] if place != 1 else [old])
+    assert not [path for path in out.iterdir() if path.name.startswith(".")]
+
+
+def test_files_appear_together_and_a_folder_in_their_place_is_refused_first(tmp_path):
+    with whole_files(tmp_path / "run.csv", tmp_path / "run.yaml") as (run, side):
+        run.write_text("rows")
+        side.write_text("facts")
+    assert tree(tmp_path) == {"run.csv": "rows", "run.yaml": "facts"}
+    (tmp_path / "folder.csv").mkdir()
+    with (
+        pytest.raises(InputError, match=r"folder\.csv: is a folder"),
+        whole_files(tmp_path / "side.yaml", tmp_path / "folder.csv"),
+    ):
+        raise AssertionError
+    assert tree(tmp_path) == {"run.csv": "rows", "run.yaml": "facts"}
+
+
+def test_a_living_writer_s_folder_stays_and_a_dead_one_s_goes(tmp_path):
+    with whole_file(tmp_path / "mine") as partial:
+        settle(tmp_path)
+        partial.write_text("here")
+    assert tree(tmp_path) == {"mine": "here"}
+    code = (
+        "import os, sys\nfrom fogml.outputs import whole_file\n"
+        "with whole_file(sys.argv[1]) as partial:\n"
+        "    partial.write_text('half')\n    print('writing', flush=True)\n    sys.stdin.read()"
+    )
+    process = subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path / "other")],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+    )
+    assert process.stdout is not None and process.stdin is not None
+    process.stdout.readline()
+    settle(tmp_path)
+    assert len(list(tmp_path.glob(".partial-*"))) == 1
+    foreign = tmp_path / ".partial-0123abcd-0000"
+    foreign.mkdir()
+    os.kill(process.pid, signal.SIGKILL)
+    process.wait()
+    process.stdin.close()
+    process.stdout.close()
+    with whole_file(tmp_path / "third") as partial:
+        partial.write_text("here")
+    # Only its own host knows whether the process of the remaining one lives.
+    assert sorted(os.listdir(tmp_path)) == [foreign.name, "mine", "third"]
+
+
+def test_the_second_writer_is_told_who_the_first_is(tmp_path):
+    out = tmp_path / "out"
+    with whole_folder(out) as folder:
+        write(folder, a="first")
+        who = f"process {os.getpid()} on {socket.gethostname()}"
+        with pytest.raises(InputError, match=who), whole_folder(out):
+            raise AssertionError
+        with whole_folder(tmp_path / "other") as other:
+            write(other, a="other")
+    assert tree(tmp_path) == {"out/a": "first", "other/a": "other"}
+
+
+def test_the_lock_of_a_dead_process_is_taken_over_but_not_that_of_another_host(tmp_path):
+    lock = tmp_path / ".out.lock"
+    lock.write_text(json.dumps({"pid": 1, "host": socket.gethostname()}))
+    with sole_writer(tmp_path / "out"):
+        assert json.loads(lock.read_text())["pid"] == os.getpid()
+    assert not lock.exists()
+    lock.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
+    who = r"process 1 on elsewhere .* remove .*\.out\.lock"
+    with pytest.raises(InputError, match=who), sole_writer(tmp_path / "out"):
+        raise AssertionError
+
+
+def test_messages_name_the_output_and_not_where_it_lies_meanwhile(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError) as told, whole_folder("out") as folder:
+        raise InputError(f"{folder / 'report.json'}: is bad, and so is {folder}")
+    assert str(told.value) == "out/report.json: is bad, and so is out"
+    with pytest.raises(InputError) as told, whole_file("run.csv") as partial:
+        (partial / "deeper").write_text("")
+    assert (
+        str(told.value)
+        == "run.csv/deeper: cannot be written (No such file or directory); choose another place"
+    )
+    with pytest.raises(FileNotFoundError, match=r"input\.csv"), whole_folder("out"):
+        Path("input.csv").read_text()
+
+
+@pytest.mark.parametrize("shared", [True, False])
+def test_places_that_are_links_or_the_present_folder(tmp_path, monkeypatch, shared):
+    real = tmp_path / "real"
+    write(real, a="old", mine="mine")
+    (tmp_path / "link").symlink_to("real")
+    (tmp_path / "dangling").symlink_to("missing")
+    for name in ("link", "dangling"):
+        with whole_folder(tmp_path / name, shared=shared) as folder:
+            write(folder, a="new")
+        assert (tmp_path / name).is_symlink()
+    assert tree(real) == {"a": "new", "mine": "mine"}
+    assert tree(tmp_path / "missing") == {"a": "new"}
+    monkeypatch.chdir(real)
+    before = os.stat(".").st_ino
+    with whole_folder(".", shared=shared) as folder:
+        write(folder, a="newer")
+    assert os.stat(real).st_ino == before
+    assert tree(Path()) == {"a": "newer", "mine": "mine"}
+
+
+@pytest.mark.parametrize("whole", [whole_file, whole_folder])
+def test_places_that_cannot_be(tmp_path, whole):
+    write(tmp_path, file="mine")
+    with (
+        pytest.raises(InputError, match="file: is a file, a folder was expected"),
+        whole(tmp_path / "file" / "x"),
+    ):
+        raise AssertionError
+    assert tree(tmp_path) == {"file": "mine"}
+
+
+def test_a_scratch_folder_is_gone_after_its_block(tmp_path, monkeypatch):
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    with scratch_folder() as folder:
+        (folder / "x").touch()
+    assert not list(tmp_path.iterdir())
+    assert outputs.PARTIAL in str(folder)
+
+
+def test_waiting_writers_take_turns(tmp_path):
+    """A lock is not held by two, though its file is removed each time it is given back."""
+    context = multiprocessing.get_context("spawn")
+    crew = [context.Process(target=_add_one, args=(tmp_path, 60)) for _ in range(2)]
+    for process in crew:
+        process.start()
+    for process in crew:
+        process.join()
+    assert (tmp_path / "count").read_text() == "120"
+
+
+def _add_one(home: Path, times: int) -> None:
+    done = 0
+    while done < times:
+        try:
+            with sole_writer(home / "count"):
+                path = home / "count"
+                number = int(path.read_text()) if path.exists() else 0
+                time.sleep(0.0005)
+                path.write_text(str(number + 1))
+            done += 1
+        except InputError:
+            time.sleep(0.0005)
