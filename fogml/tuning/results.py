@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
 from fogml.tuning.plan import OBJECTIVES
+from fogml.tuning.sampling import place_of
 from fogml.tuning.storage import shown
 from fogml.tuning.study import is_finished
 from fogml.tuning.winner import command_line, figure, importance, pareto, winner
@@ -50,7 +51,8 @@ def study_json(
     judgement
         The winner on the test runs; None where there are none.
     """
-    trials = [trial for trial in study.get_trials(deepcopy=False) if is_finished(trial)]
+    finished = [trial for trial in study.get_trials(deepcopy=False) if is_finished(trial)]
+    trials = sorted(finished, key=place_of)
     place = {trial.number: index for index, trial in enumerate(trials)}
     best = winner(trials)
     chosen = dict(_trial(best))
@@ -83,7 +85,7 @@ def _trial(trial: FrozenTrial) -> dict[str, Any]:
     attributes = trial.user_attrs
     whole = trial.state.name == "COMPLETE"
     return {
-        "number": trial.number,
+        "number": place_of(trial),
         "state": "complete" if whole else "pruned",
         "model": attributes.get("model", ""),
         "features": attributes.get("features", ""),

@@ -10,17 +10,20 @@ import numpy as np
 import optuna
 from optuna.distributions import BaseDistribution
 from optuna.samplers import BaseSampler, RandomSampler, TPESampler
-from optuna.trial import FrozenTrial, TrialState
+from optuna.trial import FrozenTrial
 
 SAMPLERS = ("tpe", "random")
+PLACE = "place"
+"""Attribute of a trial: which of the trials asked for it is, from 0; a trial tried again keeps it."""
 
 
 class SeededByTrial(BaseSampler):
     """A sampler whose random numbers follow from the seed and the trial's place alone.
 
-    So a study that was interrupted goes on as it would have gone, and ``random`` tries the same
-    whatever the number of workers. ``tpe`` learns from what has finished, in whatever order
-    several workers finish it. A trial's place does not count those that a killed worker left.
+    What a trial draws follows from the seed, the trial's place and, with ``tpe``, the trials that have
+    finished. So one worker, killed anywhere and started again on its machine, goes on as it would have
+    gone, bit for bit. Several workers try the same with ``random``; with ``tpe`` what they try depends on
+    the order in which they finish.
 
     Parameters
     ----------
@@ -49,7 +52,7 @@ class SeededByTrial(BaseSampler):
         self, study: optuna.Study, trial: FrozenTrial, param_name: str, param_distribution: BaseDistribution
     ) -> Any:
         """A parameter's value; it follows from seed, place and name, whatever was drawn before."""
-        key = [self._seed, place_of(study, trial.number), crc32(param_name.encode())]
+        key = [self._seed, place_of(trial), crc32(param_name.encode())]
         seed = int(np.random.SeedSequence(key).generate_state(1)[0])
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
@@ -57,7 +60,6 @@ class SeededByTrial(BaseSampler):
             return kind(seed=seed).sample_independent(study, trial, param_name, param_distribution)
 
 
-def place_of(study: optuna.Study, number: int) -> int:
-    """How many trials before this one count: all but those that failed."""
-    trials = study.get_trials(deepcopy=False)
-    return sum(trial.number < number and trial.state != TrialState.FAIL for trial in trials)
+def place_of(trial: FrozenTrial) -> int:
+    """Which of the trials asked for one is."""
+    return int(trial.user_attrs.get(PLACE, trial.number))

@@ -14,6 +14,7 @@ from fogml.errors import InputError
 from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
+from fogml.tuning.sampling import PLACE, place_of
 from fogml.tuning.storage import import_optuna, open_storage, shown
 
 if TYPE_CHECKING:
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 IDENTITY, WORKER, BEAT = "fogml_identity", "worker", "beat"
 _SILENT_BEATS = 3
+_HOLDING = ("RUNNING", "COMPLETE", "PRUNED")
 
 
 def open_study(plan: Plan, runs: Sequence[Run] | None = None) -> optuna.Study:
@@ -88,14 +90,46 @@ def finished_count(study: optuna.Study) -> int:
     return sum(is_finished(trial) for trial in study.get_trials(deepcopy=False))
 
 
-def sign_up(trial: optuna.Trial) -> None:
-    """Note on a trial which process runs it."""
+def free_place(study: optuna.Study, count: int) -> int | None:
+    """The first of so many places that no trial holds or has filled; None if there is none."""
+    trials = study.get_trials(deepcopy=False)
+    held = {place_of(trial) for trial in trials if trial.state.name in _HOLDING}
+    return next((place for place in range(count) if place not in held), None)
+
+
+def begin_trial(study: optuna.Study, place: int) -> optuna.Trial | None:
+    """Begin the trial of a place; None if another worker was quicker.
+
+    The trial is made together with its place and its worker: there is none without, whenever a
+    worker is killed.
+    """
+    import optuna
+    from optuna.trial import TrialState, create_trial
+
     pid = os.getpid()
-    trial.set_user_attr(WORKER, {"host": socket.gethostname(), "pid": pid, "started": process_start(pid)})
+    worker = {"host": socket.gethostname(), "pid": pid, "started": process_start(pid)}
+    attributes: dict[str, Any] = {PLACE: place, WORKER: worker}
+    failed = [t.number for t in study.get_trials(deepcopy=False) if _holds(t, place, ("FAIL",))]
+    if failed:
+        attributes["retry_of"] = failed[-1]
+    # Optuna's ask makes a trial first and lets attributes be added.
+    template = create_trial(state=TrialState.RUNNING, user_attrs=attributes)
+    identity = study._storage.create_new_trial(study._study_id, template_trial=template)
+    study._thread_local.cached_all_trials = None
+    trial = optuna.Trial(study, identity)
+    others = [t for t in study.get_trials(deepcopy=False) if _holds(t, place, _HOLDING)]
+    if min(other.number for other in others) < trial.number:
+        study.tell(trial, state=TrialState.FAIL)
+        return None
+    return trial
+
+
+def _holds(trial: FrozenTrial, place: int, states: tuple[str, ...]) -> bool:
+    return trial.state.name in states and place_of(trial) == place
 
 
 class Recovery:
-    """Finds trials whose worker is gone, and puts them up to be tried again.
+    """Finds trials whose worker is gone, and gives their places up, to be tried again.
 
     On this machine a worker is gone if its process is. Of another machine's workers a trial is
     given up once its heartbeat has not changed for three times the heartbeat's interval, by this
@@ -107,9 +141,9 @@ class Recovery:
         self._heard: dict[int, tuple[Any, float]] = {}
 
     def __call__(self, study: optuna.Study) -> int:
-        """Put up again what dead workers left; how many trials."""
+        """Give up what dead workers left; how many trials."""
         running = [trial for trial in study.get_trials(deepcopy=False) if trial.state.name == "RUNNING"]
-        return sum(_try_again(study, trial) for trial in running if self._is_dead(trial))
+        return sum(_give_up(study, trial) for trial in running if self._is_dead(trial))
 
     def _is_dead(self, trial: FrozenTrial) -> bool:
         worker = trial.user_attrs.get(WORKER) or {"host": "", "started": ""}
@@ -124,15 +158,12 @@ class Recovery:
         return now - before[1] > self._patience_s
 
 
-def _try_again(study: optuna.Study, trial: FrozenTrial) -> bool:
-    """Fail a trial and put its parameters up again; False if somebody else did."""
+def _give_up(study: optuna.Study, trial: FrozenTrial) -> bool:
+    """Fail a trial; False if somebody else did."""
     from optuna.exceptions import UpdateFinishedTrialError
     from optuna.trial import TrialState
 
     try:
-        if not study._storage.set_trial_state_values(trial._trial_id, TrialState.FAIL):
-            return False
+        return bool(study._storage.set_trial_state_values(trial._trial_id, TrialState.FAIL))
     except UpdateFinishedTrialError:
         return False
-    study.enqueue_trial(trial.params, user_attrs={"retry_of": trial.number})
-    return True

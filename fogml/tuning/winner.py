@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.tuning.sampling import place_of
 from fogml.tuning.worker import score_of
 
 if TYPE_CHECKING:
@@ -19,8 +20,8 @@ _LEAST_TRIALS = 10
 
 
 def complete(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
-    """The trials that went through every fold, by number."""
-    return sorted((t for t in trials if t.state.name == "COMPLETE"), key=lambda t: t.number)
+    """The trials that went through every fold, by place."""
+    return sorted((t for t in trials if t.state.name == "COMPLETE"), key=lambda t: place_of(t))
 
 
 def pareto(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
@@ -30,15 +31,15 @@ def pareto(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
     """
     kept: list[FrozenTrial] = []
     for trial in complete(trials):
-        others = [other for other in complete(trials) if other.number != trial.number]
+        others = [other for other in complete(trials) if place_of(other) != place_of(trial)]
         if not any(_at_least_as_good(other, trial) for other in others):
             kept.append(trial)
-    return sorted(kept, key=lambda t: (figure(t, "rms"), t.number))
+    return sorted(kept, key=lambda t: (figure(t, "rms"), place_of(t)))
 
 
 def _at_least_as_good(other: FrozenTrial, trial: FrozenTrial) -> bool:
     if other.values == trial.values:
-        return other.number < trial.number
+        return place_of(other) < place_of(trial)
     return all(a <= b for a, b in zip(other.values, trial.values, strict=True))
 
 
@@ -62,10 +63,10 @@ def winner(trials: Sequence[FrozenTrial]) -> FrozenTrial:
         reasons = [t.user_attrs["reason"] for t in trials if "reason" in t.user_attrs]
         why = f": {reasons[0]}" if reasons else ""
         raise InputError(f"no trial could be fitted{why}")
-    best = min(found, key=lambda t: (figure(t, "rms"), t.number))
+    best = min(found, key=lambda t: (figure(t, "rms"), place_of(t)))
     score = score_of(best)
     as_good = [t for t in found if not score.beats(score_of(t))]
-    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "rms"), t.number))
+    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "rms"), place_of(t)))
 
 
 def train_settings(trial: FrozenTrial) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from fogml.tuning.held_out import FoldResult, HeldOut
 from fogml.tuning.plan import Plan
 from fogml.tuning.sampling import place_of
 from fogml.tuning.space import Choice
-from fogml.tuning.study import BEAT, Recovery, finished_count, is_finished, sign_up
+from fogml.tuning.study import BEAT, Recovery, begin_trial, finished_count, free_place
 
 if TYPE_CHECKING:
     import optuna
@@ -27,10 +27,6 @@ _LEAST_FOLDS = 2
 # Folds before a trial may be pruned.
 _WAIT_S = 0.2
 _REFUSALS = (FogmlError, ValueError, ArithmeticError, np.linalg.LinAlgError)
-
-
-class _NotNeeded(Exception):
-    """A trial begun after all that were asked for had been."""
 
 
 def work(
@@ -55,28 +51,24 @@ def work(
     recover = Recovery(plan.heartbeat_s)
     while True:
         recover(study)
-        trials = study.get_trials(deepcopy=False)
-        finished = sum(is_finished(trial) for trial in trials)
-        if finished >= plan.trials:
-            return
-        states = [trial.state.name for trial in trials]
-        if "WAITING" not in states and finished + states.count("RUNNING") >= plan.trials:
+        place = free_place(study, plan.trials)
+        if place is None:
+            if finished_count(study) >= plan.trials:
+                return
             # Others run what is left: one of them may die.
             time.sleep(_WAIT_S)
             continue
-        _one_trial(study, plan, held_out)
+        _one_trial(study, plan, held_out, place)
         if progress is not None:
             latest = study.get_trials(deepcopy=False)[-1]
             progress(finished_count(study), str(latest.user_attrs.get("model", "")))
 
 
-def _one_trial(study: optuna.Study, plan: Plan, held_out: HeldOut) -> None:
+def _one_trial(study: optuna.Study, plan: Plan, held_out: HeldOut, place: int) -> None:
     from optuna.trial import TrialState
 
-    trial = study.ask()
-    sign_up(trial)
-    if place_of(study, trial.number) >= plan.trials:
-        study.tell(trial, state=TrialState.FAIL)
+    trial = begin_trial(study, place)
+    if trial is None:
         return
     with _heartbeat(trial, plan.heartbeat_s):
         values = _evaluate(study, plan, held_out, trial)
@@ -150,7 +142,7 @@ def score_of(trial: FrozenTrial, folds: int | None = None) -> Score:
 
 
 def _beaten_by(study: optuna.Study, plan: Plan, choice: Choice, folds: list[FoldResult]) -> int | None:
-    """Number of a finished trial that is no larger, and better beyond noise on the folds so far."""
+    """Place of a finished trial that is no larger, and better beyond noise on the folds so far."""
     mine = Score(
         Candidate(choice.features),
         0,
@@ -158,13 +150,13 @@ def _beaten_by(study: optuna.Study, plan: Plan, choice: Choice, folds: list[Fold
         np.concatenate([fold.rows for fold in folds]),
     )
     sizes = {"bytes": size_of(folds), "operations": work_of(folds)}
-    for trial in study.get_trials(deepcopy=False):
+    for trial in sorted(study.get_trials(deepcopy=False), key=place_of):
         if trial.state.name != "COMPLETE":
             continue
         if any(trial.user_attrs[name] > sizes[name] for name in plan.objectives if name in sizes):
             continue
         if score_of(trial, len(folds)).beats(mine):
-            return trial.number
+            return place_of(trial)
     return None
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import multiprocessing
 import os
 import signal
@@ -14,13 +15,15 @@ import pytest
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.tuning.held_out import HeldOut
+from fogml.tuning.results import study_json
 from fogml.tuning.space import Choice, Space
-from fogml.tuning.study import is_finished, open_study
+from fogml.tuning.storage import JOURNAL
+from fogml.tuning.study import begin_trial, free_place, is_finished, open_study
 from fogml.tuning.sweep import run_sweep
 from fogml.tuning.winner import complete, figure, pareto, winner
 from tests.tuning.world import SPACE, plan, runs
 
-pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
+optuna = pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
 
 
 def tried(study):
@@ -65,6 +68,52 @@ def test_a_sweep_repeats_itself_and_goes_on_as_if_it_had_not_been_interrupted(tm
     assert len(tried(whole)) == 8
     assert tried(whole) == tried(again) == tried(resumed)
     assert tried(run_sweep(plan(tmp_path / "other", seed=1))) != tried(whole)
+
+
+@pytest.mark.parametrize("sampler", ["tpe", "random"])
+def test_a_sweep_killed_at_any_entry_of_its_journal_goes_on_bit_for_bit(tmp_path, sampler):
+    settings = {"sampler": sampler, "trials": 5, "prune": True, "objectives": ("rms", "bytes")}
+    whole = plan(tmp_path / "whole", **settings)
+    expected = _told(run_sweep(whole))
+    lines = (tmp_path / "whole" / JOURNAL).read_text().splitlines(keepends=True)
+    # A process that is gone: the journal names this one, which lives.
+    lines = [line.replace(f'"pid":{os.getpid()}', '"pid":999999999') for line in lines]
+    begun = [at for at, line in enumerate(lines) if '"op_code":4' in line]
+    # After a trial is made, after its first parameter, before it is told; of the third and the last trial.
+    ends = [begun[2] + 1, begun[2] + 2, begun[3], begun[4] + 1, len(lines) - 1]
+    for end in ends:
+        folder = tmp_path / f"cut-{end}"
+        folder.mkdir()
+        (folder / JOURNAL).write_text("".join(lines[:end]))
+        assert _told(run_sweep(plan(folder, **settings))) == expected
+
+
+def _told(study):
+    """``sweep.json`` but for how many trials had to be tried again."""
+    values = study_json(
+        study,
+        objectives=["rms", "bytes"],
+        runs=["a.csv", "b.csv"],
+        test=[],
+        seed=0,
+        averaging_s=100.0,
+        storage=None,
+        judgement=None,
+    )
+    del values["counts"]["retried"]
+    return json.dumps(values)
+
+
+def test_workers_of_one_place_leave_it_to_the_first(tmp_path):
+    study = open_study(plan(tmp_path))
+    first, second = begin_trial(study, 0), begin_trial(study, 0)
+    assert first is not None and second is None
+    assert [t.state.name for t in study.get_trials()] == ["RUNNING", "FAIL"]
+    assert free_place(study, 2) == 1
+    study.tell(first, state=optuna.trial.TrialState.FAIL)
+    assert free_place(study, 2) == 0
+    again = begin_trial(study, 0)
+    assert again is not None and again.user_attrs["retry_of"] == 1
 
 
 def test_the_right_features_win(tmp_path):
