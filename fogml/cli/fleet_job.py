@@ -20,7 +20,8 @@ from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
 from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.json_files import finite_json, write_json
-from fogml.outputs import whole_folder
+from fogml.outputs import sole_writer, whole_folder
+from fogml.runs.sources import sources_stamp
 
 _SHOWN = 40
 
@@ -72,7 +73,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     home = Path(settings.out)
     if home.exists() and not home.is_dir():
         raise InputError(f"{home}: is a file, a folder was expected; choose another --out")
-    with terminal.work("fleet", total=len(tasks)) as work:
+    with sole_writer(home), terminal.work("fleet", total=len(tasks)) as work:
         outcomes = _run(settings, tasks, work, terminal)
     values = finite_json(fleet_json(outcomes, settings.for_units()))
     page = fleet_page(values, Path(settings.manifest).name)
@@ -101,7 +102,9 @@ def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
         _check_device(settings)
     make_model(settings.model, settings.features, settings.seed, own["parameters"])
     work = UnitWork(own, settings.form, shared)
-    told = {**own, "shared": shared}
+    # A twin is a file, or one that ships.
+    twin = sources_stamp([Path(settings.twin)]) if Path(settings.twin).is_file() else None
+    told = {**own, "shared": shared, "twin file": twin}
     # Units that are done are known by their settings: workers write into one folder, wherever they run.
     return [Task(unit, work, str(Path(settings.out).absolute()), told) for unit in units]
 

@@ -15,7 +15,7 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
-from fogml.tuning.plan import OBJECTIVES, Plan
+from fogml.tuning.plan import OBJECTIVES, Plan, run_identity
 from fogml.tuning.space import Space
 from fogml.yaml_text import parse_yaml
 
@@ -80,7 +80,7 @@ class SweepSettings(Settings):
         """What workers are told."""
         return Plan(
             name=self.name,
-            read=partial(_read, tuple(self.runs), self.repair, [run.hash for run in runs]),
+            read=partial(_read, tuple(self.runs), self.repair, [run_identity(run) for run in runs]),
             space=self.space,
             objectives=tuple(self.objectives),
             folds=self.folds,
@@ -95,11 +95,11 @@ class SweepSettings(Settings):
         )
 
 
-def _read(paths: tuple[str, ...], repair: bool, hashes: list[str]) -> list[Run]:
+def _read(paths: tuple[str, ...], repair: bool, identities: list[Any]) -> list[Run]:
     """The training runs, which have to be those that the sweep began with."""
     runs = [open_run(path, repair=repair) for path in paths]
-    for path, run, wanted in zip(paths, runs, hashes, strict=True):
-        if run.hash != wanted:
+    for path, run, wanted in zip(paths, runs, identities, strict=True):
+        if run_identity(run) != wanted:
             raise InputError(f"{path}: has changed since the sweep began; finished trials are kept")
     return runs
 

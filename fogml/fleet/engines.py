@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import as_completed
 from contextlib import contextmanager
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
 from fogml.errors import InputError
@@ -131,9 +132,7 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
     with client:
         # Tasks have effects: each is its own, and none may be taken for another.
         futures = {
-            client.submit(
-                run_task, task, key=f"fogml-{task.unit.folder}-{task.fingerprint()}", pure=False
-            ): task
+            client.submit(run_task, task, key=f"fogml-{task.unit.folder}-{token_hex(8)}", pure=False): task
             for task in tasks
         }
         for future in completed_on(list(futures), loop=client.loop, raise_errors=False):

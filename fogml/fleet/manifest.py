@@ -37,6 +37,8 @@ class Unit:
         Axis, or an empty text.
     folder
         Name of the unit's own folder, unlike every other's.
+    fault
+        What is wrong with the unit's runs: it fails with that, and the others go on.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Unit:
     test: tuple[str, ...]
     axis: str
     folder: str
+    fault: str = ""
 
     @property
     def label(self) -> str:
@@ -62,7 +65,7 @@ def read_manifest(path: str | Path) -> list[Unit]:
     Raises
     ------
     InputError
-        Naming file, row and column of the first fault; a run that is not there is one.
+        Naming file, row and column of the first fault; a run that is not there is its unit's.
     """
     path = Path(path)
     if not path.is_file():
@@ -129,15 +132,16 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
         raise InputError(f"{where}: column 'unit' is empty; a serial number was expected")
     if job not in JOBS:
         raise InputError(f"{where}: column 'job': '{job}'; {', '.join(JOBS)} were expected")
+    faults: list[str] = []
     train, test = (
-        tuple(_found(run, f"{where}: column '{key}'", path.parent) for run in _listed(row.get(key)))
+        tuple(_found(run, f"{where}: column '{key}'", path.parent, faults) for run in _listed(row.get(key)))
         for key in ("train", "test")
     )
     if not train:
         raise InputError(f"{where}: column 'train' names no run")
     if not test and job != "diagnose":
         raise InputError(f"{where}: column 'test' names no run; '{job}' judges on at least one")
-    return Unit(name, job, train, test, axis, "")
+    return Unit(name, job, train, test, axis, "", "; ".join(faults))
 
 
 def _text(value: Any) -> str:
@@ -149,18 +153,19 @@ def _listed(value: Any) -> list[str]:
     return [text for item in items if (text := _text(item))]
 
 
-def _found(run: str, place: str, folder: Path) -> str:
-    """The run's path in full."""
+def _found(run: str, place: str, folder: Path, faults: list[str]) -> str:
+    """The run's path in full; one that is not there is added to the faults."""
     if run.startswith(SHIPPED):
         from fogml.runs.shipped import shipped_names
 
         if run.removeprefix(SHIPPED) not in shipped_names():
-            raise InputError(f"{place}: {run}: no such recording ships")
+            faults.append(f"{place}: {run}: no such recording ships")
         return run
     for home in (Path(), folder):
         if (home / run).is_file():
             return str((home / run).absolute())
-    raise InputError(f"{place}: {run}: no such file, here or beside the manifest")
+    faults.append(f"{place}: {run}: no such file, here or beside the manifest")
+    return str((folder / run).absolute())
 
 
 def _with_folders(units: list[Unit], path: Path) -> list[Unit]:

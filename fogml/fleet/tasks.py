@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fogml import __version__
 from fogml.errors import FogmlError, InputError
-from fogml.fleet.manifest import SHIPPED, Unit
+from fogml.fleet.manifest import Unit
+from fogml.json_files import write_json
 from fogml.outputs import NO_ROOM, whole_file
+from fogml.runs.sources import run_sources, sources_stamp
 
 OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
 DONE, FAILED = "done", "failed"
@@ -50,12 +53,17 @@ class Task:
         return Path(self.home) / self.unit.folder
 
     def fingerprint(self) -> str:
-        """What tells this task from another: the line of the manifest, the settings, the runs' files."""
-        runs = {path: _stamp(path) for path in (*self.unit.train, *self.unit.test)}
+        """What tells this task from another: all that its results depend on.
+
+        That is the line of the manifest, the settings, every file that is read for the runs, and the
+        version of fogml.
+        """
+        files = [run_sources(path) for path in (*self.unit.train, *self.unit.test)]
         values = {
-            "unit": [self.unit.name, self.unit.job, self.unit.axis],
-            "runs": [runs[path] for path in self.unit.train] + [[]] + [runs[path] for path in self.unit.test],
+            "unit": [self.unit.name, self.unit.job, self.unit.axis, self.unit.fault],
+            "runs": [len(self.unit.train), sources_stamp(file for of_run in files for file in of_run)],
             "settings": self.settings,
+            "version": __version__,
         }
         return hashlib.sha256(json.dumps(values, sort_keys=True, default=str).encode()).hexdigest()
 
@@ -70,7 +78,10 @@ def run_task(task: Task) -> dict[str, Any]:
     InputError
         If the disk is full: then other units would fail as well.
     """
-    fingerprint = task.fingerprint()
+    try:
+        fingerprint = task.fingerprint()
+    except InputError as error:
+        return lost(task, str(error))
     known = finished(task, fingerprint)
     if known is not None:
         return known
@@ -83,6 +94,8 @@ def run_task(task: Task) -> dict[str, Any]:
         "fingerprint": fingerprint,
     }
     try:
+        if task.unit.fault:
+            raise InputError(task.unit.fault)
         outcome |= {"status": DONE, "found": dict(task.job(task.unit, task.folder))}
     except OSError as error:
         if error.errno in NO_ROOM:
@@ -96,8 +109,7 @@ def run_task(task: Task) -> dict[str, Any]:
     try:
         task.folder.mkdir(parents=True, exist_ok=True)
         with whole_file(task.folder / OUTCOME) as partial:
-            text = json.dumps(outcome, indent=1, allow_nan=False, ensure_ascii=False)
-            partial.write_text(text + "\n", encoding="utf-8")
+            write_json(partial, outcome, indent=1)
     except OSError as error:
         raise full_disk(task.home, error) from error
     return outcome
@@ -112,12 +124,16 @@ def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | Non
         outcome = json.loads((task.folder / OUTCOME).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    same = isinstance(outcome, dict) and outcome.get("fingerprint") == (fingerprint or task.fingerprint())
-    return outcome if same and outcome.get("status") == DONE else None
+    if not isinstance(outcome, dict) or outcome.get("status") != DONE:
+        return None
+    try:
+        return outcome if outcome.get("fingerprint") == (fingerprint or task.fingerprint()) else None
+    except InputError:
+        return None  # the job tells which file can't be read
 
 
 def lost(task: Task, reason: str) -> dict[str, Any]:
-    """The outcome of a unit whose job ended its process."""
+    """The outcome of a unit whose job could not begin, or ended its process."""
     return {
         "schema": OUTCOME_SCHEMA,
         "unit": task.unit.name,
@@ -135,14 +151,3 @@ def full_disk(home: str, error: OSError) -> InputError:
         f"{home}: cannot be written ({error.strerror or error}); finished units are kept, make room and "
         "run the command again"
     )
-
-
-def _stamp(path: str) -> list[Any]:
-    """Name, size and time of change of a run and of its side file."""
-    if path.startswith(SHIPPED):
-        return [path]
-    stamps: list[Any] = [Path(path).name]
-    for file in (Path(path), Path(path).with_suffix(".yaml")):
-        if file.exists():
-            stamps += [file.stat().st_size, file.stat().st_mtime_ns]
-    return stamps

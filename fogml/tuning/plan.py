@@ -97,5 +97,10 @@ class Plan:
             "seed": self.seed,
             "sampler": self.sampler,
             "pruning": self.prune,
-            "training runs": [run.hash for run in runs],
+            "training runs": [run_identity(run) for run in runs],
         }
+
+
+def run_identity(run: Run) -> list[Any]:
+    """What has to be the same for a run to be the same: its columns, and its set-up facts."""
+    return [run.hash, run.facts.as_dict()]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 
 import pytest
 import yaml
@@ -151,11 +152,45 @@ def test_bad_fleets(invoke, tmp_path, monkeypatch, arguments, message):
     assert not (tmp_path / "out" / "fleet.json").exists()
 
 
-def test_a_manifest_with_a_missing_file(invoke, tmp_path):
-    path = tmp_path / "m.csv"
-    path.write_text("unit,job,train,test,axis\nF-1,train,a.csv,b.csv,x\n")
-    result = invoke("fleet", path, "--out", tmp_path / "out", status=2)
-    assert result.stderr == (
-        "fogml: m.csv: row 2: column 'train': a.csv: no such file, here or beside the manifest\n"
+def test_a_missing_file_fails_its_unit_and_the_others_go_on(invoke, invoke_json, tmp_path):
+    manifest = write_fleet(tmp_path, 2)
+    manifest.write_text(
+        manifest.read_text() + "F-9,train,gone.csv,0b.csv,x\nF-8,train,shipped:gone,0b.csv,x\n"
     )
-    assert not (tmp_path / "out").exists()
+    arguments = ("fleet", manifest, "--model", "M1", "--averaging", 40, "--out", tmp_path / "out")
+    units = {unit["unit"]: unit for unit in invoke_json(*arguments, status=1)["units"]}
+    assert [unit["status"] for unit in units.values()] == ["done", "done", "failed", "failed"]
+    reason = "fleet.csv: row 4: column 'train': gone.csv: no such file, here or beside the manifest"
+    assert units["F-9"]["reason"] == reason
+    assert "no such recording ships" in units["F-8"]["reason"]
+    # Once it is there, that unit is done, and the others are not done again.
+    done = tmp_path / "out" / "FOG-000-x" / "report.json"
+    before = done.stat().st_mtime_ns
+    for suffix in (".csv", ".yaml"):
+        text = (tmp_path / f"0a{suffix}").read_text().replace("FOG-000", "F-9")
+        (tmp_path / f"gone{suffix}").write_text(text)
+    (tmp_path / "0b.yaml").unlink()
+    units = {unit["unit"]: unit for unit in invoke_json(*arguments, status=1)["units"]}
+    assert units["F-9"]["status"] == "done"
+    assert done.stat().st_mtime_ns != before
+
+
+@pytest.mark.parametrize("suffix", [".yaml", ".yml"])
+def test_a_fleet_done_before_is_done_again_where_a_side_file_has_changed(invoke_json, tmp_path, suffix):
+    manifest = write_fleet(tmp_path, 1)
+    for name in ("0a", "0b"):
+        (tmp_path / f"{name}.yaml").rename(tmp_path / f"{name}{suffix}")
+        side = tmp_path / f"{name}{suffix}"
+        side.write_text(side.read_text() + 'scale_factor: {value: 1.0, unit: "count per deg/h"}\n')
+        run = tmp_path / f"{name}.csv"
+        run.write_text(run.read_text().replace("gyro [deg/h]", "gyro [count]"))
+    arguments = ("fleet", manifest, "--model", "none", "--averaging", 40, "--out")
+    first = invoke_json(*arguments, tmp_path / "out")["units"][0]
+    times = (tmp_path / f"0b{suffix}").stat()
+    side = tmp_path / f"0b{suffix}"
+    side.write_text(side.read_text().replace("1.0", "0.5"))
+    # Not told by its size, nor by a time that a copy keeps.
+    os.utime(side, ns=(times.st_atime_ns, times.st_mtime_ns))
+    resumed = invoke_json(*arguments, tmp_path / "out")["units"][0]
+    assert resumed == invoke_json(*arguments, tmp_path / "anew")["units"][0]
+    assert resumed["after"] != first["after"]

@@ -52,7 +52,6 @@ def test_folders_are_safe_and_unlike_each_other(folder):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (HEAD + "F-1,train,a.csv,missing.csv,x\n", "row 2: column 'test': missing.csv: no such file"),
         (HEAD + "F-1,trian,a.csv,b.csv,x\n", "'trian'; train, compare, diagnose"),
         (HEAD + ",train,a.csv,b.csv,x\n", "row 2: column 'unit' is empty"),
         (HEAD + "F-1,train,a.csv,,x\n", "column 'test' names no run"),
@@ -65,7 +64,6 @@ def test_folders_are_safe_and_unlike_each_other(folder):
         (HEAD, "holds no unit"),
         ("unit,job,trian\n", "unknown column 'trian'; did you mean 'train'"),
         ("unit,job\n", "column 'train' is missing"),
-        (HEAD + "F-1,train,shipped:nothing,b.csv,x\n", "no such recording ships"),
     ],
 )
 def test_faults(folder, text, message):
@@ -73,6 +71,20 @@ def test_faults(folder, text, message):
         read_manifest(manifest(folder, text))
     assert message in str(told.value)
     assert str(told.value).startswith("m.csv: ")
+
+
+@pytest.mark.parametrize(
+    ("runs", "fault"),
+    [
+        ("a.csv,missing.csv", "m.csv: row 2: column 'test': missing.csv: no such file"),
+        ("shipped:nothing,b.csv", "m.csv: row 2: column 'train': shipped:nothing: no such recording ships"),
+    ],
+)
+def test_a_run_that_is_not_there_is_its_unit_s_fault(folder, runs, fault):
+    text = HEAD + f"F-1,train,{runs},x\nF-2,train,a.csv,b.csv,x\n"
+    first, second = read_manifest(manifest(folder, text))
+    assert first.fault.startswith(fault)
+    assert not second.fault
 
 
 @pytest.mark.parametrize("text", ["a: 1\n", "[1, 2]\n", "schema: fogml.other/1\nunits: []\n"])
