@@ -10,6 +10,9 @@ from typing import Any
 
 from fogml.errors import InputError
 
+FAR_OFF = "is a value in the input, or a setting, far too large or far too small?"
+"""What to do about a result that is not finite."""
+
 
 def write_json(path: str | Path, values: Any, indent: int | None = 2) -> None:
     """Write values as a JSON file.
@@ -23,7 +26,7 @@ def write_json(path: str | Path, values: Any, indent: int | None = 2) -> None:
     path.write_text(json_text(values, path.name, indent) + "\n", encoding="utf-8")
 
 
-def json_text(values: Any, name: str, indent: int | None = None) -> str:
+def json_text(values: Any, name: str, indent: int | None = None, *, ascii_only: bool = False) -> str:
     """Values as the text of JSON.
 
     Parameters
@@ -34,6 +37,8 @@ def json_text(values: Any, name: str, indent: int | None = None) -> str:
         What they are called in a message.
     indent
         Spaces for each level; None for one line.
+    ascii_only
+        Whether other characters are written as escapes, for a terminal of any encoding.
 
     Raises
     ------
@@ -41,27 +46,47 @@ def json_text(values: Any, name: str, indent: int | None = None) -> str:
         If a number is NaN or infinite, naming its key.
     """
     try:
-        return json.dumps(values, indent=indent, allow_nan=False, ensure_ascii=False)
+        text = json.dumps(values, indent=indent, allow_nan=False, ensure_ascii=False)
     except ValueError:
-        for place, number in _not_finite(values, ""):
-            raise InputError(
-                f"{name}: '{place}' comes out as {number}, which is no result; is a value in the input, or a "
-                "setting, far too large or far too small?"
-            ) from None
+        check_finite(values, name)
         raise
+    # A file's name need not be text: what is not comes as the replacement character.
+    text = text.encode("utf-8", "surrogateescape").decode("utf-8", "replace")
+    return json.dumps(json.loads(text), indent=indent) if ascii_only else text
 
 
-def finite_json(value: Any) -> Any:
-    """The value with numpy's scalars and arrays as Python's, tuples as lists, and NaN, no value, as None.
+def check_finite(values: Any, name: str) -> None:
+    """Refuse a result that is none.
 
-    Infinities stay: `json_text` refuses them.
+    Raises
+    ------
+    InputError
+        If a number is NaN or infinite, naming its key.
     """
+    for place, number in _not_finite(values, ""):
+        raise InputError(f"{name}: '{place}' comes out as {number}, which is no result; {FAR_OFF}")
+
+
+def finite_json(values: Any, name: str = "result") -> Any:
+    """Values with numpy's scalars and arrays as Python's, tuples as lists, and NaN, no value, as None.
+
+    Raises
+    ------
+    InputError
+        If a number is infinite, naming its key.
+    """
+    plain = _plain(values)
+    check_finite(plain, name)
+    return plain
+
+
+def _plain(value: Any) -> Any:
     if isinstance(value, dict):
-        return {str(key): finite_json(item) for key, item in value.items()}
+        return {str(key): _plain(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
-        return [finite_json(item) for item in value]
+        return [_plain(item) for item in value]
     if hasattr(value, "tolist"):
-        return finite_json(value.tolist())
+        return _plain(value.tolist())
     if isinstance(value, float) and math.isnan(value):
         return None
     return value

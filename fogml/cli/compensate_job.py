@@ -62,7 +62,7 @@ def _compensate(
 ) -> NDArray[np.int64]:
     """Write the compensated run; how many samples got each flag, shape (3,)."""
     from fogml.models.compensation import compensate_blocks
-    from fogml.runs.writing import BlockWriter, header_cells
+    from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 
     counts = np.zeros(len(FLAGS), dtype=np.int64)
     written: Future[None] | None = None
@@ -75,7 +75,9 @@ def _compensate(
             else:
                 written.result()
             recorded = {cell: block.columns[name] for name, cell in header_cells(block).items()}
-            written = beside.submit(writer.write, {**recorded, **compensation.columns()})
+            written = beside.submit(
+                writer.write, {**recorded, **compensation.columns()}, carried_cells(block)
+            )
             counts += np.bincount(compensation.flag, minlength=len(FLAGS))
             work.advance(len(block))
         if written is None:

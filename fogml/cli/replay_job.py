@@ -11,8 +11,9 @@ from fogml.cli.runs import open_run
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
+from fogml.json_files import check_finite
 from fogml.runs.run import FloatArray, Run
-from fogml.runs.writing import BlockWriter, header_cells
+from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 from fogml.twin.replay import replay
 from fogml.twin.truth import read_truth
 from fogml.twin.twin import Twin
@@ -52,19 +53,21 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
         replayed = replay(twin, run, only=settings.only, truth=truth)
+        values = _values(settings, twin, run, replayed)
+        check_finite(values, run.name)
         work.doing(f"writing {out.name}")
         with settings.written_beside(out, "replay"):
             _write(run, replayed, out)
-    _print(settings, twin, run, replayed, terminal)
+    _print(settings, values, terminal)
 
 
 def _write(run: Run, replayed: FloatArray, out: Path) -> None:
     recorded = {cell: run.columns[name] for name, cell in header_cells(run).items()}
     with BlockWriter(out, run.facts) as writer:
-        writer.write({**recorded, "replayed [deg/h]": replayed})
+        writer.write({**recorded, "replayed [deg/h]": replayed}, carried_cells(run))
 
 
-def _print(settings: ReplaySettings, twin: Twin, run: Run, replayed: FloatArray, terminal: Terminal) -> None:
+def _values(settings: ReplaySettings, twin: Twin, run: Run, replayed: FloatArray) -> dict[str, Any]:
     assert settings.out
     values: dict[str, Any] = {
         "schema": "fogml.replay/1",
@@ -76,15 +79,21 @@ def _print(settings: ReplaySettings, twin: Twin, run: Run, replayed: FloatArray,
         "unit": "deg/h",
         "replayed_rms": _rms(replayed),
     }
-    if settings.only is not None:
-        terminal.say(f"{settings.only} changes {run.name} by {number(values['replayed_rms'])} deg/h rms")
-    else:
+    if settings.only is None:
         gap = run.gyro_deg_h - replayed if _in_rate(run) else None
         values["gap_mean"] = float(gap.mean()) if gap is not None else None
         values["gap_rms"] = _rms(gap) if gap is not None else None
+    return values
+
+
+def _print(settings: ReplaySettings, values: dict[str, Any], terminal: Terminal) -> None:
+    if settings.only is not None:
+        terminal.say(f"{settings.only} changes {values['run']} by {number(values['replayed_rms'])} deg/h rms")
+    else:
+        mean, rms = number(values["gap_mean"]), number(values["gap_rms"])
         terminal.say(
-            f"{run.name} replayed by {twin.name}: recorded less replayed is {number(values['gap_mean'])} "
-            f"deg/h in the mean, {number(values['gap_rms'])} deg/h rms over single samples"
+            f"{values['run']} replayed by {values['twin']}: recorded less replayed is {mean} deg/h in the "
+            f"mean, {rms} deg/h rms over single samples"
         )
     terminal.say(f"Written to {settings.out}")
     terminal.result(values)

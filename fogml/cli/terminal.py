@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 import time
 from collections.abc import Iterator, Sequence
@@ -12,6 +11,7 @@ from typing import Any, Protocol
 import typer
 
 from fogml.escaping import terminal_text, visible
+from fogml.json_files import json_text
 
 _LINE_EVERY_S = 10.0
 """Where stderr is no terminal, a line on long work this often."""
@@ -58,7 +58,7 @@ class Terminal:
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
         if self.as_json:
-            typer.echo(json.dumps(values, allow_nan=False))
+            typer.echo(json_text(values, "result", ascii_only=True))
 
     def table(self, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """A table on stdout for people: the first column left, the others right."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml import json_files
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored, arrays_to_write
@@ -41,8 +42,7 @@ def write_json(
         name: {"shape": list(array.values.shape), "values": array.decoded.tolist()}
         for name, array in stored.items()
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
-    (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
+    json_files.write_json(folder / JSON_FILE, document, indent=1)
     packed = save({name: np.ascontiguousarray(array) for name, array in arrays.items()})
     (folder / TENSORS_FILE).write_bytes(packed)
 

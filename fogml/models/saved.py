@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.json_files import json_text
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
 from fogml.models.intervals import Intervals
@@ -64,7 +65,7 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
         "bytes": sum(array.nbytes for array in arrays.values()),
         "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
-    text = json.dumps(document, indent=1, ensure_ascii=False, allow_nan=False)
+    text = json_text(document, MODEL_FILE, indent=1)
     with whole_folder(folder) as staging:
         (staging / MODEL_FILE).write_text(text + "\n", encoding="utf-8")
         (staging / WEIGHTS_FILE).write_bytes(weights)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.json_files import FAR_OFF
 from fogml.outputs import whole_file, whole_files
-from fogml.runs.columns import header
+from fogml.runs.columns import column_spec, header
 from fogml.runs.facts import SIDE_SUFFIXES, Facts, read_side_file, side_file, side_file_text
 from fogml.runs.raw_table import FACTS_KEY
 from fogml.runs.run import Run
@@ -62,6 +63,11 @@ def header_cells(run: Run) -> dict[str, str]:
     return {name: header(name, run.gyro_unit if name == "gyro" else None) for name in run.columns}
 
 
+def carried_cells(run: Run) -> set[str]:
+    """Header cells of a run's columns that the run format does not know: kept as they are."""
+    return {cell for name, cell in header_cells(run).items() if column_spec(name) is None}
+
+
 class BlockWriter:
     """Writes a run block by block to CSV or Parquet; the file appears when the block ends well.
 
@@ -91,6 +97,7 @@ class BlockWriter:
         self._stack = ExitStack()
         self._sink: Any = None
         self._schema: Schema | None = None
+        self._rows = 0
 
     def __enter__(self) -> Self:
         self._partial = self._stack.enter_context(_with_side_file(self.path, self.facts))
@@ -109,19 +116,30 @@ class BlockWriter:
             raise
         self._stack.__exit__(kind, error, trace)
 
-    def write(self, block: Run | Mapping[str, ArrayLike]) -> None:
+    def write(self, block: Run | Mapping[str, ArrayLike], carried: Collection[str] = ()) -> None:
         """Append a block: a run, or header cell to values of shape (n,).
+
+        Parameters
+        ----------
+        block
+            What is appended.
+        carried
+            Header cells of columns that are written as they were recorded, whatever they hold; of a run
+            those that the run format does not know.
 
         Raises
         ------
         InputError
-            If its columns are not those of the first block.
+            If its columns are not those of the first block, or a value is not finite.
         """
         import pyarrow as arrow
 
         if isinstance(block, Run):
+            carried = carried_cells(block)
             block = {cell: block.columns[name] for name, cell in header_cells(block).items()}
-        table = arrow.table({cell: np.asarray(values) for cell, values in block.items()})
+        arrays = {cell: np.asarray(values) for cell, values in block.items()}
+        self._check_finite({cell: values for cell, values in arrays.items() if cell not in carried})
+        table = arrow.table(arrays)
         if self._schema is None:
             self._schema = table.schema
             if self.facts is not None:
@@ -133,6 +151,17 @@ class BlockWriter:
                 f"{self.path.name}: a block's columns {table.column_names} are not the first block's"
             )
         self._append(table)
+
+    def _check_finite(self, block: Mapping[str, NDArray[np.generic]]) -> None:
+        for cell, values in block.items():
+            sound = np.isfinite(values)
+            if not sound.all():
+                row = int(np.argmin(sound))
+                raise InputError(
+                    f"{self.path.name}, column '{cell}', row {self._rows + row + 1}: comes out as "
+                    f"{values[row]}, which is no result; {FAR_OFF}"
+                )
+        self._rows += len(next(iter(block.values()), ()))
 
     def _opened(self, schema: Schema) -> Any:
         if self.path.suffix.lower() == ".parquet":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -59,6 +60,12 @@ class Timeline:
             raise InputError(
                 f"{self.programme.name}: 'sample_s' is {self.sample_s:g}; it lies above 0 and "
                 f"within the programme's {self.programme.total_s:g} s"
+            )
+        # Beyond that a float does not tell one sample's time from the next one's.
+        if self.programme.total_s / self.sample_s > 1.0 / sys.float_info.epsilon:
+            raise InputError(
+                f"{self.programme.name}: 'sample_s' is {self.sample_s:g}; the programme's "
+                f"{self.programme.total_s:g} s hold more such samples than times can be told apart"
             )
 
     def __len__(self) -> int:

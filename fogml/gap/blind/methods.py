@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import DIAGNOSIS, CaseFiles
+from fogml.json_files import write_json
 
 Method = Callable[[CaseFiles, Path], Any]
 """Reads a case's runs and writes ``gap.json`` into a folder."""
@@ -69,7 +69,6 @@ def diagnosis(case: CaseFiles, out: Path) -> Any:
         seed=case.seed,
         plan=False,
     )
-    text = json.dumps(found.as_dict(), allow_nan=False, ensure_ascii=False)
-    (out / "gap.json").write_text(text + "\n", encoding="utf-8")
+    write_json(out / "gap.json", found.as_dict(), indent=None)
     found.write_model(model, out / "twin.yaml")
     return found

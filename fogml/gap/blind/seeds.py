@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import read_json
+from fogml.json_files import write_json
 from fogml.outputs import whole_file
 
 FINAL_FROM = 1_000_000
@@ -55,4 +55,4 @@ def record_use(ledger: Path, seed: int, cases: int, truth_hash: str, figures: di
     ledger.parent.mkdir(parents=True, exist_ok=True)
     values = {"schema": SCHEMA, "uses": [*uses(ledger), use]}
     with whole_file(ledger) as partial:
-        partial.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(partial, values, indent=1)

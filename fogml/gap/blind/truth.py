@@ -7,7 +7,6 @@ run, and ``truth/SHA256SUMS`` the hashes of all of them, in the form that ``sha2
 from __future__ import annotations
 
 import hashlib
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from fogml.errors import InputError
+from fogml.json_files import write_json
 from fogml.outputs import whole_file
 from fogml.signals.noise_model import NoiseModel
 
@@ -227,7 +227,7 @@ def write_truth(folder: Path, truth: Truth, contributions: Mapping[tuple[str, in
     """
     values = truth.model_dump(mode="json", by_alias=True)
     with whole_file(folder / f"{truth.case}.json") as partial:
-        partial.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(partial, values, indent=1)
     with whole_file(folder / f"{truth.case}.npz") as partial, partial.open("wb") as file:
         arrays: dict[str, Any] = {_key(run, i): values for (run, i), values in contributions.items()}
         np.savez_compressed(file, **arrays)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fogml.gap.blind.signatures import Stack
+from fogml.json_files import write_json
 from fogml.outputs import whole_file
 from fogml.runs.run import FloatArray
 from fogml.signals.averages import block_averages
@@ -83,7 +83,7 @@ def write_answer(
         "how_far": _how_far(held_out, noise),
     }
     with whole_file(out / "gap.json") as partial:
-        partial.write_text(json.dumps(values, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        write_json(partial, values, indent=1)
 
 
 def floor_of(noise: NoiseModel, averaging_s: float = AVERAGING_S) -> float:
