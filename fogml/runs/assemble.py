@@ -134,23 +134,20 @@ def _listed(names: Collection[str]) -> str:
 def _finite_rows(
     table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
 ) -> tuple[IndexArray, Finding | None]:
-    """Rows whose values of the run format are all finite, and their squares too."""
+    """Rows whose values of the run format are all finite."""
     bad: NDArray[np.bool_] | None = None
     for name, values in columns.items():
-        # The sum of squares is finite unless a value's is not, and takes one pass without a mask.
+        # The sum is finite unless a value is not, and takes one pass without a mask.
         with np.errstate(over="ignore", invalid="ignore"):
-            is_sound = np.isfinite(np.dot(values, values))
+            is_sound = np.isfinite(values.sum())
         if is_sound or column_spec(name) is None:
             continue
-        with np.errstate(over="ignore"):
-            found = ~np.isfinite(values * values)
+        found = ~np.isfinite(values)
         if not found.any():
             continue
         if not repair:
             row = int(np.argmax(found))
-            value = values[row]
-            kind = f"{value:g}, whose square is infinite" if np.isfinite(value) else "infinite"
-            kind = "missing (NaN)" if np.isnan(value) else kind
+            kind = "missing (NaN)" if np.isnan(values[row]) else "infinite"
             raise InputError(
                 f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is {kind}, "
                 f"{int(found.sum())} such in the column; correct them, or {_REPAIR} drops the rows"

@@ -12,8 +12,9 @@ from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -148,7 +149,7 @@ def _tiles(edges: IntArray) -> IntArray:
     return np.ascontiguousarray(np.column_stack((first, np.minimum(first + _TILE, end), end)))
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@kernel(fastmath={"reassoc", "contract"})
 def _sum_about(values: FloatArray, origin: float) -> float:
     total = 0.0
     for i in range(len(values)):
@@ -156,7 +157,7 @@ def _sum_about(values: FloatArray, origin: float) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _block_sums(
     values: FloatArray, origin: FloatArray, first: IntArray, last: IntArray, sums: FloatArray
 ) -> None:
@@ -164,7 +165,7 @@ def _block_sums(
         sums[b] = _sum_about(values[first[b] : last[b]], origin[b])
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _totals_before(segment: IntArray, sums: FloatArray) -> FloatArray:
     """Sum of a segment's earlier blocks, compensated (Neumaier)."""
     before = np.zeros(len(sums))
@@ -182,7 +183,7 @@ def _totals_before(segment: IntArray, sums: FloatArray) -> FloatArray:
     return before
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _fill(
     values: FloatArray,
     mean: FloatArray,
@@ -200,7 +201,7 @@ def _fill(
             phases[i + shift] = before[b] + local
 
 
-@njit(cache=True, nogil=True, fastmath={"reassoc", "contract"})
+@kernel(fastmath={"reassoc", "contract"})
 def _squares(x0: FloatArray, x1: FloatArray, x2: FloatArray) -> float:
     total = 0.0
     for i in range(len(x0)):
@@ -209,7 +210,7 @@ def _squares(x0: FloatArray, x1: FloatArray, x2: FloatArray) -> float:
     return total
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _overlapping(phases: FloatArray, tiles: IntArray, factors: IntArray, sums: FloatArray) -> None:
     for t in range(len(tiles)):
         first, last, end = tiles[t]
@@ -224,7 +225,7 @@ def _overlapping(phases: FloatArray, tiles: IntArray, factors: IntArray, sums: F
                 )
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _stepped(
     phases: FloatArray, edges: IntArray, factors: IntArray, sums: FloatArray, counts: IntArray
 ) -> None:
@@ -239,7 +240,7 @@ def _stepped(
             sums[k] += total
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _lag_sums(phases: FloatArray, edges: IntArray, m: int, sums: FloatArray) -> None:
     for s in range(len(edges) - 1):
         averages = (edges[s + 1] - 1 - edges[s]) // m

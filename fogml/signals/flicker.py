@@ -15,8 +15,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ _FASTEST = -9.0
 _BLEND = 0.1533
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def flicker_kernel(
     white: FloatArray, decay: FloatArray, weight: FloatArray, states: FloatArray, last: float, blend: float
 ) -> float:

@@ -13,8 +13,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -23,7 +24,7 @@ _CHUNK = 512
 _INVERSE_FACTORIALS = np.array([1.0 / math.factorial(k) for k in range(11)])
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def phi_functions(x: float) -> tuple[float, float, float]:
     """exp(-x), phi_1 = (1 - exp(-x)) / x and phi_2 = (1 - phi_1) / x, exact to rounding for x >= 0.
 
@@ -41,20 +42,20 @@ def phi_functions(x: float) -> tuple[float, float, float]:
     return 1.0 - x * phi_1, phi_1, phi_2
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def held(rate: float, step: float) -> float:
     """Response after `step` to a constant input of 1: (1 - exp(-rate step)) / rate."""
     return step * phi_functions(rate * step)[1]
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def faded(rate: float, fade_rate: float, step: float) -> float:
     """Response after `step` to exp(-fade_rate t); no cancellation where the two rates meet."""
     slow, apart = min(rate, fade_rate), abs(rate - fade_rate)
     return math.exp(-slow * step) * held(apart, step)
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def windowed(
     rate: float, start: float, stop: float, on: float, off: float, source: tuple[float, float, float]
 ) -> float:
@@ -75,13 +76,13 @@ def windowed(
     return response * math.exp(-rate * (stop - end))
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _same(this: float, step: float, time: float) -> bool:
     """Whether two steps differ by the clock's rounding at most."""
     return abs(this - step) <= 1e-15 * abs(time)
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _product(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
     for i in range(len(out)):
         out[i] = 0.0
@@ -89,7 +90,7 @@ def _product(matrix: FloatArray, x: FloatArray, out: FloatArray) -> None:
             out[i] += matrix[i, j] * x[j]
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def modes_kernel(
     time: FloatArray,
     inputs: FloatArray,

@@ -11,9 +11,9 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
 from fogml.signals.sample_means import mean_cosine
 
@@ -171,7 +171,7 @@ def bursts(
     return series
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _shape_flicker(spectrum: Float32Array, coefficient: float, step: float, root: FloatArray) -> None:
     """Give white Fourier coefficients, shape (m, 2), the deviation of flicker noise; none at frequency 0."""
     spectrum[0, 0] = 0.0
@@ -202,7 +202,7 @@ def _folded_root() -> FloatArray:
     return np.ascontiguousarray(fitted.convert(kind=np.polynomial.Polynomial).coef)
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _gauss_markov_kernel(series: FloatArray, decay: float, newest: float, kept: float, state: float) -> None:
     """Turn white noise into means of a Gauss-Markov process of variance 1, in place."""
     for k in range(len(series)):

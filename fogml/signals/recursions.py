@@ -9,13 +9,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def lag_kernel(
     time: FloatArray, x: FloatArray, tau: FloatArray, last_time: float, last_x: float, state: float
 ) -> tuple[FloatArray, float]:
@@ -48,7 +49,7 @@ def lag_kernel(
     return out, y
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def play_kernel(x: FloatArray, half_width: float, state: float) -> tuple[FloatArray, float]:
     """Play operator: s = min(max(s, x - w), x + w); a NaN state starts in the middle."""
     n = len(x)
@@ -66,7 +67,7 @@ def play_kernel(x: FloatArray, half_width: float, state: float) -> tuple[FloatAr
     return out, s
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def window_steps_kernel(
     time: FloatArray, x: FloatArray, window: float, first: int
 ) -> tuple[FloatArray, FloatArray]:

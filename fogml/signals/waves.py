@@ -9,8 +9,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def sine(turns: ArrayLike) -> FloatArray:
     return out
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _sine_kernel(turns: FloatArray, out: FloatArray) -> None:
     for i in range(len(turns)):
         x = turns[i] - np.floor(turns[i] + 0.5)

@@ -11,9 +11,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
 
 FloatArray = NDArray[np.float64]
@@ -22,7 +22,7 @@ IntArray = NDArray[np.int64]
 _TILE = 128
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def step_terms(
     step: float,
     averaging: float,
@@ -81,7 +81,7 @@ def step_terms(
     return own
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def gains_kernel(
     kind: IntArray,
     steps: FloatArray,
@@ -159,7 +159,7 @@ def gains_kernel(
         deviation[i] = math.sqrt(total)
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def _predict(c: FloatArray, z: FloatArray, predicted: FloatArray) -> None:
     """Add c @ z, in the order in which `whiten_kernel` does, so that blocks end where they may."""
     size, width = z.shape
@@ -175,7 +175,7 @@ def _predict(c: FloatArray, z: FloatArray, predicted: FloatArray) -> None:
         j += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def whiten_kernel(
     values: FloatArray,
     kind: IntArray,
@@ -241,7 +241,7 @@ def whiten_kernel(
         states[:, left:right] = z
 
 
-@njit(cache=True, nogil=True)
+@kernel()
 def adjoint_kernel(
     values: FloatArray,
     kind: IntArray,

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import math
 
-from numba import boolean, float64, njit, types
+from numba import boolean, float64, types
 
 from fogml.signals.clock import BoolArray, FloatArray
+from fogml.signals.compiled import kernel
 
 # Declared read-only, the inputs take both the frozen columns of a run and ordinary arrays.
 _INPUT = types.Array(float64, 1, "C", readonly=True)
@@ -30,7 +31,7 @@ _KERNEL = types.void(
 _FEWEST_STEPS = 32
 
 
-@njit(_KERNEL, cache=True, nogil=True)
+@kernel(_KERNEL)
 def block_kernel(
     time: FloatArray,
     x: FloatArray,
@@ -81,7 +82,7 @@ def block_kernel(
             full[i] = True
 
 
-@njit(_KERNEL, cache=True, nogil=True)
+@kernel(_KERNEL)
 def slope_kernel(
     time: FloatArray,
     x: FloatArray,
@@ -129,7 +130,7 @@ def slope_kernel(
             full[i] = True
 
 
-@njit(_KERNEL, cache=True, nogil=True)
+@kernel(_KERNEL)
 def exponential_kernel(
     time: FloatArray,
     x: FloatArray,

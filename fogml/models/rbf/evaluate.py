@@ -9,8 +9,9 @@ from math import factorial, log
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
+
+from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ _DOUBLE = np.array([1 / log(2), 0.5, 700.0, *(log(2) ** k / factorial(k) for k i
 _SINGLE = np.array([1 / log(2), 0.5, 80.0, *(0.0,) * 5, *_DOUBLE[-8:]], dtype=np.float32)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+@kernel(error_model="numpy", fastmath=_FAST)
 def _gaussian(lanes, centre, inverse, table, bias, shift, bits, power, out):  # type: ignore[no-untyped-def]
     """Write exp(-|(x - centre) * inverse|^2) of the columns x of `lanes` (d, l) into `out` (l,).
 
@@ -60,7 +61,7 @@ def _gaussian(lanes, centre, inverse, table, bias, shift, bits, power, out):  # 
         out[lane] = p * power[lane]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+@kernel(error_model="numpy", fastmath=_FAST)
 def _fill(lanes, inputs, columns, start, stop):  # type: ignore[no-untyped-def]
     """Copy rows start:stop of the chosen columns into `lanes` (d, l), one input to a line."""
     for i in range(columns.shape[0]):
@@ -69,7 +70,7 @@ def _fill(lanes, inputs, columns, start, stop):  # type: ignore[no-untyped-def]
             lanes[i, row - start] = inputs[row, column]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+@kernel(error_model="numpy", fastmath=_FAST)
 def _network(inputs, columns, centres, inverse, weights, linear, constant, table, bias, shift, bits, out):  # type: ignore[no-untyped-def]
     """Constant + linear part + weighted basis functions of rows (n, k) into `out` (n,)."""
     size = bits.shape[0]
@@ -94,7 +95,7 @@ def _network(inputs, columns, centres, inverse, weights, linear, constant, table
             out[row] = value + total[row - start]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath=_FAST)
+@kernel(error_model="numpy", fastmath=_FAST)
 def _basis(inputs, columns, centres, inverse, table, bias, shift, bits, out):  # type: ignore[no-untyped-def]
     """Basis functions of rows (n, k) into `out` (j, n)."""
     size = bits.shape[0]
