@@ -22,7 +22,7 @@ from fogml.twin.effect import Effect, SensorEffect, ThermalEffect
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.plant.estimate import estimate_nodes, recorded_power
 from fogml.twin.plant.power import PowerWindows
-from fogml.twin.truth import Truth
+from fogml.twin.truth import Truth, read_time_on
 from fogml.twin.twin import RATE_WINDOW_S, EffectSetting, Twin
 
 _CACHE_BYTES = 256_000_000
@@ -276,7 +276,7 @@ _replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()
 def _power_windows(run: Run) -> PowerWindows:
     """When the unit was on: from the column ``time_on`` of a simulated run, else as recorded."""
     if "time_on" in run.columns and len(run):
-        ons = _power_ons(run.time, run.columns["time_on"])
+        ons = _power_ons(run.time, read_time_on(run.columns["time_on"]))
         starts = np.searchsorted(run.time, ons[1:])
         offs = [*run.time[starts - 1].tolist(), math.inf]
         return tuple(zip(ons, offs))

@@ -17,7 +17,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
-from fogml.twin.truth import Truth
+from fogml.twin.truth import TIME_ON, Truth, written_time_on
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
 from fogml.twin.world import Samples, World
@@ -176,13 +176,12 @@ def simulate_to_file(
 
 
 def _write(writer: Any, truth_writer: Any, recorded: Mapping[str, FloatArray], true: Truth | None) -> None:
-    writer.write({header(name, _units(name)): values for name, values in recorded.items()})
+    cells = {TIME_ON if name == "time_on" else header(name): values for name, values in recorded.items()}
+    if TIME_ON in cells:
+        cells[TIME_ON] = written_time_on(cells[TIME_ON])
+    writer.write(cells, (TIME_ON,))
     if truth_writer is not None and true is not None:
-        truth_writer.write(true.columns())
-
-
-def _units(name: str) -> str | None:
-    return "s" if name == "time_on" else None
+        truth_writer.write(true.columns(), (TIME_ON,))
 
 
 def _never_on(world: World) -> InputError:

@@ -16,6 +16,20 @@ _PART = "contribution of "
 _DRIVE_UNITS = {"heading": "deg", "shaking": "1", "dose": "Gy"}
 
 
+TIME_ON = "time_on [s]"
+"""Header cell of the time since the latest power-on."""
+
+
+def written_time_on(values: FloatArray) -> FloatArray:
+    """Time since power-on as a file has it: no value where the unit was on long before."""
+    return np.where(np.isinf(values), np.nan, values)
+
+
+def read_time_on(values: FloatArray) -> FloatArray:
+    """Time since power-on of a file: infinite where it has no value."""
+    return np.where(np.isnan(values), np.inf, values)
+
+
 @dataclass(frozen=True, eq=False)
 class Truth:
     """The truth of a simulation at each recorded sample; all columns of shape (n,).
@@ -60,7 +74,8 @@ class Truth:
 
     def columns(self) -> dict[str, FloatArray]:
         """Header cell to values, as in a truth file."""
-        columns = {"time [s]": self.time, "rate [deg/s]": self.table_rate, "time_on [s]": self.time_on}
+        on = written_time_on(self.time_on)
+        columns = {"time [s]": self.time, "rate [deg/s]": self.table_rate, TIME_ON: on}
         columns |= {f"{name} [degC]": values for name, values in self.nodes.items()}
         columns |= {header(name, _DRIVE_UNITS.get(name)): values for name, values in self.drives.items()}
         columns |= {"noise_free [deg/h]": self.noise_free, "noise [deg/h]": self.noise}
@@ -101,6 +116,7 @@ def truth_from_columns(columns: Mapping[str, FloatArray], source: str = "truth")
         named[name] = values.astype(np.float64, copy=False)
     parts = {name.removeprefix(_PART): named.pop(name) for name in list(named) if name.startswith(_PART)}
     time, rate, on = (named.pop(name) for name in ("time", "rate", "time_on"))
+    on = read_time_on(on)
     free, noise = named.pop("noise_free"), named.pop("noise")
     nodes = {name: values for name, values in named.items() if name.startswith("T_")}
     drives = {name: values for name, values in named.items() if name not in nodes}
@@ -126,7 +142,8 @@ def read_truth(path: str | Path) -> Truth:
         else:
             from pyarrow import csv
 
-            table = csv.read_csv(path)
+            # "nan" is a number: a column of nothing else stays one of numbers.
+            table = csv.read_csv(path, convert_options=csv.ConvertOptions(null_values=[""]))
         columns = {name: table.column(name).to_numpy() for name in table.column_names}
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: no truth can be read from it ({str(error).splitlines()[0]})") from None

@@ -7,7 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from fogml.json_files import finite_json
+from fogml.errors import InputError
+from fogml.json_files import finite_json, json_text
 from fogml.runs.run import Run
 from fogml.validation.compare import Comparison
 from fogml.validation.judge import judge
@@ -60,7 +61,11 @@ def test_comparison_keys(judgement):
 
 def test_numpy_and_numbers_that_json_lacks():
     values = finite_json(
-        {"a": np.float64(1.5), "b": np.arange(2), "c": (float("nan"), np.inf), "d": np.bool_(True)}
+        {"a": np.float64(1.5), "b": np.arange(2), "c": (float("nan"), 1.0), "d": np.bool_(True)}
     )
-    assert values == {"a": 1.5, "b": [0, 1], "c": [None, None], "d": True}
+    assert values == {"a": 1.5, "b": [0, 1], "c": [None, 1.0], "d": True}
     assert type(values["d"]) is bool
+    with pytest.raises(InputError, match=r"'test\[0\]\.after\.rms' comes out as inf"):
+        finite_json({"test": [{"after": {"rms": np.inf}}]})
+    with pytest.raises(InputError, match=r"report\.json: 'a' comes out as nan"):
+        json_text({"a": float("nan")}, "report.json")
