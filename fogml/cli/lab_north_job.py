@@ -55,7 +55,7 @@ class NorthSettings(Settings):
         pairs = [number_list(item, "0.2,600") if isinstance(item, str) else item for item in value]
         if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
             raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
-        return pairs
+        return [tuple(pair) for pair in pairs]
 
 
 def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
