@@ -254,7 +254,8 @@ class _Staging:
             raise type(error)(told(str(error))) from error
         except OSError as error:
             name = None if error.filename is None else os.fsdecode(error.filename)
-            if name is not None and str(self.path) not in name:
+            elsewhere = error.errno not in NO_ROOM if name is None else str(self.path) not in name
+            if elsewhere:
                 raise
             raise _unwritable(Path(told(name)) if name is not None else output, error) from error
 
