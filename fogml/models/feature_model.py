@@ -22,6 +22,7 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.folds import dealt_folds
+from fogml.models.intervals import Intervals
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.regressors import (
@@ -79,7 +80,7 @@ class FeatureModel(DriftModel):
 
     def __init__(
         self,
-        features: str | Features = "T, dT, T*dT",
+        features: str | Features | None = "T, dT, T*dT",
         regressor: Any = None,
         kind: str = "features",
         max_rows: int | None = None,
@@ -99,24 +100,37 @@ class FeatureModel(DriftModel):
         """
         group = checked_runs(runs)
         hashes = hash_ahead(group)
-        features = resolve_features(self.features, group)
+        features = self._chosen_features(group)
         rows = [run_rows(run, features) for run in group]
-        count = row_count(rows)
+        row_count(rows)
         learn_box(features, [part.atoms for part in rows])
-        regressor = self.unfitted_regressor(len(features))
-        regressor = for_features(regressor, features, [part.atoms for part in rows])
         self.features_ = features
-        if isinstance(regressor, LinearRegressor) and self.max_rows is None:
-            self.regressor_ = regressor.fit_parts([_part(part, features) for part in rows])
-        else:
-            table = table_of_rows(rows, features.compose, self.max_rows)
-            count = len(table)
-            self.regressor_ = self._fit_regressor(regressor, table)
+        count = self._fit_rows(rows, features)
         notes = [*(note for part in rows for note in part.notes), *self._fit_notes()]
         self.card_ = training_card(group, hashes=hashes, rows=count, box=features.box, notes=notes)
-        table = interval_table(rows)
-        self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=features.window_s)
+        self.intervals_ = self._interval(rows)
         return self
+
+    def _chosen_features(self, runs: Sequence[Run]) -> Features:
+        """Features for the training runs, no box learned yet."""
+        assert self.features is not None
+        return resolve_features(self.features, runs)
+
+    def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
+        """Fit the regressor to the training rows; how many rows it was fitted to."""
+        regressor = self.unfitted_regressor(len(features))
+        regressor = for_features(regressor, features, [part.atoms for part in rows])
+        if isinstance(regressor, LinearRegressor) and self.max_rows is None:
+            self.regressor_ = regressor.fit_parts([_part(part, features) for part in rows])
+            return row_count(rows)
+        table = table_of_rows(rows, features.compose, self.max_rows)
+        self.regressor_ = self._fit_regressor(regressor, table)
+        return len(table)
+
+    def _interval(self, rows: Sequence[RunRows]) -> Intervals:
+        """Half-widths of the prediction interval, from parts of the training rows left out."""
+        table = interval_table(rows)
+        return out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
 
     def unfitted_regressor(self, width: int) -> Any:
         """An unfitted regressor for `width` columns."""
@@ -175,6 +189,8 @@ class FeatureModel(DriftModel):
         """Names of the features, those of the text before a fit."""
         if hasattr(self, "features_"):
             return list(self.features_.names())
+        if self.features is None:
+            return []
         return [self.features] if isinstance(self.features, str) else list(self.features.names())
 
     def weights(self) -> dict[str, NDArray[Any]]:
@@ -203,9 +219,10 @@ class FeatureModel(DriftModel):
         """The fitted model as JSON-ready values and arrays."""
         self._check_fitted()
         values, arrays = regressor_to_saved(self.regressor_)
+        asked = self.features_ if self.features is None else self.features
         return {
             "features": self.features_.text,
-            "asked_features": self.features if isinstance(self.features, str) else self.features.text,
+            "asked_features": asked if isinstance(asked, str) else asked.text,
             "max_rows": self.max_rows,
             "regressor": values,
         }, arrays

@@ -46,6 +46,7 @@ MODEL_NAMES = (
     *PRESETS,
     "rbf",
     "rbf-patent",
+    "mixed-effects",
     "joint",
     "joint-patent",
 )
@@ -66,7 +67,8 @@ def make_model(
     name
         One of `MODEL_NAMES`, or a scikit-learn regressor by its dotted name.
     features
-        Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent`` and dotted names.
+        Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
+        dotted names.
     seed
         Seed of whatever is random.
     parameters
@@ -99,6 +101,10 @@ def make_model(
         return _linear(name, features or POLYNOMIAL_FEATURES, {"ridge": "auto", **(parameters or {})})
     if name in ("rbf", "rbf-patent"):
         return _rbf(name, features, {"seed": seed, **(parameters or {})})
+    if name == "mixed-effects":
+        from fogml.models.mixed_effects_model import MixedEffectsModel
+
+        return MixedEffectsModel(None if features is None else _understood(features))
     if features is not None:
         raise InputError(
             f"model '{name}' has its own columns, so features can't be stated for it; "

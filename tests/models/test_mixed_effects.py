@@ -1,0 +1,155 @@
+"""Mixed effects: the posterior against its closed form, what is a run's own, and drift that remembers."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.optimize import approx_fprime
+
+from fogml.features.features import Features
+from fogml.models.folds import dealt_blocks
+from fogml.models.mixed_effects import SizePriors, fit_mixed_effects, skill_of
+from fogml.models.mixed_effects_model import moves_both_ways
+from fogml.models.names import make_model
+from fogml.models.saved import load_model, save_model
+from fogml.models.table import TrainingTable
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+from tests.models.test_memory_features import made_run
+
+
+def table_of(X: np.ndarray, y: np.ndarray, runs: np.ndarray) -> TrainingTable:
+    time = np.concatenate([100.0 * np.arange(np.sum(runs == run)) for run in np.unique(runs)])
+    return TrainingTable(X, y, runs, time, dealt_blocks(len(y)))
+
+
+def cycle(seed: int, drift, own: float = 0.0, noise: float = 0.02) -> Run:  # type: ignore[no-untyped-def]
+    rng = np.random.default_rng(seed)
+    time = np.arange(0.0, 14400.0, 20.0)
+    T = 20.0 + 40.0 * np.sin(2.0 * np.pi * time / time[-1] + 0.3 * seed)
+    slow = own * (rng.normal() + rng.normal() * np.sin(time / 4000.0 + rng.uniform(0.0, 6.0)))
+    return Run(f"r{seed}", {"time": time, "gyro": drift(T) + slow + rng.normal(0.0, noise, len(T)), "T": T})
+
+
+def test_the_shared_part_is_generalised_least_squares_with_the_sizes_found() -> None:
+    # With one linear column, no curvature and vast prior sizes, the posterior mean is the GLS estimate under
+    # the covariance of the own parts that the fit itself states.
+    rng = np.random.default_rng(0)
+    runs = np.repeat([0, 1, 2], 60)
+    T = rng.uniform(-40.0, 60.0, 180)
+    y = 0.05 * T + np.repeat(rng.normal(0.0, 1.0, 3), 60) + rng.normal(0.0, 0.1, 180)
+    table = table_of(T[:, None], y, runs)
+    found = fit_mixed_effects(table, Features("T").terms, SizePriors(linear=10.0, spread=1e-3, offset=50.0))
+    spread = y.std()
+    shift, slow, fast = (
+        found.sizes[f"own {name}"] / spread for name in ("shift", "slow drift", "faster drift")
+    )
+    apart = np.abs(table.time_s[:, None] - table.time_s[None, :]) / 5900.0
+    same = runs[:, None] == runs[None, :]
+    covariance = same * (shift**2 + slow**2 * np.exp(-4.5 * apart**2) + fast**2 * np.exp(-20.0 * apart))
+    covariance += (found.sizes["noise"] / spread) ** 2 * np.eye(180)
+    design = np.column_stack([np.ones(180), T])
+    inverse = np.linalg.inv(covariance)
+    expected = np.linalg.solve(design.T @ inverse @ design, design.T @ inverse @ y)
+    assert found.coef[0] == pytest.approx(expected[1], rel=2e-4)
+    assert found.intercept == pytest.approx(expected[0], abs=2e-2)
+    errors = spread * np.sqrt(np.diag(np.linalg.inv(design.T @ inverse @ design)))
+    np.testing.assert_allclose(np.sqrt(np.diag(found.covariance)), errors, rtol=2e-2)
+
+
+def test_the_slope_of_the_evidence_is_its_finite_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    import fogml.models.mixed_effects as module
+
+    held = {}
+
+    def stop(loss, first, **_):  # type: ignore[no-untyped-def]
+        held["loss"], held["first"] = loss, first
+        return type("Found", (), {"x": first})
+
+    monkeypatch.setattr(module, "minimize", stop)
+    rng = np.random.default_rng(1)
+    T = rng.uniform(-40.0, 60.0, 60)
+    X = np.column_stack([T, T**2])
+    fit_mixed_effects(
+        table_of(X, 0.1 * T + rng.normal(size=60), np.repeat([0, 1], 30)), Features("T, T^2").terms
+    )
+    at = held["first"] + rng.normal(0.0, 0.3, len(held["first"]))
+    numeric = approx_fprime(at, lambda x: held["loss"](x)[0], 1e-6)
+    np.testing.assert_allclose(held["loss"](at)[1], numeric, rtol=1e-3, atol=1e-3)
+
+
+def test_what_is_a_runs_own_is_never_subtracted() -> None:
+    covered, subtracted = [], []
+    for draw in range(8):
+        *train, test = (cycle(100 * draw + run, lambda T: 0.0 * T, own=1.0) for run in range(4))
+        model = make_model("mixed-effects").fit(train)
+        subtracted.append(np.std(model.predict(test)))
+        low, high = model.predict_interval(test)
+        covered.append(np.mean((test.gyro > low) & (test.gyro < high)))
+    assert max(subtracted) < 0.15
+    assert 0.8 < np.mean(covered) <= 1.0
+
+
+def test_a_shared_cubic_is_found_beside_own_shifts() -> None:
+    def drift(T: np.ndarray) -> np.ndarray:
+        return 0.05 * T + 3e-4 * T**2 - 4e-6 * T**3
+
+    model = make_model("mixed-effects").fit([cycle(seed, drift, own=0.1) for seed in range(3)])
+    test = cycle(9, drift)
+    assert np.std(model.predict(test) - drift(test.columns["T"])) < 0.05 * test.gyro.std()
+    assert model.skill_ > 0.95
+
+
+def test_memory_in_the_truth_is_closed_on_another_run(tmp_path) -> None:  # type: ignore[no-untyped-def]
+    def bare(run: Run) -> Run:
+        # Light power is not among what the model looks for by itself.
+        columns = dict(run.columns)
+        columns["gyro"] = columns["gyro"] - 0.01 * columns.pop("light")
+        return Run(run.name, columns, run.facts)
+
+    train, test = [bare(made_run(1, 1.0)), bare(made_run(2, 0.7))], bare(made_run(3, 1.5))
+    model = make_model("mixed-effects").fit(train)
+    cubic = make_model("polynomial").fit(train)
+    left, before = ((test.gyro - m.predict(test)) for m in (model, cubic))
+    assert left.std() < 0.2 * before.std()
+    low, high = model.predict_interval(test)
+    means = [values.reshape(-1, 10).mean(axis=1) for values in (test.gyro[:1160], low[:1160], high[:1160])]
+    assert np.mean((means[0] > means[1]) & (means[0] < means[2])) > 0.85
+    save_model(model, tmp_path / "model")
+    np.testing.assert_array_equal(load_model(tmp_path / "model").predict(test), model.predict(test))
+    again = make_model("mixed-effects").fit(train)
+    np.testing.assert_array_equal(again.predict(test), model.predict(test))
+
+
+def test_features_follow_what_the_runs_can_tell() -> None:
+    whole = made_run(1, 1.0)
+    top = int(np.argmax(whole.columns["T"]))
+    assert make_model("mixed-effects").fit(whole[:top]).feature_names == ["T", "T^2", "T^3", "T^4", "T^5"]
+    names = make_model("mixed-effects").fit(whole).feature_names
+    assert "since_on(400 s)" in names and "play(T, 10 degC)" in names
+    unknown = Run("u", whole.columns, Facts(unit="U", axis="x"))
+    assert not any("since_on" in name for name in make_model("mixed-effects").fit(unknown).feature_names)
+    asked = make_model("mixed-effects", features="T, light").fit(whole)
+    assert asked.feature_names == ["T", "light"]
+
+
+@pytest.mark.parametrize(
+    ("temperatures", "expected"),
+    [
+        ([np.linspace(0.0, 50.0, 300)], False),
+        ([np.linspace(0.0, 50.0, 300), np.linspace(50.0, 0.0, 300)], True),
+        ([np.linspace(0.0, 50.0, 300), np.linspace(50.0, 45.0, 300)], False),
+        ([np.linspace(0.0, 50.0, 3000) + np.random.default_rng(0).normal(0.0, 0.3, 3000)], False),
+    ],
+)
+def test_both_ways_means_a_fifth_of_the_span_each_way(temperatures: list, expected: bool) -> None:
+    assert moves_both_ways(temperatures) is expected
+
+
+def test_skill_is_the_least_squares_share_between_nothing_and_all() -> None:
+    p = np.array([1.0, -1.0, 2.0])
+    assert skill_of([]) == (1.0, 0.0)
+    assert skill_of([(p, 0.25 * p)])[0] == pytest.approx(0.25)
+    assert skill_of([(p, -p)])[0] == 0.0
+    assert skill_of([(p, 3.0 * p)])[0] == 1.0
+    assert skill_of([(p, 0.5 * p)])[1] == pytest.approx(0.0, abs=1e-12)
