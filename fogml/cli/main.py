@@ -16,7 +16,7 @@ import typer
 from typer.core import TyperGroup
 
 from fogml import __version__
-from fogml.errors import FogmlError
+from fogml.errors import FogmlError, printable
 from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
 from fogml.processes import end_as_interrupted, quiet_libraries
@@ -100,6 +100,15 @@ class LazyGroup(TyperGroup):
             raise
         except OSError as error:
             fail(_system_message(error))
+        except UnicodeEncodeError as error:
+            # Python takes any bytes for a name; the libraries that read and write files take text.
+            name = str(error.object)
+            if not any("\udc80" <= letter <= "\udcff" for letter in name):
+                raise
+            fail(
+                f"{printable(name)}: a name that is no text in UTF-8; rename the file or folder, or set a "
+                "locale of UTF-8 (LC_ALL=C.UTF-8)"
+            )
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")
         except KeyboardInterrupt as interrupt:

@@ -110,3 +110,33 @@ def test_an_interrupt_while_the_staging_folder_is_made_leaves_nothing(whole, tmp
     with pytest.raises(KeyboardInterrupt), whole(tmp_path / "out"):
         pass
     assert not list(tmp_path.iterdir())
+
+
+def test_a_name_that_is_no_text_is_told_or_taken(run_files, tmp_path, invoke):
+    named = os.fsdecode(bytes(tmp_path) + b"/a\xff.csv")
+    os.rename(tmp_path / "a.csv", named)
+    result = invoke("inspect", named, status=2)
+    assert len(result.stderr.splitlines()) == 1
+    assert "a name that is no text in UTF-8; rename" in result.stderr
+    # A folder of results may have any name; running its settings again finds it.
+    out = Path(os.fsdecode(bytes(tmp_path) + b"/out\xfe"))
+    runs = (tmp_path / "b.csv", "--test", tmp_path / "b.csv", "--model", "M1")
+    invoke("train", *runs, "--out", out)
+    report = (out / "report.json").read_bytes()
+    invoke("train", "--config", out / "train.config.yaml")
+    assert (out / "report.json").read_bytes() == report
+    assert {path.name for path in tmp_path.glob("*out*")} == {out.name}
+
+
+def test_a_locale_of_ascii(run_files, tmp_path):
+    ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii", "PYTHONCOERCECLOCALE": "0"}
+    found = subprocess.run(
+        [*PROGRAM, "noise", "a.csv", "-o", "out"],
+        cwd=tmp_path,
+        env={**os.environ, **ascii_only},
+        capture_output=True,
+        timeout=120,
+    )
+    assert found.returncode == 0, found.stderr
+    assert found.stdout.isascii() and found.stderr.isascii()
+    json.loads((tmp_path / "out" / "noise.json").read_text(encoding="utf-8"))

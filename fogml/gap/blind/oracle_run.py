@@ -10,7 +10,7 @@ from typing import Any
 from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import OUTCOME, BlindFolder
 from fogml.gap.blind.methods import ORACLE
-from fogml.gap.blind.run import Progress, RunPlan, count_samples, outcome_of
+from fogml.gap.blind.run import Progress, RunPlan, case_stamp, count_samples, outcome_of
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.processes import in_processes
@@ -47,6 +47,7 @@ def _one(path: Path, answers: Path, code: str, name: str) -> tuple[str, bool]:
             answer = {"done": False, "reason": "error", "message": f"{type(error).__name__}: {error}"}
         answer["seconds"] = time.perf_counter() - began
         samples = count_samples(folder.cases / name)
-        values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples, code)
+        files = case_stamp(folder.cases / name)
+        values = outcome_of(name, ORACLE, answer, "not sealed: it is given the truth", samples, code, files)
         write_json(out / OUTCOME, values, indent=1)
     return name, bool(answer["done"])

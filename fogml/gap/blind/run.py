@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import queue
 import shutil
 import threading
@@ -14,12 +13,14 @@ from typing import Any
 import fogml
 from fogml.errors import InputError
 from fogml.gap.blind.code_state import code_state
-from fogml.gap.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files
+from fogml.gap.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files, read_json
 from fogml.gap.blind.pool import Worker, WorkerLost
 from fogml.gap.blind.sealing import own_roots, within
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.runs.sources import sources_stamp
 
+_FILES = "files"
 LIMIT_S = 600.0
 """Time that a case may take unless told otherwise [s]."""
 Progress = Callable[[str], None]
@@ -91,7 +92,10 @@ class RunPlan:
         outcome = self.answers / name / OUTCOME
         if not outcome.is_file():
             return False
-        return not self.retry or bool(json.loads(outcome.read_text(encoding="utf-8"))["done"])
+        told = read_json(outcome)
+        if _FILES in told and told[_FILES] != case_stamp(self.folder.cases / name):
+            return False  # the case is another one by now
+        return not self.retry or bool(told.get("done"))
 
 
 @dataclass
@@ -167,9 +171,9 @@ def check_out_of_reach(plan: RunPlan) -> None:
 
 
 def outcome_of(
-    case: str, method: str, answer: dict[str, Any], locks: str, samples: int, code: str
+    case: str, method: str, answer: dict[str, Any], locks: str, samples: int, code: str, files: str
 ) -> dict[str, Any]:
-    """The values of ``outcome.json``, schema ``fogml.blind_outcome/1``."""
+    """The values of ``outcome.json``, schema ``fogml.blind_outcome/1``; `files` is the case's stamp."""
     return {
         "schema": OUTCOME_SCHEMA,
         "case": case,
@@ -182,7 +186,13 @@ def outcome_of(
         "sealed_by": locks,
         "version": fogml.__version__,
         "code": code,
+        _FILES: files,
     }
+
+
+def case_stamp(folder: Path) -> str:
+    """A hash of all files of a case: an answer is to these."""
+    return sources_stamp(sorted(path for path in folder.iterdir() if path.is_file()))
 
 
 def count_samples(folder: Path) -> int:
@@ -225,6 +235,7 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
     source, case, out = plan.folder.cases / name, worker.home / name, worker.home / "answer"
     # A copy, not a link: nothing in it leads back to the suite.
     shutil.copytree(source, case)
+    files = case_stamp(case)
     out.mkdir()
     try:
         answer = worker.ask({"case": name, "out": out.name, "seed": plan.seed}, plan.limit_s)
@@ -237,7 +248,7 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
     if shared.stop.is_set():
         return False
     method, samples = plan.name or plan.method, count_samples(case)
-    values = outcome_of(name, method, answer, worker.locks, samples, shared.code)
+    values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
     with whole_folder(plan.answers, shared=True) as staging:
         shutil.copytree(out, staging / name)
         write_json(staging / name / OUTCOME, values, indent=1)

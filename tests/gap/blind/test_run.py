@@ -120,6 +120,17 @@ def test_failures_are_recorded_and_the_rest_goes_on(folder: BlindFolder, tmp_pat
     assert again.left() == ("0002", "0003", "0004", "0005")
 
 
+def test_a_case_that_has_changed_is_answered_again(folder: BlindFolder, tmp_path: Path) -> None:
+    plan = RunPlan(folder, "cheat:ends", code=tmp_path / "code", only=("0001", "0006"))
+    assert run_cases(plan) == (2, 0)
+    assert plan.left() == ()
+    side = folder.cases / "0006" / "fit-1.yml"
+    side.write_text("latitude: 39.9\n")
+    assert plan.left() == ("0006",)
+    assert run_cases(plan) == (1, 0)
+    assert plan.left() == ()
+
+
 def test_shards_share_the_cases(folder: BlindFolder) -> None:
     parts = [RunPlan(folder, "abstain", shard=(i, 4)).left() for i in (1, 2, 3, 4)]
     assert sorted(name for part in parts for name in part) == list(folder.names())
