@@ -131,7 +131,7 @@ class LimitSettings(Settings):
             except ValueError:
                 equals = ""
             if not equals:
-                raise ValueError(f"'{text}' is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
+                raise ValueError(f"{quoted(text)} is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
         return limits
 
 
@@ -147,7 +147,7 @@ def named_values(texts: list[Any]) -> dict[str, Any]:
     for text in texts:
         name, equals, value = str(text).partition("=")
         if not (equals and name.strip()):
-            raise ValueError(f"'{text}' sets nothing; write NAME=VALUE, e.g. centres=16")
+            raise ValueError(f"{quoted(text)} sets nothing; write NAME=VALUE, e.g. centres=16")
         values[name.strip()] = parse_yaml(value, quoted(text))
     return values
 
@@ -163,7 +163,7 @@ def number_list(text: str, example: str) -> list[float]:
     try:
         return [float(part) for part in text.split(",")]
     except ValueError:
-        raise ValueError(f"'{text}' is no list of numbers; write e.g. {example}") from None
+        raise ValueError(f"{quoted(text)} is no list of numbers; write e.g. {example}") from None
 
 
 def read_config(path: Path) -> dict[str, Any]:

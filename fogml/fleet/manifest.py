@@ -131,7 +131,7 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
     if not name:
         raise InputError(f"{where}: column 'unit' is empty; a serial number was expected")
     if job not in JOBS:
-        raise InputError(f"{where}: column 'job': '{job}'; {', '.join(JOBS)} were expected")
+        raise InputError(f"{where}: column 'job': {quoted(job)}; {', '.join(JOBS)} were expected")
     faults: list[str] = []
     train, test = (
         tuple(_found(run, f"{where}: column '{key}'", path.parent, faults) for run in _listed(row.get(key)))
@@ -175,8 +175,8 @@ def _with_folders(units: list[Unit], path: Path) -> list[Unit]:
     for (name, axis, job), count in twice.items():
         if count > 1:
             raise InputError(
-                f"{path.name}: unit {name}{' axis ' + axis if axis else ''} has the job '{job}' {count} "
-                "times; once was expected"
+                f"{path.name}: unit {name}{' axis ' + axis if axis else ''} has the job {quoted(job)} "
+                f"{count} times; once was expected"
             )
     jobs = len({unit.job for unit in units}) > 1
     placed, taken = [], set()

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 
 
 @dataclass(frozen=True)
@@ -153,6 +153,6 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
         )
     if unit not in spec.units:
         raise InputError(
-            f"{file}: column '{name}' has unit '{unit}', not accepted here; use one of {accepted}"
+            f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; use one of {accepted}"
         )
     return spec.units[unit]

@@ -96,6 +96,11 @@ def csv_dialect(path: Path) -> CsvDialect:
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
     first = next((i for i, line in enumerate(lines) if line.strip()), None)
+    if cut and (first is None or len(lines) == 1):
+        raise InputError(
+            f"{path.name}: no line ends within the first {_HEAD_BYTES} bytes; a header such as "
+            "'time [s],gyro [deg/h],T [degC]' and rows of numbers were expected"
+        )
     if first is None:
         raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
     if any(ord(character) < 32 and character != "\t" for character in lines[first]):

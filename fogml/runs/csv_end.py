@@ -5,13 +5,12 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.csv_dialect import CsvDialect, number
 from fogml.runs.findings import Finding
 
 _TAIL_BYTES = 1 << 15
 _LEAST_LINES = 20
-_LONGEST_SHOWN = 60
 
 
 def note_of_end(path: Path) -> list[Finding]:
@@ -45,9 +44,9 @@ def cut_line(path: Path, dialect: CsvDialect) -> str | None:
 
 def cut_error(path: Path, line: str) -> InputError:
     """What to say of a file that ends with such a line."""
-    shown = line.strip()[-_LONGEST_SHOWN:]
+    shown = quoted(line.strip())
     return InputError(
-        f"{path.name}, last line: the file ends in the middle of a number, '{shown}'; "
+        f"{path.name}, last line: the file ends in the middle of a number, {shown}; "
         "copy or export it again, or --repair drops the row"
     )
 

@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
 from fogml.runs.csv_end import cut_error, cut_line, note_of_end
 from fogml.runs.csv_lines import LineReader, line_of_row
+from fogml.runs.csv_quotes import quotes_are_plain
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
 
@@ -37,6 +38,7 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
 
     dialect = csv_dialect(path)
     try:
+        _check_quotes(path, dialect)
         table = arrow_csv.read_csv(path, **_options(dialect))
     except OSError as error:
         raise _unreadable(path, error) from None
@@ -75,6 +77,7 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
         raise cut_error(path, cut)
     start = 0
     try:
+        _check_quotes(path, dialect)
         with arrow_csv.open_csv(path, **_options(dialect, _STREAM_BYTES)) as reader:
             for table in _regrouped(reader, rows):
                 raw = _raw(path, dialect, table, start)
@@ -89,6 +92,14 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
             yield raw.noting(lines.findings())
     if start == 0:
         raise no_samples(path.name)
+
+
+def _check_quotes(path: Path, dialect: CsvDialect) -> None:
+    """Leave a file to the exact reader where the fast one would read its quotation marks otherwise."""
+    import pyarrow as arrow
+
+    if not quotes_are_plain(path, dialect.separator):
+        raise arrow.ArrowInvalid("quotation marks")
 
 
 def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:

@@ -11,13 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.csv_dialect import CsvDialect, number
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
 
 _CHUNK_ROWS = 1 << 16
-_LONGEST_SHOWN = 40
 
 
 def line_of_row(path: Path, dialect: CsvDialect, row: int) -> int:
@@ -120,7 +119,7 @@ class LineReader:
         found = [
             Finding(
                 "text_column",
-                f"column '{self.dialect.name(i)}' holds text, first in line {line}; missing there",
+                f"column {quoted(self.dialect.name(i))} holds text, first in line {line}; missing there",
                 column=self.dialect.name(i),
             )
             for i, line in sorted(self.text_lines.items())
@@ -145,7 +144,7 @@ class LineReader:
         with self.path.open("r", encoding=dialect.encoding, errors="replace", newline="") as file:
             for _ in range(dialect.header_line):
                 file.readline()
-            reader = csv.reader(_without_zero_bytes(file), delimiter=dialect.separator)
+            reader = csv.reader(_without_zero_bytes(file), delimiter=dialect.separator, strict=True)
             begin = dialect.header_line + 1
             try:
                 for fields in reader:
@@ -169,10 +168,9 @@ class LineReader:
             text = fields[i]
             value = number(text, dialect.decimal)
             if value is None and i in dialect.known:
-                shown = text.strip()[:_LONGEST_SHOWN]
                 mark = "comma" if dialect.decimal == "," else "point"
                 raise _Fault(
-                    f"line {line}, column '{dialect.name(i)}': '{shown}' is not a number "
+                    f"line {line}, column {quoted(dialect.name(i))}: {quoted(text.strip())} is not a number "
                     f"(with a decimal {mark})"
                 )
             if value is None:

@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterator
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import Facts
 from fogml.runs.raw_table import (
@@ -90,7 +90,7 @@ def write_hdf5(run: Run, cells: dict[str, str], path: Path) -> None:
             label, unit = parse_header(cell)
             if "/" in label or "\0" in label or label in ("", ".", "run"):
                 raise InputError(
-                    f"{path.name}: column '{label}' can't be named so in an HDF5 file; rename it, "
+                    f"{path.name}: column {quoted(label)} can't be named so in an HDF5 file; rename it, "
                     "or write CSV or Parquet"
                 )
             dataset = file.create_dataset(

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, listed, quoted
 from fogml.runs.findings import Finding
 from fogml.runs.profile_schema import ImportProfile
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
-_NEWLINE, _RETURN, _BLANK, _TAB = 10, 13, 32, 9
+_NEWLINE, _RETURN, _BLANK, _TAB, _STRAY = 10, 13, 32, 9, 31
 _SIGNATURE_LINES = 20
 
 
@@ -61,7 +61,11 @@ class _Lines:
         if starts[-1] == len(text):
             starts, ends = starts[:-1], ends[:-1]
         returns = (ends > starts) & (text[np.maximum(ends - 1, 0)] == _RETURN)
-        return cls(text, starts, ends - returns)
+        ends = ends - returns
+        # A carriage return within a line is no line's end: it is a fault of the field that it stands in.
+        stray = text == _RETURN
+        stray[ends[returns]] = False
+        return cls(np.where(stray, _STRAY, text).astype(np.uint8), starts, ends)
 
     def line(self, number: int) -> str:
         return self.text[self.starts[number] : self.ends[number]].tobytes().decode()
@@ -118,22 +122,23 @@ def _content(path: Path, profile: ImportProfile) -> bytes:
     if not raw.strip():
         raise InputError(f"{path.name}: the file is empty")
     try:
-        text = raw.decode(profile.encoding)
-    except UnicodeDecodeError as error:
+        text = raw.decode(profile.encoding).removeprefix("\ufeff").encode()
+    except UnicodeError as error:
+        place = f"byte {error.start}" if isinstance(error, UnicodeDecodeError) else "it"
         raise InputError(
-            f"{path.name}: byte {error.start} is no {profile.encoding} text; "
+            f"{path.name}: {place} is no {profile.encoding} text; "
             "give the file's encoding in the profile (key 'encoding')"
         ) from None
-    if "\0" in text[:4096]:
+    if b"\0" in text[:4096]:
         raise InputError(f"{path.name}: this is a binary file, a text file was expected")
-    return text.removeprefix("\ufeff").encode()
+    return text
 
 
 class _Reader:
     def __init__(self, file: str, profile: ImportProfile, profile_name: str) -> None:
         self.file = file
         self.profile = profile
-        self.hint = f"is this a file for the profile '{profile_name}'?"
+        self.hint = f"is this a file for the profile {quoted(profile_name)}?"
 
     def read(self, content: bytes) -> LoggerTable:
         profile = self.profile
@@ -142,13 +147,17 @@ class _Reader:
         if signature is not None:
             head = [lines.line(number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
             if not any(signature in line for line in head):
-                raise InputError(f"{self.file}: '{signature}' was expected in its first lines; {self.hint}")
+                raise InputError(
+                    f"{self.file}: {quoted(signature)} was expected in its first lines; {self.hint}"
+                )
         first = lines.first_bytes()
         used = first != 0
         used[: profile.skip_lines] = False
         if profile.comment is not None:
-            for number in np.flatnonzero(used & (first == profile.comment.encode()[0])).tolist():
-                if lines.line(number).lstrip().startswith(profile.comment):
+            for number in np.flatnonzero(
+                used & (first == profile.comment.encode(errors="replace")[0])
+            ).tolist():
+                if lines.line(number).lstrip(" \t").startswith(profile.comment):
                     used[number] = False
         numbers = np.flatnonzero(used)[profile.header_lines :]
         names: list[str] | None = None
@@ -157,8 +166,8 @@ class _Reader:
             numbers = numbers[1:]
         if len(numbers) == 0:
             raise InputError(f"{self.file}: no data rows; {self.hint}")
-        places = self._places(names)
         fields = profile.fields or (len(names) if names else 0)
+        places = self._places(names, fields)
         return self._table(lines, numbers, fields, places)
 
     def _names(self, line: str) -> list[str]:
@@ -166,7 +175,7 @@ class _Reader:
         names = line.split(separator)
         return [name.strip().strip('"') for name in names] if self.profile.strip_names else names
 
-    def _places(self, names: list[str] | None) -> dict[str | int, int]:
+    def _places(self, names: list[str] | None, fields: int) -> dict[str | int, int]:
         """Position of each source column."""
         places: dict[str | int, int] = {}
         for source in self.profile.sources:
@@ -177,9 +186,16 @@ class _Reader:
             if len(found) != 1:
                 fault = "no column" if not found else "more than one column"
                 raise InputError(
-                    f"{self.file}: {fault} '{source}'; the header holds {', '.join(names or [])}; {self.hint}"
+                    f"{self.file}: {fault} {quoted(source)}; the header holds {listed(names or [])}; "
+                    f"{self.hint}"
                 )
             places[source] = found[0]
+        for source, place in places.items():
+            if place >= fields:
+                raise InputError(
+                    f"{self.file}: source {quoted(source)} is column {place} counted from 0, and a row has "
+                    f"{fields} fields; {self.hint}"
+                )
         return places
 
     def _table(
@@ -202,7 +218,7 @@ class _Reader:
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
                 raise InputError(
                     f"{self.file}: line {line + 1} holds text or nothing in a number's place "
-                    f"({int(faulty.sum())} such rows): '{lines.line(line)[:80]}'; {self.hint}"
+                    f"({int(faulty.sum())} such rows): {quoted(lines.line(line))}; {self.hint}"
                 )
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True
@@ -226,7 +242,8 @@ class _Reader:
             return csv.read_csv(
                 pa.BufferReader(content),
                 csv.ReadOptions(column_names=names),
-                csv.ParseOptions(delimiter=separator, ignore_empty_lines=False),
+                # A mark that is not closed must not swallow the lines below it.
+                csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
                 csv.ConvertOptions(
                     column_types=dict.fromkeys(wanted, kind),
                     include_columns=sorted(set(wanted)),
@@ -262,7 +279,8 @@ def _numbers(text: Any, decimal: str) -> Any:
     import pyarrow as pa
     import pyarrow.compute as compute
 
-    plain = compute.utf8_trim_whitespace(text)
+    plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
+    plain = compute.utf8_trim_whitespace(plain)
     if decimal == ",":
         plain = compute.replace_substring(plain, ",", ".")
     plain = compute.replace_substring_regex(plain, r"^\+", "")

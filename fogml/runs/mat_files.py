@@ -19,7 +19,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
@@ -81,8 +81,8 @@ def write_mat(
     for label, _ in labels.values():
         if not _VARIABLE.match(label) or label in (*_RESERVED, "run"):
             raise InputError(
-                f"{path.name}: column '{label}' can't be named so in a MATLAB file; rename it to letters, "
-                "digits and underscores, or write CSV or Parquet"
+                f"{path.name}: column {quoted(label)} can't be named so in a MATLAB file; rename it to "
+                "letters, digits and underscores, or write CSV or Parquet"
             )
     if version is None:
         version = "7.3" if 8 * len(run) >= _LARGEST_V5_BYTES else "5"

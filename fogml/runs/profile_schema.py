@@ -6,6 +6,8 @@ messages name lines of the file, which editors count from 1.
 
 from __future__ import annotations
 
+import codecs
+import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -19,6 +21,12 @@ from fogml.yaml_text import read_yaml
 
 PROFILE_FOLDER = Path(__file__).parent / "import_profiles"
 
+_DECIMAL = r"([-+]?\d{1,30}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,3})?)"
+_QUOTIENT = re.compile(rf"\s*{_DECIMAL}\s*/\s*{_DECIMAL}\s*\Z", re.ASCII)
+_PART_OF_A_NAME = re.compile(r"\w[\w.+-]{0,39}\Z")
+_NO_TEXT = frozenset({"idna", "punycode", "unicode_escape", "raw_unicode_escape", "undefined", "utf_7"})
+"""Codecs of Python that no logger writes; some take quadratic time."""
+
 SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
 
@@ -26,10 +34,10 @@ def _number(value: Any) -> Any:
     """A number, or the quotient of two written as text ("1/340")."""
     if not isinstance(value, str):
         return value
+    found = _QUOTIENT.match(value)
     try:
-        numerator, _, denominator = value.partition("/")
-        return float(Fraction(numerator) / Fraction(denominator or "1"))
-    except (ValueError, ZeroDivisionError):
+        return float(Fraction(found[1]) / Fraction(found[2])) if found else value
+    except (OverflowError, ZeroDivisionError):
         raise ValueError("a number or a quotient such as '1/340' was expected") from None
 
 
@@ -150,19 +158,29 @@ class ImportProfile(_Strict):
         for leg, (first, end) in self.legs.items():
             if not 0 <= first < end:
                 raise ValueError(f"key 'legs.{leg}': [first row, row after the last] was expected")
+        for key, names in (("axes", self.axes), ("legs", self.legs)):
+            for name in names:
+                # Files are named after them.
+                if not _PART_OF_A_NAME.match(name):
+                    raise ValueError(
+                        f"key '{key}': {quoted(name)}: letters, digits, '.', '+' and '-' were expected"
+                    )
         for axis in self.axis_facts:
             if axis not in self.axes:
                 raise ValueError(f"key 'axis_facts.{axis}': no such axis under 'axes'")
         try:
             "".encode(self.encoding)
-        except LookupError:
-            raise ValueError(f"key 'encoding': no text encoding is called '{self.encoding}'") from None
+            known = codecs.lookup(self.encoding).name.replace("-", "_") not in _NO_TEXT
+        except (LookupError, ValueError):
+            known = False
+        if not known:
+            raise ValueError(f"key 'encoding': no text encoding is called {quoted(self.encoding)}")
         return self
 
     def _check_positions(self, fields: int) -> None:
         for source in self.sources:
             if isinstance(source, str):
-                raise ValueError(f"source '{source}': without a header, columns are given by position")
+                raise ValueError(f"source {quoted(source)}: without a header, columns are given by position")
             if source >= fields:
                 raise ValueError(f"source {source}: a row has only {fields} fields, counted from 0")
 
@@ -190,7 +208,7 @@ def _check_columns(profile: ImportProfile) -> None:
             raise ValueError(f"key 'columns.{name}': not a column of the run format; use one of {known}")
         if column.unit not in spec.units:
             accepted = ", ".join(spec.units)
-            raise ValueError(f"key 'columns.{name}.unit': '{column.unit}' is not one of {accepted}")
+            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not one of {accepted}")
         if column.source is None and not (name == "gyro" and profile.axes):
             raise ValueError(f"key 'columns.{name}.source': missing")
         if name == "gyro" and column.source is not None and profile.axes:
@@ -239,7 +257,7 @@ def _first_fault(error: ValidationError) -> str:
             home = {"reject": Reject, "leading_jump": LeadingJump, "columns": ImportColumn,
                     "facts": Facts, "axis_facts": Facts}.get(str(part), home)  # fmt: skip
         known = ", ".join(field.alias or name for name, field in home.model_fields.items())
-        return f"unknown key '{key}'; known keys are {known}"
+        return f"unknown key {quoted(key)}; known keys are {known}"
     if first["type"] == "missing":
         return f"key '{key}' is missing"
     message = str(first["msg"]).removeprefix("Value error, ")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion
 from fogml.runs.facts import Facts, read_side_file
@@ -105,7 +105,7 @@ def runs_from_table(
     for name, (leg, this_axis) in run_names(profile, stem).items():
         if axis is None or this_axis == axis:
             part, findings = _leg(table, profile, leg, file)
-            columns = _columns(table, part, profile, this_axis)
+            columns = _columns(table, part, profile, this_axis, file)
             _check_clock(columns["time"], table.rows[part], file)
             run_facts = _facts(profile, this_axis, facts)
             runs.append(Run(name, columns, run_facts, findings=(*table.findings, *findings)))
@@ -116,7 +116,7 @@ def runs_from_table(
 def _check_axis(profile: ImportProfile, axis: str | None) -> None:
     if axis is not None and axis not in profile.axes:
         known = ", ".join(profile.axes) or "none"
-        raise InputError(f"axis '{axis}' is not in the import profile; its axes are: {known}")
+        raise InputError(f"axis {quoted(axis)} is not in the import profile; its axes are: {known}")
 
 
 def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> LoggerTable:
@@ -130,7 +130,8 @@ def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> Logge
     plural = "row" if count == 1 else "rows"
     finding = Finding(
         "rejected_rows",
-        f"{count} leading {plural} left out: '{rule.source}' then jumps by more than {rule.more_than:g}",
+        f"{count} leading {plural} left out: {quoted(str(rule.source))} then jumps by more than "
+        f"{rule.more_than:g}",
         row=int(table.rows[0]) + 1,
         count=count,
     )
@@ -147,7 +148,7 @@ def _leg(
     first, end = profile.legs[leg]
     if end > table.total_rows:
         raise InputError(
-            f"{file}: leg '{leg}' ends at row {end}, the file has only {table.total_rows} rows; "
+            f"{file}: leg {quoted(leg)} ends at row {end}, the file has only {table.total_rows} rows; "
             "the profile's 'legs' belong to another recording"
         )
     covered = np.zeros(table.total_rows, dtype=bool)
@@ -165,24 +166,33 @@ def _leg(
 
 
 def _columns(
-    table: LoggerTable, part: slice, profile: ImportProfile, axis: str | None
+    table: LoggerTable, part: slice, profile: ImportProfile, axis: str | None, file: str
 ) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {}
     for name, column in profile.columns.items():
         source = profile.axes[axis] if name == "gyro" and axis is not None else column.source
         assert source is not None  # the profile's own check
         columns[name] = _internal(table.columns[source][part], name, column)
-    if profile.sample_s is not None:
-        rows = table.rows[part]
-        columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
-    columns["time"] = columns["time"] - columns["time"][:1]
+    rows = table.rows[part]
+    with np.errstate(over="ignore", invalid="ignore"):
+        if profile.sample_s is not None:
+            columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
+        columns["time"] = columns["time"] - columns["time"][:1]
+    for name, values in columns.items():
+        lost = ~np.isfinite(values)
+        if lost.any():
+            raise InputError(
+                f"{file}: column '{name}' is no finite number at data row {int(rows[np.argmax(lost)]) + 1} "
+                "once it is scaled; correct 'scale', 'offset' or 'sample_s' in the profile"
+            )
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]
     return {name: columns[name] for name in order}
 
 
 def _internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
     factor, shift = conversion(name, column.unit, "import profile")
-    return (values * column.scale + column.offset) * factor + shift
+    with np.errstate(over="ignore", invalid="ignore"):
+        return (values * column.scale + column.offset) * factor + shift
 
 
 def _check_clock(time: FloatArray, rows: NDArray[np.intp], file: str) -> None:

@@ -33,7 +33,7 @@ def named_from(start: int) -> Callable[[int], str]:
 
 def text_column(name: str) -> Finding:
     """What to say of a column that holds no numbers."""
-    return Finding("text_column", f"column '{name}' holds no numbers and is left out", column=name)
+    return Finding("text_column", f"column {quoted(name)} holds no numbers and is left out", column=name)
 
 
 def facts_from_json(text: str | bytes, source: str) -> Facts:

@@ -328,3 +328,83 @@ def test_numbers_come_back_to_the_last_digit_among_garbage(tmp_path_factory, val
     assert run.gyro.tolist() == [gyro for gyro, _ in values]
     assert run.temperature("T").tolist() == [temperature for _, temperature in values]
     assert sum(counts(run).values()) == len(counted)
+
+
+TABLE = """time;rate;temp;note
+0;0,5;300;a
+100;0,25;301;b
+200;"-0,5";302;"c"
+300;0,75;303;d
+"""
+OWN = LOGGER.replace("source: t,", "source: time,")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("100;", '"100;', r"line 3 holds text .*\(1 such rows\): '\"100;0,25"),
+        ("100;", "1\x0000;", "binary file"),
+        ("100;", "100\r;", None),
+        ("0,25;", "0,\r25;", "line 3 holds text"),
+        ("0,25;", "1e400;", "line 3 holds text|no finite number"),
+        ("b\n", 'b"\n', None),
+        ("b\n", "b;\n", "4 fields were expected, line 3 has 5"),
+        ("a\n", "\udcff\n", "byte 30 is no utf-8 text"),
+    ],
+)
+def test_marks_and_control_characters_in_a_loggers_file(write, tmp_path, old, new, told):
+    path = tmp_path / "log.csv"
+    path.write_bytes(TABLE.replace(old, new, 1).encode(errors="surrogateescape"))
+    profile = write("own.yaml", OWN)
+    if told is None:
+        (run,) = import_recording(path, profile)
+        np.testing.assert_allclose(run.time, [0.0, 0.1, 0.2, 0.3])
+        np.testing.assert_allclose(run.columns["gyro"], [1800.0, 900.0, -1800.0, 2700.0])
+        return
+    with pytest.raises(InputError, match=rf"log\.csv: .*({told})"):
+        import_recording(path, profile)
+
+
+def test_a_zero_byte_far_below_is_a_fault_of_its_line(write, tmp_path):
+    path = tmp_path / "log.csv"
+    rows = "".join(f"{i};0,5;300;a\n" for i in range(2000))
+    path.write_text("time;rate;temp;note\n" + rows + "20\x0000;0,5;300;a\n")
+    with pytest.raises(InputError, match=r"log\.csv: line 2002 holds text"):
+        import_recording(path, write("own.yaml", OWN))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("source: rate", "source: 4", r"source 4 is column 4 counted from 0, and a row has 4 fields"),
+        ("source: rate", "source: 999999999999", r"counted from 0, and a row has 4 fields"),
+        ("source: rate", "source: -1", "columns.gyro.source"),
+        ("source: rate", f"source: {'9' * 400}", "too large"),
+        ("description:", "fields: 2\ndescription:", "source 'temp' is column 2 .* a row has 2 fields"),
+        ("unit: deg/s", "unit: deg/s, scale: 1e308", "column 'gyro' is no finite number at data row 1"),
+        ("unit: deg/s", "unit: deg/s, offset: 1e308", "column 'gyro' is no finite number at data row 1"),
+        ("unit: deg/s", "unit: deg/s, scale: 1e999999999/3", "columns.gyro.scale"),
+        ("unit: deg/s", "unit: deg/s, scale: '2'", "columns.gyro.scale"),
+        ("unit: deg/s", "unit: deg/s, scale: true", "columns.gyro.scale"),
+        ("description:", "encoding: punycode\ndescription:", "no text encoding is called 'punycode'"),
+        ("description:", 'encoding: "a\\0b"\ndescription:', "no text encoding"),
+        ("description:", "skip_lines: 9000000000\ndescription:", "no data rows"),
+        ("description:", "header_lines: 9000000000\ndescription:", "no data rows"),
+        ("description:", "fields: 9000000000\ndescription:", "9000000000 fields were expected"),
+        ("description:", "legs: {../up: [0, 4]}\ndescription:", r"key 'legs': '\.\./up'"),
+        ("description:", "legs: {'1': [true, 4]}\ndescription:", "legs"),
+        ("description:", "legs: {'1': [0, 9000000000]}\ndescription:", "leg '1' ends at row"),
+    ],
+)
+def test_profiles_that_ask_for_what_is_not_there(write, tmp_path, old, new, told):
+    path = write("log.csv", TABLE)
+    profile = write("own.yaml", OWN.replace(old, new, 1))
+    with pytest.raises(InputError, match=told):
+        import_recording(path, profile)
+
+
+@pytest.mark.parametrize("name", ["../x", "/tmp/x", ".hidden", "a/b", "", "a" * 50])
+def test_axes_name_no_other_place(write, name):
+    own = OWN.replace("gyro: {source: rate, ", "gyro: {").rstrip() + f"\naxes: {{'{name}': rate}}\n"
+    with pytest.raises(InputError, match="key 'axes'"):
+        load_profile(write("own.yaml", own))
