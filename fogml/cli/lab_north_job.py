@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
-from pydantic import field_validator
+from pydantic import Field, field_validator
 
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
@@ -29,7 +29,7 @@ class NorthSettings(Settings):
     dwell: float = 60.0
     transfer: float = 0.0
     drift: float = 0.0
-    transients: list[tuple[float, float]] = []
+    transients: list[Annotated[tuple[float, float], Field(strict=False)]] = []
     start: float = 0.0
     noise: float = 0.0
     sense: str = "cw"

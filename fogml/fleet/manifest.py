@@ -81,7 +81,7 @@ def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             reader = csv.DictReader(
-                (line for line in file if not line.startswith("#")), skipinitialspace=True
+                (line for line in file if not line.startswith("#")), skipinitialspace=True, strict=True
             )
             heads = [str(name).strip() for name in reader.fieldnames or ()]
             _check_keys(heads, f"{path.name}: header")
@@ -90,7 +90,9 @@ def _csv_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
     except UnicodeDecodeError as error:
         raise InputError(f"{path.name}: is no UTF-8 text ({error.reason} at byte {error.start})") from None
     except csv.Error as error:
-        raise InputError(f"{path.name}: {error}") from None
+        raise InputError(
+            f"{path.name}: not readable as CSV ({error}); is a quotation mark not closed?"
+        ) from None
 
 
 def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:

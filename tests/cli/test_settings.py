@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 import yaml
 
+from fogml.cli import settings as settings_module
 from fogml.cli.compensate_job import CompensateSettings
 from fogml.cli.import_job import ImportSettings
+from fogml.cli.lab_north_job import NorthSettings
 from fogml.cli.options import spread_values
 from fogml.cli.replay_job import ReplaySettings
 from fogml.cli.settings import Settings
 from fogml.cli.simulate_job import SimulateSettings
 from fogml.cli.train_job import TrainSettings
 from fogml.errors import InputError
+from fogml.yaml_text import parse_yaml
 
 
 def config(folder: Path, text: str) -> Path:
@@ -111,6 +115,44 @@ def test_written_settings_read_back_the_same(tmp_path):
 )
 def test_values_after_an_option_belong_to_it(given, expected):
     assert spread_values(given, "--test") == expected
+
+
+def kinds_of_settings() -> list[type[Settings]]:
+    for path in Path(settings_module.__file__).parent.glob("*_job.py"):
+        import_module(f"fogml.cli.{path.stem}")
+    found: list[type[Settings]] = [Settings]
+    for kind in found:
+        found += [derived for derived in kind.__subclasses__() if derived not in found]
+    return found
+
+
+def test_settings_that_are_written_are_read_back():
+    """Whatever their types: a pair is a list in YAML."""
+    kinds = kinds_of_settings()
+    assert len(kinds) > 15
+    needed = {"SweepSettings": {"space": {"features": ["T"], "models": ["M1"]}}}
+    stated = [kind.model_validate(needed.get(kind.__name__, {})) for kind in kinds]
+    stated.append(NorthSettings(azimuth=30.0, transients=[(0.2, 600.0), (1.0, 5.0)]))
+    for settings in stated:
+        again = type(settings).model_validate(parse_yaml(settings.yaml("any"), "config.yaml"))
+        assert again == settings
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ("averaging: yes", "'averaging': .*number .found 'yes'"),
+        ("averaging: true", "'averaging': .*number .found True"),
+        ("averaging: '10'", "'averaging': .*number .found '10'"),
+        ("seed: 3.0", "'seed': .*integer"),
+        ("repair: 1", "'repair': .*boolean"),
+        ("model: 5", "'model': .*string"),
+        ("averaging: 010", "'010' begins with a zero"),
+    ],
+)
+def test_a_value_of_another_type_is_told(tmp_path, values, told):
+    with pytest.raises(InputError, match=told):
+        TrainSettings.gather(config(tmp_path, values), {})
 
 
 @pytest.mark.parametrize(

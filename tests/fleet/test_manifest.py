@@ -62,6 +62,8 @@ def test_folders_are_safe_and_unlike_each_other(folder):
             "unit F-1 axis x has the job 'train' 2",
         ),
         (HEAD, "holds no unit"),
+        (HEAD + 'F-1,train,a.csv,"b.csv,x\nF-2,train,c.csv,b.csv,x\n', "is a quotation mark not closed?"),
+        (HEAD + 'F-1,train,a.csv,"b.csv"x,x\n', "is a quotation mark not closed?"),
         ("unit,job,trian\n", "unknown column 'trian'; did you mean 'train'"),
         ("unit,job\n", "column 'train' is missing"),
     ],
