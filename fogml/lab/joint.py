@@ -59,7 +59,8 @@ def scale_factors(run: Run, one_sense: bool = False) -> ScaleFactors:
     output = run.gyro_deg_h[steps.usable]
     heights = steps.of(run.gyro_deg_h)
     found_temperature, found_factor = [], []
-    for turn in np.unique(steps.turn):
+    # A slow turn alone tells little but noise.
+    for turn in np.unique(steps.turn[steps.large]):
         mine = np.flatnonzero(steps.turn == turn)
         first, last = steps.before[mine[0], 1], steps.after[mine[-1], 0]
         found_temperature.append(float(temperature[first : max(last, first + 1)].mean()))

@@ -63,6 +63,7 @@ def _specs() -> dict[str, ColumnSpec]:
         ColumnSpec("supply", "V", {"V": (1.0, 0.0)}, "supply voltage"),
         ColumnSpec("humidity", "%", {"%": (1.0, 0.0)}, "relative humidity"),
         ColumnSpec("vibration", "g", {"g": (1.0, 0.0)}, "rms vibration"),
+        ColumnSpec("dose", "Gy", {"Gy": (1.0, 0.0), "krad": (10.0, 0.0)}, "absorbed radiation dose"),
         ColumnSpec("compressor", "0/1", _DUTY, "duty of the compressor"),
         ColumnSpec("heater", "0/1", _DUTY, "duty of the heater"),
         ColumnSpec("fan", "0/1", _DUTY, "duty of the fan"),

@@ -22,5 +22,9 @@ def turning(run: Run) -> BoolArray:
 
     A measured rate counts as zero within six times its own noise.
     """
-    least = max(LEAST_RATE_DEG_S, 6.0 * white_noise(run.rate))
-    return np.asarray(np.abs(run.rate) > least)
+    return np.asarray(np.abs(run.rate) > least_rate_deg_s(run))
+
+
+def least_rate_deg_s(run: Run) -> float:
+    """The least table rate that is not rest [deg/s]: `LEAST_RATE_DEG_S`, or six times its own noise."""
+    return max(LEAST_RATE_DEG_S, 6.0 * white_noise(run.rate))

@@ -70,6 +70,9 @@ class Effect(ABC):
     drawn_per_run
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
+    seeded
+        Whether a simulation draws what differs each time itself, from its seed: then repeats leave the
+        amplitude alone, and a replay, which can't know the draw, has what is expected of it.
     """
 
     id: ClassVar[str]
@@ -87,6 +90,7 @@ class Effect(ABC):
     told_by: ClassVar[tuple[tuple[str, ...], ...]] = ()
     amplitudes: ClassVar[tuple[float, ...]] = ()
     drawn_per_run: ClassVar[bool] = False
+    seeded: ClassVar[bool] = False
 
     @abstractmethod
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:

@@ -83,6 +83,8 @@ class Inputs:
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
         Window of rates [s]; 0 for neighbouring samples.
+    seed
+        Of what effects draw anew in each simulation; None in a replay, which does not know it.
     angle_begins_anew
         Whether the recorded angle may begin anew after a turn.
     hindsight
@@ -109,6 +111,7 @@ class Inputs:
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     sensors: Mapping[str, Sequence[FloatArray]] = field(default_factory=dict)
     rate_window_s: float = 64.0
+    seed: int | None = None
     angle_begins_anew: bool = False
     hindsight: bool = False
     coil: Coil = REFERENCE_COIL

@@ -17,6 +17,7 @@ class Memory:
 
     def __init__(self) -> None:
         self._states: dict[str, tuple[float, ...]] = {}
+        self._generators: dict[str, np.random.Generator] = {}
         self._histories: dict[str, tuple[FloatArray, FloatArray]] = {}
 
     def lag(self, key: str, time: FloatArray, x: FloatArray, time_constant: float | FloatArray) -> FloatArray:
@@ -112,6 +113,14 @@ class Memory:
             past = int(np.searchsorted(all_time, all_time[-1] - span_s)) - 1
             self._histories[key] = (all_time[max(past, 0) :].copy(), all_x[max(past, 0) :].copy())
         return all_time, all_x
+
+    def generator(self, key: str, seed: int) -> np.random.Generator:
+        """A generator of this name out of a seed's, which goes on from block to block."""
+        if key not in self._generators:
+            from fogml.twin.noise import stream
+
+            self._generators[key] = stream(seed, key)
+        return self._generators[key]
 
     def first(self, key: str, x: FloatArray) -> float:
         """The very first sample of x, of all blocks; NaN before there is one."""

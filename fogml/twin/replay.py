@@ -174,6 +174,9 @@ class Replayer:
         given = self._inputs(twin)
 
         def signature(declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
+            if self.truth is not None and declared.seeded and declared.id in self.truth.contributions:
+                # Only the truth holds what the simulation drew.
+                return self.truth.contributions[declared.id] / setting.amplitude
             # What depends on the nominal gyro's slopes changes with its constants.
             slopes = twin.nominal if isinstance(declared, SensorEffect | ThermalEffect) else None
             key = (given.key, declared, setting.key, slopes)

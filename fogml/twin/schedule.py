@@ -24,7 +24,7 @@ from fogml.twin.steps import (
 )
 from fogml.twin.table import Table
 
-_REST: dict[Switched, float] = {"power": 1.0, "fan": 1.0, "yaw": 0.0}
+_REST: dict[Switched, float] = {"power": 1.0, "fan": 1.0, "yaw": 0.0, "radiation": 0.0}
 _SLACK_S = 1e-6
 
 

@@ -33,6 +33,7 @@ _UNITS: Mapping[str, Mapping[str, float]] = {
     "angle": {"deg": 1.0, "°": 1.0, "degree": 1.0, "degrees": 1.0},
     "duty": {"%": 0.01},
     "humidity": {"%": 1.0},
+    "dose rate": {"Gy/h": 1.0, "Gy/min": 60.0, "krad/h": 10.0},
 }
 _EXAMPLES = {
     "time": "30 min",
@@ -43,6 +44,7 @@ _EXAMPLES = {
     "angle": "90 deg",
     "duty": "50 %",
     "humidity": "20 %",
+    "dose rate": "10 Gy/h",
 }
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?")
 _UNIT = re.compile(r"\s*([^\s,;:\d][^\s,;:]*)")

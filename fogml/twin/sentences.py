@@ -11,6 +11,7 @@ Actions within a step, at times counted from its beginning::
     turn to ANGLE at RATE [from minute M]         turn by ANGLE at RATE [from minute M]
     power | fan | compressor | heater   on | off | at N % | automatic   [for TIME] [from minute M]
     humidity N % | automatic [for TIME] [from minute M]
+    radiation at N Gy/h | off [for TIME] [from minute M]
     yaw to ANGLE [at minute M]
 
 A moment is "minute 20", "hour 1", "second 30" or a time such as "1 h 30 min"; "from", "at" and
@@ -150,6 +151,12 @@ def _setting(reader: SentenceReader, what: Switched) -> Setting:
         value = reader.quantity("humidity")
         if not 0.0 <= value <= 100.0:
             reader.fail("humidity lies between 0 and 100 %", place)
+    elif what == "radiation":
+        off = reader.one_of(("at", "off")) == "off"
+        place = reader.place
+        value = 0.0 if off else reader.quantity("dose rate")
+        if value < 0.0:
+            reader.fail("a dose rate is not negative", place)
     else:
         words = ("on", "off", *(("at",) if what != "power" else ()))
         word = reader.one_of((*words, "automatic") if what in AUTOMATIC else words)

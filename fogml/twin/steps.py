@@ -8,12 +8,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 from fogml.errors import InputError
 
-Switched = Literal["power", "fan", "compressor", "heater", "humidity", "yaw"]
-SWITCHED: tuple[Switched, ...] = ("power", "fan", "compressor", "heater", "humidity", "yaw")
+Switched = Literal["power", "fan", "compressor", "heater", "humidity", "radiation", "yaw"]
+SWITCHED: tuple[Switched, ...] = get_args(Switched)
 FASTEST_DEG_S = 10_000.0
 """No table turns faster."""
 _LONGEST_S = 1e9
@@ -105,7 +105,8 @@ class Setting:
     Attributes
     ----------
     what
-        ``power``, ``fan``, ``compressor`` or ``heater`` (0 to 1), ``humidity`` (%), ``yaw`` (deg).
+        ``power``, ``fan``, ``compressor`` or ``heater`` (0 to 1), ``humidity`` (%), ``radiation`` (Gy/h),
+        ``yaw`` (deg).
     value
         The value; None leaves it to the chamber.
     start_s, duration_s
@@ -122,7 +123,7 @@ class Setting:
             raise InputError(f"{self.what}: it can't be left to the chamber")
         if self.what == "power" and self.value not in (0.0, 1.0):
             raise InputError("power: it is on (1) or off (0)")
-        highest = {"yaw": 1e6, "humidity": 100.0}.get(self.what, 1.0)
+        highest = {"yaw": 1e6, "humidity": 100.0, "radiation": 1e6}.get(self.what, 1.0)
         lowest = -highest if self.what == "yaw" else 0.0
         _need(self.value or 0.0, lowest, highest, self.what)
         _need(self.start_s, 0.0, _LONGEST_S, f"{self.what}: start [s]")
@@ -144,6 +145,8 @@ class Setting:
             return f"to {number_text(self.value)} deg"
         if self.what == "humidity":
             return f"{number_text(self.value)} %"
+        if self.what == "radiation":
+            return f"at {number_text(self.value)} Gy/h"
         if self.value in (0.0, 1.0):
             return "on" if self.value else "off"
         return f"at {number_text(100.0 * self.value)} %"

@@ -228,6 +228,14 @@ class TimelineBlock:
         return self._given_or("humidity", 100.0 * water / saturation_pressure(self.set_point))
 
     @cached_property
+    def dose(self) -> FloatArray:
+        """Radiation dose absorbed since the beginning [Gy]."""
+        times, rates = _arrays(self.timeline.schedule.settings["radiation"])
+        starts = np.maximum(times, 0.0)
+        absorbed = np.concatenate([[0.0], np.cumsum(rates[:-1] * np.diff(starts))]) / 3600.0
+        return self._linear(starts, absorbed, rates / 3600.0)
+
+    @cached_property
     def yaw(self) -> FloatArray:
         """Yaw of the fixture on the table [deg]."""
         return self._held("yaw")

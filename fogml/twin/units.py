@@ -77,7 +77,8 @@ def draw_units(twin: Twin, count: int, *, repeats: int = 1, seed: int = 0) -> tu
 def repeat_unit(unit: Twin, count: int, *, seed: int = 0) -> tuple[Twin, ...]:
     """The same unit, used several times: what is drawn at each power-on differs, constants do not.
 
-    The amplitude of such an effect, as `unit` states it, is its standard deviation over power-ons.
+    The amplitude of such an effect, as `unit` states it, is its standard deviation over power-ons. What a
+    simulation draws from its own seed stays: give each repeat a seed of its own there.
 
     Raises
     ------
@@ -90,7 +91,7 @@ def repeat_unit(unit: Twin, count: int, *, seed: int = 0) -> tuple[Twin, ...]:
         rng = generator(seed, number)
         settings: dict[str, EffectSetting] = dict(unit.settings)
         for declared, setting in unit.on:
-            if declared.drawn_per_run:
+            if declared.drawn_per_run and not declared.seeded:
                 drawn = declared.amplitude.within(setting.amplitude * rng.standard_normal())
                 settings[declared.id] = replace(setting, amplitude=drawn)
         repeats.append(replace(unit, settings=settings))

@@ -27,6 +27,7 @@ _ALL_DRIVES = (
     "power",
     "supply",
     "humidity",
+    "dose",
     "vibration",
     "compressor",
     "heater",
@@ -105,6 +106,7 @@ class World:
     ) -> None:
         self.timeline = timeline(programme, sample_s)
         self.twin, self.columns, self.truth = twin, columns, truth
+        self._seed = seed
         ons = [on for on, _ in self.timeline.power_windows]
         self._power_ons = ons or [math.inf]
         first = self._power_ons[0]
@@ -186,6 +188,7 @@ class World:
                 power_ons_s=tuple(self._power_ons[1:]),
                 drives=drives_on,
                 coil=branch.twin.coil,
+                seed=self._seed,
                 rate_window_s=0.0,
                 memory=branch.memory,
             )
@@ -215,6 +218,8 @@ class World:
             drives["heater"] = block.heater
         if "humidity" in needed:
             drives["humidity"] = block.humidity
+        if "dose" in needed:
+            drives["dose"] = block.dose
         if "supply" in needed:
             drives["supply"] = np.full(len(block), outside.supply)
         if "power" in needed:

@@ -195,7 +195,7 @@ def _judge_run(
         series=_series(errors, metrics, before, after),
         noise=_noise(run),
         findings=findings,
-        notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes),
+        notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes, *metrics.notes),
         power_on_known=run.facts.powered_on is not None,
     )
 

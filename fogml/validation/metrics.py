@@ -12,7 +12,7 @@ from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.signals.averages import BlockAverages, block_averages
 from fogml.validation.rate_ladder import find_ladder, ladder_figures
 from fogml.validation.results import Metrics
-from fogml.validation.scale_factor import find_steps, scale_factor_error
+from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
 from fogml.validation.turn_on import check_turn_on_band, turn_on_time
 
@@ -106,6 +106,19 @@ class RunMetrics:
                 f"{run.name}: {used.sum()} usable rows give {found} averages over {averaging_s:g} s, at "
                 "least 2 are needed; choose a shorter --averaging or a longer run"
             )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What the figures leave out, in words."""
+        if self._steps is None:
+            return ()
+        small = len(np.unique(self._steps.turn[~self._steps.large]))
+        if not small:
+            return ()
+        return (
+            f"{small} turns below {LEAST_SHARE:.0%} of the greatest rate tell nonlinearity and asymmetry; "
+            "the largest scale factor error of single turns leaves them out for their noise",
+        )
 
     def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
         """Averages over the averaging time of columns that hold the used rows only."""

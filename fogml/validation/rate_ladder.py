@@ -14,8 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.run import FloatArray
-from fogml.validation.scale_factor import LEAST_STEP, Steps
+from fogml.validation.scale_factor import Steps
 
+SAME_SHARE = 1e-3
+"""Share of a rate by which a table misses it from one time to the next, at most."""
 LEAST_LEVELS = 4
 """A line through fewer outputs leaves nothing that could be called nonlinearity."""
 
@@ -50,11 +52,14 @@ class LadderFigures:
 def find_ladder(steps: Steps) -> RateLadder | None:
     """The levels that steps go between; None where they don't hang together, as after a gap.
 
-    Rates closer than half of the smallest step that counts are one level.
+    Rates that a table's own error may set apart, `SAME_SHARE` of them, are one level, as are those within
+    half of what counts as rest. Rest is the table at rest.
     """
     values = steps.levels.ravel()
     order = np.argsort(values, kind="stable")
-    apart = np.diff(values[order]) > 0.5 * LEAST_STEP * np.abs(steps.height).max()
+    sorted_values = values[order]
+    sizes = np.maximum(np.abs(sorted_values[1:]), np.abs(sorted_values[:-1]))
+    apart = np.diff(sorted_values) > np.maximum(0.5 * steps.rest, SAME_SHARE * sizes)
     labels = np.empty(len(values), dtype=np.intp)
     labels[order] = np.concatenate(([0], np.cumsum(apart)))
     rates = np.bincount(labels, values) / np.bincount(labels)
@@ -62,8 +67,7 @@ def find_ladder(steps: Steps) -> RateLadder | None:
     if np.linalg.matrix_rank(_incidence(sides, len(rates))) < len(rates) - 1:
         return None
     rest = int(np.argmin(np.abs(rates)))
-    at_rest = abs(rates[rest]) < LEAST_STEP * np.abs(rates).max()
-    return RateLadder(rates, sides, rest if at_rest else None)
+    return RateLadder(rates, sides, rest if abs(rates[rest]) < steps.rest else None)
 
 
 def ladder_figures(ladder: RateLadder, steps_of_error: FloatArray) -> LadderFigures:

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.transitions import find_transitions, transition_mask
+from fogml.runs.turning import least_rate_deg_s
 
-LEAST_STEP = 0.02
-"""Steps smaller than this share of the run's greatest step are no turns."""
+LEAST_SHARE = 0.02
+"""Turns smaller than this share of the run's greatest tell little of it but noise, each for itself."""
 LONGEST_PIECE_S = 60.0
 """Longest piece beside a transition [s]: long enough to average, short enough for a moving bias."""
 
@@ -35,6 +36,8 @@ class Steps:
         Which turn (from rest to rest) each step belongs to, shape (k,).
     usable
         Indices of the usable rows, shape (m,).
+    rest
+        Rates below this are rest [deg/h].
     """
 
     before: NDArray[np.intp]
@@ -42,6 +45,7 @@ class Steps:
     levels: FloatArray
     turn: NDArray[np.intp]
     usable: NDArray[np.intp]
+    rest: float = 0.0
 
     def __len__(self) -> int:
         return len(self.levels)
@@ -50,6 +54,15 @@ class Steps:
     def height(self) -> FloatArray:
         """Step of the reference rate [deg/h], shape (k,)."""
         return np.asarray(self.levels[:, 1] - self.levels[:, 0])
+
+    @property
+    def large(self) -> BoolArray:
+        """Which steps belong to turns of some size, `LEAST_SHARE` of the greatest step; shape (k,)."""
+        size = np.abs(self.height)
+        _, member = np.unique(self.turn, return_inverse=True)
+        greatest = np.zeros(member.max() + 1)
+        np.maximum.at(greatest, member, size)
+        return np.asarray((greatest >= LEAST_SHARE * size.max())[member])
 
     def of(self, error_deg_h: FloatArray) -> FloatArray:
         """Steps of the whole run's error series [deg/h], shape (k,)."""
@@ -64,10 +77,14 @@ class Steps:
 
 @dataclass(frozen=True)
 class ScaleFactorError:
-    """Scale factor error [ppm]: by least squares over all steps, and the greatest of single turns."""
+    """Scale factor error [ppm]: by least squares over all steps, and the greatest of single turns.
+
+    The greatest is that of the turns of some size; `left_out` is how many others there are.
+    """
 
     overall: float
     largest: float
+    left_out: int = 0
 
 
 def find_steps(run: Run, full: BoolArray) -> Steps | None:
@@ -98,10 +115,10 @@ def find_steps(run: Run, full: BoolArray) -> Steps | None:
     gap_before = np.isin(edges[1:-1], np.searchsorted(usable, run.gap_starts))
     means = np.add.reduceat(reference, edges[:-1]) / np.diff(edges)
     before, after, levels, at_rest = [], [], [], []
-    steps = np.abs(np.diff(means))
-    least = LEAST_STEP * steps.max()
+    # The table is at rest, or turns: every level that differs from the one before counts, however slow.
+    least = 3600.0 * least_rate_deg_s(run)
     resting = np.abs(means) < least
-    for i in np.flatnonzero((steps >= least) & (steps > 0.0) & ~gap_before):
+    for i in np.flatnonzero((np.abs(np.diff(means)) > least) & ~gap_before):
         start, middle, stop = edges[i], edges[i + 1], edges[i + 2]
         length = min(LONGEST_PIECE_S, time[middle - 1] - time[start], time[stop - 1] - time[middle])
         first = int(np.searchsorted(time, time[middle - 1] - length))
@@ -114,7 +131,7 @@ def find_steps(run: Run, full: BoolArray) -> Steps | None:
         return None
     turn = np.cumsum(np.array(at_rest, dtype=np.intp))
     pairs = [np.array(rows, dtype=np.intp).reshape(-1, 2) for rows in (before, after)]
-    return Steps(pairs[0], pairs[1], np.array(levels), turn, usable)
+    return Steps(pairs[0], pairs[1], np.array(levels), turn, usable, least)
 
 
 def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorError:
@@ -129,6 +146,9 @@ def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorErro
     squares = steps.height**2
     turns, member = np.unique(steps.turn, return_inverse=True)
     each = np.bincount(member, products, len(turns)) / np.bincount(member, squares, len(turns))
+    large = np.bincount(member, steps.large, len(turns)) > 0
     return ScaleFactorError(
-        overall=float(1e6 * products.sum() / squares.sum()), largest=float(1e6 * np.abs(each).max())
+        overall=float(1e6 * products.sum() / squares.sum()),
+        largest=float(1e6 * np.abs(each[large]).max()),
+        left_out=int((~large).sum()),
     )

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from scipy.optimize import bisect
 
-from fogml.runs.facts import Facts, Heading
 from fogml.runs.run import FloatArray
 from fogml.twin.inputs import Inputs
+from fogml.twin.memory import Memory
 from fogml.twin.optics import Coil
 from fogml.twin.registry import effect
+from fogml.twin.simulate import simulate
+from fogml.twin.twin import Twin
 
 N = 3600
 TIME = np.arange(float(N))
@@ -118,17 +120,49 @@ def test_supply_steps_and_ripple_line() -> None:
     assert spectrum[36] == pytest.approx(0.2 * np.exp(1j * np.radians(60.0 - 90.0)))
 
 
-def test_turn_on_bias_steps_at_power_cycles_only() -> None:
-    assert response("turn_on_bias", inputs(powered_on_s=0.0)) == pytest.approx(1.0)
+def test_turn_on_biases_are_drawn_from_the_seed_of_a_simulation() -> None:
+    """Standard normal over power cycles, others with another seed, the same with the same one."""
+    many = inputs(power_ons_s=tuple(range(1, N)))
+    first, again, other = (response("turn_on_bias", replace(many, seed=seed)) for seed in (1, 1, 2))
+    assert np.array_equal(first, again) and abs(np.corrcoef(first, other)[0, 1]) < 0.1
+    for found in (first, other):
+        assert abs(found.mean()) < 4.0 / np.sqrt(N)
+        assert found.std() == pytest.approx(1.0, abs=0.05)
+    twin = Twin().with_effect("turn_on_bias", 0.5)
+    drawn = [simulate(["hold for 20 s"], twin, seed=seed, columns=()).run.gyro[0] for seed in range(60)]
+    assert np.std(drawn) == pytest.approx(0.5, rel=0.3) and len(set(drawn)) == 60
+
+
+def test_a_replay_expects_nothing_of_later_power_cycles() -> None:
     found = response("turn_on_bias", inputs(powered_on_s=0.0, power_ons_s=(1000.0, 2000.0)))
-    assert np.flatnonzero(np.diff(found)).tolist() == [999, 1999]
-    assert found[0] == 1.0
+    assert np.array_equal(found, (TIME < 1000.0).astype(float))
 
 
-def test_turn_on_biases_of_many_cycles_are_standard_normal() -> None:
-    found = response("turn_on_bias", inputs(power_ons_s=tuple(range(1, N))))[1:]
-    assert abs(found.mean()) < 4.0 / np.sqrt(N)
-    assert found.std() == pytest.approx(1.0, abs=0.05)
+def test_slips_of_a_simulation_have_the_mean_that_a_replay_expects() -> None:
+    """Compound Poisson: sums of exponential heights, in blocks as on the whole."""
+    ramp = 25.0 + np.cumsum(np.where(TIME < 1200.0, 8.0, 0.0)) / 60.0
+    shape = {"threshold": 4.0, "time_constant": 1e7}
+    given = inputs(ramp, rate_window_s=0.0)
+    expected = response("thermal_shock", given, **shape)
+    drawn = np.array(
+        [response("thermal_shock", replace(given.afresh(), seed=s, cache={}), **shape) for s in range(200)]
+    )
+    # 80 degC above the threshold: 320 slips of 1/4 degC, with a standard deviation of sqrt(2 * 80 / 4).
+    assert expected[-1] == pytest.approx(80.0, rel=1e-2)
+    assert drawn[:, -1].mean() == pytest.approx(expected[-1], abs=4.0 * np.sqrt(40.0 / 200))
+    assert drawn[:, -1].std() == pytest.approx(np.sqrt(40.0), rel=0.2)
+    assert np.all(np.diff(drawn[0]) >= -1e-4) and np.mean(np.diff(drawn[0][:1200]) > 1e-6) < 0.5
+    memory, pieces = Memory(), []
+    for part in (slice(0, 100), slice(100, 101), slice(101, N)):
+        piece = replace(given, seed=3, memory=memory, cache={})
+        piece = replace(
+            piece,
+            time=TIME[part],
+            temperatures={k: v[part] for k, v in piece.temperatures.items()},
+            table_rate=piece.table_rate[part],
+        )
+        pieces.append(response("thermal_shock", piece, **shape))
+    assert np.concatenate(pieces) == pytest.approx(drawn[3], abs=1e-9)
 
 
 def test_ageing_slows_down() -> None:
@@ -140,27 +174,39 @@ def test_ageing_slows_down() -> None:
     assert 0.1 < year < 1.0
 
 
-def test_radiation_is_a_power_law_of_dose_and_rate() -> None:
-    given = inputs(drives={"dose": 1.0 + TIME / 1800.0}, table_rate=np.full(N, 10.0))
-    ppm = effect("radiation").signature(given, dose_exponent=0.7, rate_exponent=0.2)
-    assert ppm[500:] == pytest.approx((1.0 + TIME[500:] / 1800.0) ** 0.7 * 2.0**0.2)
-    assert not effect("radiation").signature(inputs(), dose_exponent=0.7, rate_exponent=0.2).any()
-    shown = response("radiation", replace(given.afresh(), cache={}), dose_exponent=0.7, rate_exponent=0.2)
-    assert shown == pytest.approx(0.036 * ppm)
+def test_radiation_grows_with_the_dose_and_anneals() -> None:
+    """10 Gy in a moment, then nothing: p D stays, the rest fades with exp(-t / tau)."""
+    shape = {"dose_exponent": 0.7, "permanent_share": 0.4, "annealing_time": 900.0}
+    given = inputs(drives={"dose": np.where(TIME < 1.0, 0.0, 10.0)}, table_rate=np.full(N, 10.0))
+    ppm = effect("radiation").signature(given, **shape)
+    wanted = (10.0 * (0.4 + 0.6 * np.exp(-(TIME - 0.5) / 900.0))) ** 0.7
+    assert ppm[1:] == pytest.approx(wanted[1:], rel=1e-5)
+    assert ppm[0] == 0.0 and not effect("radiation").signature(inputs(), **shape).any()
+    shown = response("radiation", replace(given.afresh(), cache={}), **shape)
+    assert shown == pytest.approx(1e-6 * 36_000.0 * ppm)
 
 
-def test_warm_up_fades_from_each_power_on() -> None:
-    shape = {"fast_time_constant": 100.0, "slow_time_constant": 1000.0, "slow_ratio": 0.5}
-    found = response("warmup_bias", inputs(powered_on_s=-50.0, power_ons_s=(2000.0,)), **shape)
-    for second, on in ((0, 50.0), (700, 750.0), (2000, 0.0), (3000, 1000.0)):
-        assert found[second] == pytest.approx(np.exp(-on / 100.0) + 0.5 * np.exp(-on / 1000.0))
-    assert not response("warmup_bias", inputs(), **shape).any()  # on since long before
+def test_a_dose_taken_faster_leaves_more() -> None:
+    shape, end = effect("radiation").default_shape(), []
+    for span in (60.0, 600.0, 3000.0):
+        taken = inputs(drives={"dose": np.minimum(TIME / span, 1.0)})
+        end.append(effect("radiation").signature(taken, **shape)[int(span)])
+    assert end[0] > end[1] > end[2]
 
 
-@pytest.mark.parametrize(
-    ("axis", "wanted"),
-    [("up", 1.0), ("down", -1.0), ("north", 0.3), (Heading(heading=77.0), 0.3), (None, 0.0)],
-)
-def test_weight_acts_by_attitude(axis: object, wanted: float) -> None:
-    given = inputs(facts=Facts(input_axis=axis))  # type: ignore[arg-type]
-    assert response("g_sensitivity", given, cross_ratio=0.3) == pytest.approx(wanted)
+def test_a_programme_irradiates_and_the_dose_is_recorded() -> None:
+    first, second = "radiation at 6 Gy/h for 20 min from minute 10", "radiation at 30 Gy/h from minute 50"
+    twin = Twin().with_effect("radiation", 100.0).with_effect("radiation_noise", 0.1, loss=1.0)
+    made = simulate([{"hold for 1 h": [first, second]}], twin, columns=("dose", "rate"), truth=True)
+    dose = made.run.columns["dose"]
+    assert dose[[0, 600, 1200, 1800, 2999]] == pytest.approx([0.0, 0.0, 1.0, 2.0, 2.0])
+    assert dose[-1] == pytest.approx(2.0 + 30.0 * 599.0 / 3600.0)
+    noise = made.truth.noise
+    assert not noise[:600].any() and noise[2400:3000].std() > 1.5 * noise[650:900].std()
+
+
+def test_radiations_noise_is_the_shot_noise_of_the_light_that_is_left() -> None:
+    shape = {"loss": 0.3, "dose_exponent": 1.0, "permanent_share": 1.0, "annealing_time": 3600.0}
+    found = effect("radiation_noise").strength(inputs(drives={"dose": TIME / 360.0}), **shape)
+    light = 10.0 ** (-0.1 * 0.3 * TIME / 360.0)
+    assert np.sqrt(1.0 + found**2) == pytest.approx(1.0 / np.sqrt(light))

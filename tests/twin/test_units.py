@@ -8,10 +8,41 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.twin.registry import effect
+from fogml.twin.effect import BiasEffect
+from fogml.twin.quantities import Quantity
+from fogml.twin.registry import effect, register, unregister
+from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_dict
 from fogml.twin.units import draw_units, repeat_unit
+
+
+class DrawnEachTime(BiasEffect):
+    """A bias that is another one each time that the unit is used.
+
+    ::
+
+        b = A
+
+    Source: none.
+    """
+
+    id, code, title = "drawn_each_time", "Z1", "Bias of a use"
+    amplitude = Quantity("amplitude", "deg/h", (0.1, 1.0), (0.01, 0.1), "A", (-10.0, 10.0), signed=True)
+    drawn_per_run = True
+
+    def signature(self, inputs, **shape):
+        return np.ones(len(inputs))
+
+
+DRAWN = DrawnEachTime
+
+
+@pytest.fixture(autouse=True)
+def drawn_each_time():
+    register(DRAWN)
+    yield
+    unregister(DRAWN.id)
 
 
 @pytest.fixture(scope="module")
@@ -42,25 +73,33 @@ def test_effects_follow_the_catalogue(units):
     assert len(widths) == len(units)
 
 
-def test_repeats_share_all_but_what_power_on_draws(units):
-    for unit in units[:20]:
-        first, second = unit.runs
-        for twin in (first, second):
-            assert twin.nominal == unit.constants.nominal and twin.noise == unit.constants.noise
-            assert twin.name == unit.serial_number
-            for id, setting in unit.constants.settings.items():
-                if id == "turn_on_bias":
-                    assert twin.settings[id].amplitude != setting.amplitude
-                else:
-                    assert twin.settings[id] == setting
-        assert first.settings["turn_on_bias"] != second.settings["turn_on_bias"]
+def test_repeats_share_all_but_what_each_use_draws():
+    """What a simulation draws from its seed stays with the unit; other draws differ from use to use."""
+    unit = load_twin("tactical").with_effect("sinusoidal").with_effect(DRAWN.id, 0.4)
+    first, second = repeat_unit(unit, 2, seed=1)
+    for twin in (first, second):
+        assert twin.nominal == unit.nominal and twin.noise == unit.noise
+        for id, setting in unit.settings.items():
+            assert (twin.settings[id] == setting) == (id != DRAWN.id)
+    assert first.settings[DRAWN.id] != second.settings[DRAWN.id]
 
 
 def test_repeats_scatter_by_the_stated_deviation():
-    unit = Twin().with_effect("turn_on_bias", 0.4)
-    drawn = [twin.settings["turn_on_bias"].amplitude for twin in repeat_unit(unit, 500, seed=1)]
+    drawn = [
+        t.settings[DRAWN.id].amplitude for t in repeat_unit(Twin().with_effect(DRAWN.id, 0.4), 500, seed=1)
+    ]
     assert np.mean(drawn) == pytest.approx(0.0, abs=0.07)
     assert np.std(drawn) == pytest.approx(0.4, rel=0.12)
+
+
+def test_repeats_of_a_unit_scatter_by_the_seeds_of_their_simulations():
+    unit = Twin().with_effect("turn_on_bias", 0.4)
+    assert repeat_unit(unit, 2)[1].settings == unit.settings
+    means = [
+        simulate(["hold for 20 s"], twin, seed=seed, columns=()).run.gyro.mean()
+        for seed, twin in enumerate(repeat_unit(unit, 200))
+    ]
+    assert np.std(means) == pytest.approx(0.4, rel=0.15)
 
 
 def test_a_unit_does_not_depend_on_how_many_there_are(units):

@@ -104,3 +104,41 @@ def test_the_metrics_of_a_run_hold_them():
     assert told.scale_factor_nonlinearity is not None
     still = run.with_columns(rate=np.zeros(len(run)))
     assert RunMetrics(still, used, 100.0).figures(np.zeros(len(run))).scale_factor_asymmetry is None
+
+
+SLOW_AND_FAST = (0.1, 0.5, 1.0, 5.0, 100.0, 300.0)
+
+
+@pytest.mark.parametrize("rest", [True, False])
+def test_every_level_counts_however_slow(rest):
+    """A ladder from 0.1 to 300 deg/s with an output that is curved near zero."""
+    run = ladder_run(SLOW_AND_FAST, rest=rest)
+    output = run.rate + 2e-3 * np.tanh(run.rate / 1.0)
+    steps = find_steps(run, np.ones(len(run), dtype=bool))
+    ladder = find_ladder(steps)
+    wanted = sorted([*SLOW_AND_FAST, *(-r for r in SLOW_AND_FAST), *((0.0,) if rest else ())])
+    assert ladder.rates / DEG_H == pytest.approx(wanted, abs=1e-9)
+    assert (ladder.rest is not None) == rest
+    levels = np.array(wanted)
+    found = ladder_figures(ladder, steps.of(DEG_H * (output - run.rate)))
+    assert found.nonlinearity == pytest.approx(closed_form(levels, levels + 2e-3 * np.tanh(levels)), rel=1e-4)
+
+
+def test_asymmetry_of_slow_rates_is_that_of_least_squares_over_all():
+    """Two slopes from rest, the way forward 751 ppm steeper, none dropped for being slow."""
+    run = ladder_run(SLOW_AND_FAST)
+    error = DEG_H * np.maximum(run.rate, 0.0) * 751e-6
+    found = figures(run, error)
+    assert found.asymmetry == pytest.approx(751e-6 / (1.0 + 0.5 * 751e-6) * 1e6, rel=1e-6)
+    only_slow = ladder_run((0.1, 0.5, 1.0, 5.0))
+    both = np.where(np.abs(only_slow.rate) < 10.0, 751e-6, 0.0) * np.maximum(only_slow.rate, 0.0)
+    assert figures(only_slow, DEG_H * both).asymmetry == pytest.approx(found.asymmetry, rel=1e-6)
+
+
+def test_slow_turns_are_left_out_of_the_largest_error_of_single_turns_and_that_is_said():
+    run = ladder_run(SLOW_AND_FAST, plateau_s=600)
+    metrics = RunMetrics(run, run.rate == 0.0, 100.0)
+    noise = np.random.default_rng(0).standard_normal(len(run))
+    found = metrics.figures(noise + DEG_H * run.rate * 20e-6)
+    assert found.scale_factor_error_largest == pytest.approx(20.0, abs=2.0)
+    assert "8 turns below 2% of the greatest rate" in metrics.notes[0]

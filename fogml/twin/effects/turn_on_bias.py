@@ -7,6 +7,7 @@ import numpy as np
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
+from fogml.twin.noise import stream
 from fogml.twin.quantities import Quantity
 
 
@@ -17,8 +18,8 @@ class TurnOnBias(BiasEffect):
 
         b = sigma_on xi_k,      xi_k ~ N(0, 1),      k = 0, 1, 2 ... the power cycle
 
-    The amplitude is what the run's first power cycle has, so xi_0 = 1; those of later cycles in the
-    same run are a fixed draw.
+    A simulation draws xi_k from its seed. A replay does not know them: there the amplitude is what the
+    run's first power cycle has, xi_0 = 1, and those of later cycles are taken for what is expected, 0.
 
     Source: IEEE Std 952-1997 (literature): bias repeatability over at least six power cycles; ranges are
     engineering ones.
@@ -39,8 +40,11 @@ class TurnOnBias(BiasEffect):
         "ageing": "several power cycles on one day",
     }
     drawn_per_run = True
+    seeded = True
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h [deg/h], shape (n,)."""
-        later = np.random.default_rng(0).standard_normal(len(inputs.power_ons_s))
-        return np.concatenate([[1.0], later])[inputs.power_cycle]
+        cycles = len(inputs.power_ons_s) + 1
+        if inputs.seed is None:
+            return np.eye(1, cycles)[0][inputs.power_cycle]
+        return stream(inputs.seed, self.id).standard_normal(cycles)[inputs.power_cycle]

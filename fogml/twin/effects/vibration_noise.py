@@ -25,7 +25,7 @@ class VibrationNoise(NoiseEffect):
     """
 
     id = "vibration_noise"
-    code = "F1"
+    code = "E11"
     title = "Noise under vibration"
     amplitude = Quantity("amplitude", "deg/sqrt(h)/g", (2e-3, 5e-2), (1e-4, 2e-3), "A", (0.0, 1e6))
     needs = ("vibration",)
