@@ -25,6 +25,18 @@ def replay(
     truth: Annotated[
         str | None, typer.Option("--truth", help="Truth of a simulated run, in place of its columns.")
     ] = None,
+    after: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--after",
+            metavar="RUN",
+            help="The unit's run before, whose memory goes on; may be repeated. Each states 'started'.",
+        ),
+    ] = None,
+    storage_temperature: Annotated[
+        float | None,
+        typer.Option("--storage-temperature", metavar="DEGC", help="Where the unit was between runs (25)."),
+    ] = None,
     repair: options.Repair = None,
     out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write: .csv or .parquet.")] = None,
     seed: options.Seed = None,
@@ -45,6 +57,8 @@ def replay(
             "run": run,
             "only": only,
             "truth": truth,
+            "after": after,
+            "storage_temperature": storage_temperature,
             "repair": repair,
             "out": str(out) if out else None,
             "seed": seed,

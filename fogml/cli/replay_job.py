@@ -14,8 +14,10 @@ from fogml.errors import InputError
 from fogml.json_files import check_finite
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.writing import BlockWriter, carried_cells, header_cells
+from fogml.twin.between_runs import Storage
 from fogml.twin.replay import replay
-from fogml.twin.truth import read_truth
+from fogml.twin.replay_after import replay_after
+from fogml.twin.truth import Truth, read_truth
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
 
@@ -23,11 +25,13 @@ from fogml.twin.twin_file import load_twin, twin_names
 class ReplaySettings(Settings):
     """Settings of ``fogml replay``."""
 
-    path_keys: ClassVar[tuple[str, ...]] = ("twin", "run", "truth")
+    path_keys: ClassVar[tuple[str, ...]] = ("twin", "run", "truth", "after")
     twin: str | None = None
     run: str | None = None
     only: str | None = None
     truth: str | None = None
+    after: list[str] = []
+    storage_temperature: float = 25.0
     repair: bool = False
     out: str | None = None
 
@@ -41,6 +45,8 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
         raise InputError("no twin is given; name a file or one of " + ", ".join(twin_names()))
     if not settings.run:
         raise InputError("no run is given; name the run to replay")
+    if settings.after and settings.truth:
+        raise InputError("--after takes recorded runs, and --truth the truth of one; give one of the two")
     if not settings.out:
         raise InputError("no --out is given; name the file to write, .csv or .parquet")
     out = Path(settings.out)
@@ -52,13 +58,21 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
         run = open_run(settings.run, repair=settings.repair)
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
-        replayed = replay(twin, run, only=settings.only, truth=truth)
+        replayed = _replayed(settings, twin, run, truth)
         values = _values(settings, twin, run, replayed)
         check_finite(values, run.name)
         work.doing(f"writing {out.name}")
         with settings.written_beside(out, "replay"):
             _write(run, replayed, out)
     _print(settings, values, terminal)
+
+
+def _replayed(settings: ReplaySettings, twin: Twin, run: Run, truth: Truth | None) -> FloatArray:
+    if not settings.after:
+        return replay(twin, run, only=settings.only, truth=truth)
+    after = [open_run(path, repair=settings.repair) for path in settings.after]
+    storage = Storage(settings.storage_temperature)
+    return replay_after(twin, run, after, only=settings.only, storage=storage)
 
 
 def _write(run: Run, replayed: FloatArray, out: Path) -> None:

@@ -2,20 +2,51 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from contextlib import ExitStack
+from datetime import datetime
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any, ClassVar, Literal, Self
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, absolute
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.runs.facts import Facts, facts_from
+from fogml.twin.between_runs import Storage
 from fogml.twin.programme import Programme, load_programme, programme_names
-from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file
+from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file, world_of, write_world
 from fogml.twin.timeline import timeline
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
+
+
+class StorageSettings(BaseModel):
+    """Where the unit is between its runs: air [degC], humidity [%], and whether it stays on."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    temperature: float = 25.0
+    humidity: float = 50.0
+    power: Literal["on", "off"] = "off"
+
+    @field_validator("power", mode="before")
+    @classmethod
+    def _as_word(cls, value: Any) -> Any:
+        return {True: "on", False: "off"}.get(value, value) if isinstance(value, bool) else value
+
+
+class SimulatedRun(BaseModel):
+    """One of several runs of a unit; what it does not state is the file's."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+    programme: str | list[Any] | dict[str, Any]
+    started: datetime
+    out: str
+    truth: str | None = None
+    sample_s: float | None = None
+    columns: list[str] | None = None
+    facts: dict[str, Any] | None = None
 
 
 class SimulateSettings(Settings):
@@ -32,6 +63,31 @@ class SimulateSettings(Settings):
     facts: dict[str, Any] | None = None
     out: str | None = None
     truth: str | None = None
+    runs: list[SimulatedRun] = []
+    storage: StorageSettings = StorageSettings()
+
+    @classmethod
+    def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
+        """As `Settings.gather`; programmes of runs are meant from where the file lies, too."""
+        found = super().gather(config, flags)
+        if config is None:
+            return found
+        runs = []
+        for run in found.runs:
+            near = config.parent / run.programme if isinstance(run.programme, str) else None
+            runs.append(run.model_copy(update={"programme": str(near)}) if near and near.is_file() else run)
+        return found.model_copy(update={"runs": runs})
+
+    def in_full(self) -> Self:
+        """The settings with every path in full."""
+        full = super().in_full()
+        runs = []
+        for run in full.runs:
+            written = {key: absolute(value) for key in ("out", "truth") if (value := getattr(run, key))}
+            if isinstance(run.programme, str) and run.programme not in programme_names():
+                written["programme"] = absolute(run.programme)
+            runs.append(run.model_copy(update=written))
+        return full.model_copy(update={"runs": runs})
 
     def _ships(self, key: str, value: str) -> bool:
         # A programme written out as a list of sentences names no file.
@@ -45,6 +101,9 @@ class SimulateSettings(Settings):
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     """Simulate block by block into a file, and print what was written."""
+    if settings.runs:
+        _simulate_runs(settings, terminal)
+        return
     if settings.programme is None:
         raise InputError("no programme is given; state 'programme' in the file, or --programme")
     if not settings.out:
@@ -57,6 +116,42 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     with settings.written_beside(out, "simulate"):
         rows = _simulate(settings, programme, twin, facts, out, terminal)
     _print(settings, programme, twin, rows, terminal)
+
+
+def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
+    """Simulate a unit's runs one after the other; what it remembers goes on from each to the next."""
+    for key in ("programme", "out", "truth"):
+        if getattr(settings, key) is not None:
+            raise InputError(f"'{key}' is stated for the file and there are 'runs'; state it in each of them")
+    twin, before = load_twin(settings.twin), None
+    outs = [Path(run.out) for run in settings.runs]
+    if len({out.absolute() for out in outs}) < len(outs):
+        raise InputError("runs: two of them are written to the same 'out'")
+    kept = settings.storage
+    storage = Storage(kept.temperature, kept.humidity, kept.power == "on")
+    results = []
+    with ExitStack() as stack:
+        stack.enter_context(settings.written_beside(outs[0], "simulate"))
+        for number, (run, out) in enumerate(zip(settings.runs, outs)):
+            stated = run.facts if run.facts is not None else settings.facts
+            facts = DEFAULT_FACTS if stated is None else facts_from(stated, "facts")
+            programme = load_programme(run.programme)
+            before = world_of(
+                programme,
+                twin,
+                run.sample_s or settings.sample_s,
+                settings.seed + number,
+                run.columns or settings.columns,
+                facts.model_copy(update={"started": run.started}),
+                truth=run.truth is not None,
+                before=before,
+                storage=storage,
+            )
+            with terminal.work(f"simulating {programme.name}", total=len(before.timeline)) as work:
+                rows = write_world(before, out, run.truth, work.advance)
+            terminal.say(f"{rows} samples of {programme.name}, started {run.started}, written to {out}")
+            results.append({"run": out.name, "rows": rows, "started": run.started.isoformat()})
+    terminal.result({"schema": "fogml.simulation/1", "twin": twin.name, "runs": results})
 
 
 def _simulate(

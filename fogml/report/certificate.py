@@ -17,10 +17,14 @@ from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import model_card, stated_limits, unseen, worst_run
 from fogml.report.words import averages, listed, number, percent, unit_of
+from fogml.runs.run import FloatArray
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 _POINTS = 700
-_NOT_STATED = "not stated"
+_NOT_STATED, _NOT_TOLD = "not stated", "not told"
+SYNTHETIC = "synthetic"
+"""What the notes of a simulated run begin with."""
+_TERMS = {"N": "Angle random walk", "B": "Bias instability", "K": "Rate random walk"}
 _MOST_RUNS = 8
 
 
@@ -35,6 +39,9 @@ class Sheet:
     limits: list[LimitOutcome]
     about: list[tuple[str, str]]
     runs: Table
+    figures: Table
+    worst: str
+    synthetic: bool
     more_runs: int
     figure: Markup
     figure_words: str
@@ -108,6 +115,10 @@ def _sheet(judgement: Judgement) -> Sheet:
         ("Size", ", ".join(card_line(card))),
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
+        ("Data", "synthetic, from a simulation" if is_synthetic(judgement) else "recorded"),
+        ("Attitude", _attitude(worst)),
+        ("Span", _span(worst)),
+        ("Rates", _rates(worst)),
         ("Averages", f"{worst.averaging_s:.4g} s"),
         ("Bias relative to", reference_of(worst)),
     ]
@@ -119,6 +130,9 @@ def _sheet(judgement: Judgement) -> Sheet:
         limits=stated_limits(judgement),
         about=about,
         runs=_runs(shown),
+        figures=_figures(worst),
+        worst=worst.run,
+        synthetic=is_synthetic(judgement),
         more_runs=len(judgement.test) - len(shown),
         figure=figure,
         figure_words=words,
@@ -131,7 +145,7 @@ def _runs(runs: Sequence[RunJudgement]) -> Table:
     columns = [("Run", "", "text"), ("Rms before", "deg/h", "figure"), ("Rms after", "deg/h", "figure")]
     columns += [
         ("Bias", "deg/h", "figure"),
-        ("Bias stability", "deg/h", "figure"),
+        ("Bias stability over temperature", "deg/h", "figure"),
         ("Range", "deg/h", "figure"),
     ]
     columns += [("Noise floor", "deg/h", "figure"), ("Outside training", "", "figure")]
@@ -141,6 +155,103 @@ def _runs(runs: Sequence[RunJudgement]) -> Table:
         cells = (run.run, *(number(value) for value in (*values, run.floor)), percent(run.outside_training))
         rows.append(Row(cells))
     return Table(tuple(columns), tuple(rows))
+
+
+def is_synthetic(judgement: Judgement) -> bool:
+    """Whether a run comes from a simulation: its notes begin with that word."""
+    notes = [run.facts.notes or "" for run in (*judgement.train, *judgement.test)]
+    notes += [note for run in (*judgement.train, *judgement.test) for note in run.notes]
+    return any(note.lower().startswith(SYNTHETIC) for note in notes)
+
+
+def sample_deviation(values: FloatArray) -> tuple[float, tuple[float, float]] | None:
+    """Standard deviation of averages over n - 1, and its 90 % interval; None of fewer than three.
+
+    The interval is that of independent normal averages, by chi-square with n - 1 degrees of freedom; a bias
+    that wanders makes it wider.
+    """
+    from scipy.stats import chi2
+
+    n = len(values)
+    if n < 3:
+        return None
+    deviation = float(np.std(values, ddof=1))
+    low, high = (deviation * float(np.sqrt((n - 1) / chi2.ppf(p, n - 1))) for p in (0.95, 0.05))
+    return deviation, (low, high)
+
+
+def at_constant_temperature(run: RunJudgement) -> FloatArray | None:
+    """Averages after compensation in the longest soak [deg/h], shape (m,); None where there is no soak."""
+    soak = np.concatenate([[False], run.series.regime == "soak", [False]])
+    edges = np.flatnonzero(np.diff(soak.astype(np.int8)))
+    spans = sorted(zip(edges[::2].tolist(), edges[1::2].tolist()), key=lambda span: span[0] - span[1])
+    if not spans:
+        return None
+    first, stop = spans[0]
+    return np.asarray(run.series.after[first:stop])
+
+
+def _figures(run: RunJudgement) -> Table:
+    """Figures of the worst run with their uncertainty."""
+    rows = []
+
+    def add(name: str, value: str, interval: str, how: str) -> None:
+        rows.append(Row((name, value, interval, how)))
+
+    per = f"averages over {run.averaging_s:.4g} s, over n - 1"
+    for name, values, how in (
+        ("Bias stability over temperature", run.series.after, f"all of the run; {per}"),
+        ("Bias stability at constant temperature", at_constant_temperature(run), f"the longest soak; {per}"),
+    ):
+        found = None if values is None else sample_deviation(values)
+        if found is None:
+            add(name, _NOT_TOLD, "", "no soak of three averages" if values is None else per)
+        else:
+            deviation, (low, high) = found
+            add(name, f"{number(deviation)} deg/h", f"{number(low)} to {number(high)}", how)
+    if run.after.bias_stability_10s is not None:
+        ten = number(run.after.bias_stability_10s)
+        add("Bias stability, 10 s averages", f"{ten} deg/h", "", "all of the run; over n")
+    error = run.after.scale_factor_error
+    add(
+        "Scale factor error",
+        _NOT_TOLD if error is None else f"{number(error)} ppm",
+        "",
+        "the table does not turn" if error is None else "all turns",
+    )
+    for name, term in (run.noise or {}).get("terms", {}).items():
+        if name in _TERMS and term and term.get("value") is not None:
+            ends = term.get("ci") or (None,)
+            told = "" if None in ends else " to ".join(number(end) for end in ends)
+            add(_TERMS[name], f"{number(term['value'])} {term['unit']}", told, "Allan deviation of the run")
+    add("Noise floor", f"{number(run.floor)} deg/h", "", f"of averages over {run.averaging_s:.4g} s")
+    names = (("Figure", "text"), ("Value", "figure"), ("90 % interval", "figure"), ("Of", "text"))
+    return Table(tuple((name, "", kind) for name, kind in names), tuple(rows))
+
+
+def _attitude(run: RunJudgement) -> str:
+    axis, latitude = run.facts.input_axis, run.facts.latitude
+    if axis is None:
+        return _NOT_STATED
+    told = axis if isinstance(axis, str) else f"level, heading {axis.heading:g} deg"
+    return f"input axis {told}" + (f", latitude {latitude:g} deg" if latitude is not None else "")
+
+
+def _span(run: RunJudgement) -> str:
+    series, started = run.series, run.facts.started
+    hours = float(np.ptp(series.time) + run.averaging_s) / 3600.0
+    low, high = float(series.temperature.min()), float(series.temperature.max())
+    begun = f"started {started.isoformat(sep=' ', timespec='minutes')}, " if started else "start not stated, "
+    return f"{begun}{hours:.3g} h, T {low:.1f} to {high:.1f} degC"
+
+
+def _rates(run: RunJudgement) -> str:
+    steepest = float(np.abs(run.series.rate).max(initial=0.0))
+    told = f"temperature up to {steepest:.2g} degC/min"
+    if run.table_rates is None:
+        return f"{told}; table rate not recorded"
+    low, high = run.table_rates
+    return f"{told}; table {low:g} to {high:g} deg/s"
 
 
 def card_line(card: dict[str, str]) -> list[str]:

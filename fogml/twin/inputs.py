@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -79,6 +80,8 @@ class Inputs:
         Power-on on the clock of `time` [s]; minus infinity where it was long before.
     power_ons_s
         Later power-ons on the same clock [s], in time order.
+    power_offs_s
+        When the unit went off before each of those [s]; long before where not given.
     drives
         Other recorded quantities by the run format's names, internal units, shape (n,).
     rate_window_s
@@ -108,6 +111,7 @@ class Inputs:
     facts: Facts = field(default_factory=Facts)
     powered_on_s: float = -np.inf
     power_ons_s: tuple[float, ...] = ()
+    power_offs_s: tuple[float, ...] = ()
     drives: Mapping[str, FloatArray] = field(default_factory=dict)
     sensors: Mapping[str, Sequence[FloatArray]] = field(default_factory=dict)
     rate_window_s: float = 64.0
@@ -261,6 +265,19 @@ class Inputs:
         """Time since the latest power-on [s], at least 0; infinite where it was long before; shape (n,)."""
         starts = np.array([self.powered_on_s, *self.power_ons_s])
         return np.maximum(self.time - starts[self.power_cycle], 0.0)
+
+    def unwarmed(self, time_constant: float) -> FloatArray:
+        """Share of a warm-up with this time constant [s] that is still to come, shape (n,).
+
+        It fades from 1 while the unit is on, and comes back as fast while it is off: a unit that was off for
+        a moment has hardly cooled.
+        """
+        starts, cold = (self.powered_on_s, *self.power_ons_s), [1.0]
+        for on, off, following in zip(starts, self.power_offs_s, starts[1:]):
+            left = cold[-1] * math.exp(-(off - on) / time_constant)
+            cold.append(1.0 + (left - 1.0) * math.exp(-(following - off) / time_constant))
+        cold += [1.0] * (len(starts) - len(cold))
+        return np.asarray(np.array(cold)[self.power_cycle] * np.exp(-self.time_on_s / time_constant))
 
     @cached_property
     def power_cycle(self) -> NDArray[np.int64]:

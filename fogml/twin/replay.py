@@ -90,6 +90,7 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         facts=_with_table_axis(run),
         powered_on_s=windows[0][0] if windows else -math.inf,
         power_ons_s=tuple(on for on, _ in windows[1:]),
+        power_offs_s=tuple(off for _, off in windows[:-1]),
         drives=drives,
         sensors=sensors,
         rate_window_s=RATE_WINDOW_S if noisy else 0.0,
@@ -112,7 +113,8 @@ def _with_table_axis(run: Run) -> Facts:
 def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
     """The true inputs behind a simulated run."""
     truth.check_fits(run.time, run.name)
-    ons = _power_ons(truth.time, truth.time_on)
+    windows = _windows_of(truth.time, truth.time_on)
+    ons = [on for on, _ in windows]
     return Inputs(
         time=truth.time,
         temperatures=truth.nodes,
@@ -121,6 +123,7 @@ def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
         facts=run.facts,
         powered_on_s=ons[0],
         power_ons_s=tuple(ons[1:]),
+        power_offs_s=tuple(off for _, off in windows[:-1]),
         drives=truth.drives,
         rate_window_s=0.0,
     )
@@ -233,7 +236,7 @@ class Replayer:
         around = self._around(twin)
         if self.truth is not None or not missing or not recorded.temperatures:
             if around not in self._given:
-                given = self._surrounded(twin, recorded)
+                given = self.surrounded(twin, recorded)
                 self._given[around] = _Given(around, given, given)
             return self._given[around]
         changes = tuple((d, s.amplitude, s.key) for d, s in twin.thermal)
@@ -247,7 +250,7 @@ class Replayer:
                 fan=recorded.drives.get("fan"),
                 table_rate=recorded.afresh().turning_deg_s,
             )
-            nominal = self._surrounded(twin, recorded)
+            nominal = self.surrounded(twin, recorded)
             inputs = replace(nominal.afresh(), temperatures={**nodes, **recorded.temperatures}, cache={})
             # Bounded: a fit may try many plants.
             if len(self._given) > 8:
@@ -263,7 +266,7 @@ class Replayer:
             return (twin.coil,)
         return twin.coil, outside.horizontal_field, outside.vertical_field
 
-    def _surrounded(self, twin: Twin, recorded: Inputs) -> Inputs:
+    def surrounded(self, twin: Twin, recorded: Inputs) -> Inputs:
         """The recorded inputs with what `_around` tells."""
         given, outside = replace(recorded, coil=twin.coil), twin.surroundings
         if len(self._around(twin)) == 1:
@@ -279,15 +282,15 @@ _replayers: WeakKeyDictionary[Run, dict[int, Replayer]] = WeakKeyDictionary()
 def _power_windows(run: Run) -> PowerWindows:
     """When the unit was on: from the column ``time_on`` of a simulated run, else as recorded."""
     if "time_on" in run.columns and len(run):
-        ons = _power_ons(run.time, read_time_on(run.columns["time_on"]))
-        starts = np.searchsorted(run.time, ons[1:])
-        offs = [*run.time[starts - 1].tolist(), math.inf]
-        return tuple(zip(ons, offs))
+        return _windows_of(run.time, read_time_on(run.columns["time_on"]))
     powered = recorded_power(run)
     return powered if powered else ((-math.inf, math.inf),)
 
 
-def _power_ons(time: FloatArray, time_on: FloatArray) -> list[float]:
-    """Times of power-on [s] from the time since."""
+def _windows_of(time: FloatArray, time_on: FloatArray) -> PowerWindows:
+    """When the unit was on, from the time since power-on [s]; it went off a sample after the last one."""
     starts = np.concatenate([[0], np.flatnonzero(time_on[1:] < time_on[:-1]) + 1])
-    return (time[starts] - time_on[starts]).tolist()
+    ons = time[starts] - time_on[starts]
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 0.0
+    offs = [*np.minimum(time[starts[1:] - 1] + step, ons[1:]).tolist(), math.inf]
+    return tuple(zip(ons.tolist(), offs))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from fogml.errors import InputError
 from fogml.runs.columns import KNOWN, coil_sensor_number, header, is_temperature
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray, Run
+from fogml.twin.between_runs import Storage
 from fogml.twin.chain import ChainOutput
 from fogml.twin.programme import Programme, load_programme
 from fogml.twin.truth import TIME_ON, Truth, written_time_on
@@ -44,10 +45,11 @@ BLOCK_ROWS = 1 << 14
 
 @dataclass(frozen=True, eq=False)
 class Simulation:
-    """A simulated run, and the truth behind it where that was asked for."""
+    """A simulated run, the truth behind it where that was asked for, and the world that it left."""
 
     run: Run
     truth: Truth | None = None
+    world: World | None = field(default=None, repr=False)
 
 
 def simulate(
@@ -59,6 +61,8 @@ def simulate(
     columns: Sequence[str] | None = None,
     facts: Facts | None = None,
     truth: bool = False,
+    after: Simulation | None = None,
+    storage: Storage | None = None,
 ) -> Simulation:
     """Run a twin through a programme.
 
@@ -79,6 +83,11 @@ def simulate(
         the notes say what was simulated, unless stated; power-on is the programme's.
     truth
         Whether to keep every node and every effect's contribution.
+    after
+        The run of the same unit before: what the unit remembers goes on from it, over the time that the facts
+        ``started`` of both tell. What is drawn at each power-on then follows from the first run's seed.
+    storage
+        Where the unit is between; off at 25 degC if None.
 
     Returns
     -------
@@ -90,7 +99,10 @@ def simulate(
     InputError
         If something can't be recorded, the seed is negative, or the unit is never on.
     """
-    world = _world(programme, twin, sample_s, seed, columns, facts, truth)
+    before = None if after is None else after.world
+    world = world_of(
+        programme, twin, sample_s, seed, columns, facts, truth=truth, before=before, storage=storage
+    )
     length = len(world.timeline)
     kept: dict[str, FloatArray] = {}
     kept_truth: dict[str, FloatArray] = {}
@@ -107,10 +119,11 @@ def simulate(
         raise _never_on(world)
     run = Run(world.twin.name, {name: values[:rows] for name, values in kept.items()}, world.facts)
     if not truth:
-        return Simulation(run)
+        return Simulation(run, None, world)
     from fogml.twin.truth import truth_from_columns
 
-    return Simulation(run, truth_from_columns({cell: values[:rows] for cell, values in kept_truth.items()}))
+    true = truth_from_columns({cell: values[:rows] for cell, values in kept_truth.items()})
+    return Simulation(run, true, world)
 
 
 def simulate_to_file(
@@ -148,9 +161,16 @@ def simulate_to_file(
     InputError
         As `simulate`, or if a file can't be written.
     """
+    world = world_of(programme, twin, sample_s, seed, columns, facts, truth=truth_path is not None)
+    return write_world(world, path, truth_path, progress)
+
+
+def write_world(
+    world: World, path: str | Path, truth_path: str | Path | None = None, progress: Any = None
+) -> int:
+    """Let a world go by and write what is recorded of it; parameters and result as `simulate_to_file`."""
     from fogml.runs.writing import BlockWriter
 
-    world = _world(programme, twin, sample_s, seed, columns, facts, truth_path is not None)
     rows = 0
     with ExitStack() as stack:
         writer = stack.enter_context(BlockWriter(path, world.facts))
@@ -188,15 +208,19 @@ def _never_on(world: World) -> InputError:
     return InputError(f"{world.timeline.programme.name}: the unit is never on; add a step with 'power on'")
 
 
-def _world(
+def world_of(
     programme: Any,
     twin: Twin | str | Path,
     sample_s: float,
     seed: int,
     columns: Sequence[str] | None,
     facts: Facts | None,
+    *,
     truth: bool,
+    before: World | None = None,
+    storage: Storage | None = None,
 ) -> World:
+    """A world that has not begun; parameters as `simulate`, `before` is that of the unit's run before."""
     if not isinstance(programme, Programme):
         programme = load_programme(programme)
     unit = twin if isinstance(twin, Twin) else load_twin(twin)
@@ -213,7 +237,7 @@ def _world(
             )
     if len(set(names)) < len(names):
         raise InputError("columns: one is named twice")
-    return World(programme, unit, sample_s, seed, names, stated, truth)
+    return World(programme, unit, sample_s, seed, names, stated, truth, before, storage)
 
 
 def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
@@ -238,7 +262,9 @@ def _recorded(
     world: World, samples: Samples, chain: ChainOutput
 ) -> tuple[dict[str, FloatArray], Truth | None]:
     inputs = samples.inputs
-    recorded = {"time": inputs.time, "gyro": world.logged(samples, chain.output + samples.noise)}
+    # On the run's own clock.
+    time = inputs.time - world.clock_s if world.clock_s else inputs.time
+    recorded = {"time": time, "gyro": world.logged(samples, chain.output + samples.noise)}
     for name in world.columns:
         if is_temperature(name):
             recorded[name] = world.sensed(name, samples)
@@ -253,7 +279,7 @@ def _recorded(
     free = world.noise_free(samples, chain.output)
     others = world.other_contributions(samples, chain.output)
     return recorded, Truth(
-        inputs.time,
+        time,
         inputs.temperatures,
         inputs.table_rate,
         inputs.drives,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,15 +13,25 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.attitude import attitude, earth_field
+from fogml.twin.between_runs import (
+    Storage,
+    later_s,
+    storage_drives,
+    storage_times,
+    stored_nodes,
+    windows_with_history,
+)
 from fogml.twin.chain import ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
 from fogml.twin.plant.network import AIR, PlantState
+from fogml.twin.plant.power import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
 from fogml.twin.timeline import TimelineBlock, timeline
 from fogml.twin.twin import Twin
+from fogml.twin.twin_file import twin_dict
 
 _ALL_DRIVES = (
     "angle",
@@ -61,18 +72,23 @@ class _Branch:
         self.state = PlantState()
         self.chamber_memory, self.memory = Memory(), Memory()
 
-    def nodes(self, block: TimelineBlock, drives: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    def go_on_from(self, before: _Branch) -> None:
+        """Take over the states that another run of the same unit left."""
+        left = before.state, before.chamber_memory, before.memory
+        self.state, self.chamber_memory, self.memory = deepcopy(left)
+
+    def nodes(
+        self, block: TimelineBlock, drives: dict[str, FloatArray], clock_s: float, windows: PowerWindows
+    ) -> dict[str, FloatArray]:
         """Temperature of every node at all samples of the block, on or off."""
-        chamber = block.set_point
+        chamber, time = block.set_point, clock_s + block.time
         for declared, setting in self.twin.thermal:
-            inputs = Inputs(
-                block.time, {AIR: chamber}, block.table_rate, drives=drives, memory=self.chamber_memory
-            )
+            inputs = Inputs(time, {AIR: chamber}, block.table_rate, drives=drives, memory=self.chamber_memory)
             chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
         return self.network.temperatures(
-            block.time,
+            time,
             chamber,
-            powered=block.timeline.power_windows,
+            powered=windows,
             fan=block.fan,
             table_rate=block.table_rate,
             state=self.state,
@@ -92,7 +108,13 @@ class World:
         Set-up facts; power-on is added.
     truth
         Whether contributions are asked for.
+    before, storage
+        The unit's run before this one, which is over, and where the unit was between: states go on. All times
+        are then those of the unit's clock, which began with its first run.
     """
+
+    clock_s = 0.0
+    """When the run starts on the unit's clock [s]."""
 
     def __init__(
         self,
@@ -103,13 +125,27 @@ class World:
         columns: tuple[str, ...],
         facts: Facts,
         truth: bool,
+        before: World | None = None,
+        storage: Storage | None = None,
     ) -> None:
         self.timeline = timeline(programme, sample_s)
         self.twin, self.columns, self.truth = twin, columns, truth
         self._seed = seed
-        ons = [on for on, _ in self.timeline.power_windows]
-        self._power_ons = ons or [math.inf]
-        first = self._power_ons[0]
+        self._first_facts: Facts = facts if before is None else before._first_facts
+        self._windows: PowerWindows = self.timeline.power_windows
+        # Times of power-on within this run; one long before counts as one.
+        self._own_cycles = len(self._windows)
+        storage = Storage() if storage is None else storage
+        if before is not None:
+            self.clock_s = later_s(facts, before._first_facts, programme.name)
+            if self.clock_s < before.end_s:
+                raise InputError(f"{programme.name}: it starts before the unit's run before it has ended")
+            shifted = tuple((on + self.clock_s, off + self.clock_s) for on, off in self._windows)
+            self._windows = windows_with_history(
+                before._windows, shifted, self.clock_s, before.end_s, storage
+            )
+        own = self._windows[len(self._windows) - self._own_cycles :]
+        first = own[0][0] - self.clock_s if own else math.inf
         self.facts = facts.model_copy(update={"powered_on": first if math.isfinite(first) else None})
         self._main = _Branch(twin)
         self._without = {}
@@ -117,6 +153,8 @@ class World:
             thermal = [declared.id for declared, _ in twin.thermal if not hidden(declared)]
             self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
+        if before is not None:
+            self._go_on_from(before, storage)
         self._noise = RandomErrors(twin, seed, len(self.timeline), sample_s, apart=truth)
         self._sensor_rng = Streams(seed, "sensor")
         self._sensor_memory, self._share_memory = Memory(), Memory()
@@ -126,7 +164,30 @@ class World:
     @property
     def power_cycles(self) -> bool:
         """Whether the unit is switched on more than once."""
-        return len(self._power_ons) > 1
+        return self._own_cycles > 1
+
+    @property
+    def end_s(self) -> float:
+        """When the run ends on the unit's clock [s]."""
+        return self.clock_s + len(self.timeline) * self.timeline.sample_s
+
+    def _go_on_from(self, before: World, storage: Storage) -> None:
+        """Take over what the unit remembers of the run before, and what storage made of it."""
+        if before.twin is not self.twin and twin_dict(before.twin) != twin_dict(self.twin):
+            raise InputError(f"{self.timeline.programme.name}: runs of one unit have one twin")
+        self._seed = before._seed
+        self._main.go_on_from(before._main)
+        for id, branch in self._without.items():
+            if id in before._without:
+                branch.go_on_from(before._without[id])
+        time = storage_times(before.end_s, self.clock_s)
+        if not len(time):
+            return
+        drives = storage_drives(time, storage, before._last_drives)
+        for branch in (self._main, *self._without.values()):
+            nodes = stored_nodes(branch.network, time, storage, self._windows, branch.state)
+            inputs = self._inputs(branch, time, nodes, np.zeros(len(time)), drives)
+            through_chain(branch.twin, inputs, inputs)
 
     def samples(self, block_rows: int) -> Iterator[Samples]:
         """What acts on the gyro at all samples in which it is on, block by block."""
@@ -176,27 +237,44 @@ class World:
         rows = slice(None) if on.all() else on
         drives_on = {name: values[rows] for name, values in drives.items()}
 
+        if len(block):
+            self._last_drives = {name: float(values[-1]) for name, values in drives.items()}
+
         def inputs(branch: _Branch) -> Inputs:
-            nodes = branch.nodes(block, drives)
-            return Inputs(
-                time=block.time[rows],
-                temperatures={name: values[rows] for name, values in nodes.items()},
-                table_rate=rate[rows],
-                earth_deg_h=facts.earth_rate_deg_h or 0.0,
-                facts=facts,
-                powered_on_s=self._power_ons[0],
-                power_ons_s=tuple(self._power_ons[1:]),
-                drives=drives_on,
-                coil=branch.twin.coil,
-                seed=self._seed,
-                rate_window_s=0.0,
-                memory=branch.memory,
-            )
+            nodes = branch.nodes(block, drives, self.clock_s, self._windows)
+            nodes_on = {name: values[rows] for name, values in nodes.items()}
+            return self._inputs(branch, self.clock_s + block.time[rows], nodes_on, rate[rows], drives_on)
 
         without = {id: inputs(branch) for id, branch in self._without.items()}
         given = inputs(self._main)
         noise, random = self._noise.block(len(block), rows, given)
         return Samples(given, noise, random, without)
+
+    def _inputs(
+        self,
+        branch: _Branch,
+        time: FloatArray,
+        nodes: dict[str, FloatArray],
+        rate: FloatArray,
+        drives: dict[str, FloatArray],
+    ) -> Inputs:
+        """What acts on a branch's gyro at times of the unit's clock [s]."""
+        ons = [on for on, _ in self._windows] or [math.inf]
+        return Inputs(
+            time=time,
+            temperatures=nodes,
+            table_rate=rate,
+            earth_deg_h=self.facts.earth_rate_deg_h or 0.0,
+            facts=self.facts,
+            powered_on_s=ons[0],
+            power_ons_s=tuple(ons[1:]),
+            power_offs_s=tuple(off for _, off in self._windows[:-1]),
+            drives=drives,
+            coil=branch.twin.coil,
+            seed=self._seed,
+            rate_window_s=0.0,
+            memory=branch.memory,
+        )
 
     def _needed_drives(self) -> set[str]:
         """Drives that are recorded, or that an effect reads; all of them for the truth."""
@@ -223,7 +301,7 @@ class World:
         if "supply" in needed:
             drives["supply"] = np.full(len(block), outside.supply)
         if "power" in needed:
-            drives["power"] = self._main.network.heating.power(block.time, self.timeline.power_windows)
+            drives["power"] = self._main.network.heating.power(self.clock_s + block.time, self._windows)
         if needed & {"B_x", "B_y", "B_z"}:
             drives |= earth_field(self.facts, angle, outside.horizontal_field, outside.vertical_field)
         return drives

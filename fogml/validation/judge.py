@@ -197,6 +197,8 @@ def _judge_run(
         findings=findings,
         notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes, *metrics.notes),
         power_on_known=run.facts.powered_on is not None,
+        facts=run.facts,
+        table_rates=(float(run.rate.min()), float(run.rate.max())) if "rate" in run.columns else None,
     )
 
 

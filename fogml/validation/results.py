@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 
 FloatArray = NDArray[np.float64]
@@ -85,8 +86,9 @@ class AveragedSeries:
 class RunJudgement:
     """One model on one run.
 
-    ``floor`` is the noise at ``averaging_s`` [deg/h]; ``noise`` the run's own Allan terms with their
-    intervals and the raw minimum, as in ``noise.json``, None where the run is too short for them.
+    ``facts`` are the run's, ``table_rates`` the least and the greatest rate of the table [deg/s], None where
+    none is recorded. ``floor`` is the noise at ``averaging_s`` [deg/h]; ``noise`` the run's own Allan terms
+    with their intervals and the raw minimum, as in ``noise.json``, None where the run is too short for them.
     """
 
     run: str
@@ -105,6 +107,8 @@ class RunJudgement:
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     power_on_known: bool = False
+    facts: Facts = field(default_factory=Facts)
+    table_rates: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)

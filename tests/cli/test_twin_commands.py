@@ -11,6 +11,7 @@ import yaml
 from fogml.runs.reading import read_run
 from fogml.twin.registry import effects
 from fogml.twin.truth import read_truth
+from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, save_twin
 
 STEPS = ["soak at 25 degC for 10 min", "ramp to 35 degC at 1 degC/min", "soak at 35 degC for 10 min"]
@@ -186,3 +187,50 @@ def test_the_catalogue_page(invoke, tmp_path):
         assert f'<article id="{id}">' in page
     # At its usual amplitude on the separating programme all but what needs other set-ups shows something.
     assert page.count("Nothing of it shows") <= 8
+
+
+def test_a_units_runs_in_one_file_and_a_replay_after_the_first(tmp_path, invoke_json, invoke):
+    """The play of the second run is where the first one left it: a replay needs --after to tell."""
+    twin, config = tmp_path / "twin.yaml", tmp_path / "runs.yaml"
+    save_twin(Twin("unit").with_effect("thermal_hysteresis"), twin)
+    first, second = tmp_path / "first.csv", tmp_path / "second.csv"
+    values = {
+        "schema": "fogml.simulate/1",
+        "sample_s": 10.0,
+        "twin": str(twin),
+        "storage": {"temperature": 20.0, "power": "off"},
+        "runs": [
+            {"programme": ["soak at 55 degC for 4 h"], "started": "2026-03-02T08:00:00Z", "out": str(first)},
+            {"programme": STEPS, "started": "2026-03-05T08:00:00Z", "out": str(second)},
+        ],
+    }
+    config.write_text(yaml.safe_dump(values))
+    told = invoke_json("simulate", config)
+    assert [run["run"] for run in told["runs"]] == ["first.csv", "second.csv"]
+    assert read_run(second).facts.started.isoformat() == "2026-03-05T08:00:00+00:00"
+    stored = ("--storage-temperature", "20")
+    found = {}
+    for name, more in (("after", ("--after", first, *stored)), ("alone", ())):
+        out = tmp_path / f"{name}.csv"
+        invoke("replay", twin, second, "-o", out, *more)
+        found[name] = np.abs(read_run(out).columns["replayed"] - read_run(second).gyro).max()
+    assert found["after"] < 1e-6 < 0.05 < found["alone"]
+    again = invoke_json("simulate", tmp_path / "first.simulate.config.yaml")
+    assert again["runs"] == told["runs"]
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"programme": STEPS}, "there are 'runs'; state it in each of them"),
+        ({"storage": {"temperature": 300.0}}, "storage: temperature is 300"),
+        ({"runs": [{"programme": STEPS, "out": "a.csv"}]}, "started"),
+    ],
+)
+def test_faulty_runs_are_refused(tmp_path, invoke, change, message):
+    config = tmp_path / "runs.yaml"
+    run = {"programme": STEPS, "started": "2026-03-02T08:00:00Z", "out": str(tmp_path / "a.csv")}
+    config.write_text(yaml.safe_dump({"schema": "fogml.simulate/1", "runs": [run], **change}))
+    result = invoke("simulate", config, status=2)
+    assert message in result.stderr
+    assert not (tmp_path / "a.csv").exists()

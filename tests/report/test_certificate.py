@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
-from datetime import date
+from datetime import UTC, date, datetime
+
+import numpy as np
+import pytest
 
 from fogml.report import certificate
-from fogml.report.certificate import by_unit
+from fogml.report.certificate import at_constant_temperature, by_unit, sample_deviation
+from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from tests.report.judgements import judged_run, judgement
 from tests.report.pages import Page
@@ -81,3 +85,41 @@ def test_many_runs_stay_on_the_sheet() -> None:
     runs = tuple(judged_run(f"r{i}.csv", n=60) for i in range(20))
     text = Page(certificate(replace(judged, test=runs))).text
     assert "12 more runs with smaller rms" in text
+
+
+def test_the_sheet_tells_synthetic_data_set_up_and_figures_over_n_less_one() -> None:
+    """Figures by their definitions over n - 1: over temperature, and in the longest soak."""
+    started = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
+    facts = Facts(latitude=39.9, input_axis="down", started=started, notes="synthetic: programme x, seed 1")
+    after = replace(judged_run().after, scale_factor_error=12.5)
+    terms = {"N": {"value": 0.02, "ci": [0.018, 0.022], "unit": "deg/sqrt(h)"}}
+    run = replace(judged_run(), facts=facts, after=after, noise={"terms": terms}, table_rates=(-10.0, 100.0))
+    text = Page(certificate(replace(judgement(), test=(run,)))).text
+    for part in (
+        "synthetic data",
+        "input axis down, latitude 39.9 deg",
+        "started 2026-03-02 08:00",
+        "table -10 to 100 deg/s",
+        "Bias stability, 10 s averages",
+        "12.5 ppm",
+        "Angle random walk",
+    ):
+        assert part in text, part
+    whole, held = run.series.after, at_constant_temperature(run)
+    assert len(held) == len(whole) // 5
+    for values in (whole, held):
+        told, (low, high) = sample_deviation(values)
+        assert told == pytest.approx(np.sqrt(((values - values.mean()) ** 2).sum() / (len(values) - 1)))
+        assert low < told < high
+    assert "over temperature" in text and "at constant temperature" in text
+    assert "synthetic data" not in Page(certificate(judgement())).text
+
+
+def test_the_interval_of_a_deviation_covers_the_truth() -> None:
+    rng = np.random.default_rng(0)
+    hits = 0
+    for _ in range(1000):
+        _, (low, high) = sample_deviation(2.0 * rng.standard_normal(12))
+        hits += low <= 2.0 <= high
+    assert hits / 1000 == pytest.approx(0.9, abs=0.03)
+    assert sample_deviation(np.zeros(2)) is None

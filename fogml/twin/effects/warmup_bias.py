@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import BiasEffect
 from fogml.twin.inputs import Inputs
@@ -17,7 +15,8 @@ class WarmupBias(BiasEffect):
 
         b = w_1 (exp(-t / tau_1) + r exp(-t / tau_2))
 
-    t is the time since power-on; the amplitude is w_1, ``fast_time_constant`` and
+    t is the time since power-on of a unit that was cold; while it is off each part comes back as it went, so
+    that a minute off brings little of it. The amplitude is w_1, ``fast_time_constant`` and
     ``slow_time_constant`` are tau_1 and tau_2, ``slow_ratio`` r is w_2 / w_1.
 
     Source: form and ranges are engineering ones; a north-seeker's start-up error of 0.09 to 0.1 deg, from
@@ -46,6 +45,5 @@ class WarmupBias(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h of w_1 [deg/h], shape (n,)."""
-        on = inputs.time_on_s
-        slow = shape["slow_ratio"] * np.exp(-on / shape["slow_time_constant"])
-        return np.exp(-on / shape["fast_time_constant"]) + slow
+        slow = shape["slow_ratio"] * inputs.unwarmed(shape["slow_time_constant"])
+        return inputs.unwarmed(shape["fast_time_constant"]) + slow

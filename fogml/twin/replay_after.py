@@ -1,0 +1,182 @@
+"""Replay of a run after others of the same unit: what the unit remembers of them goes on."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.between_runs import (
+    Storage,
+    later_s,
+    plant_state,
+    storage_drives,
+    storage_times,
+    stored_nodes,
+    windows_with_history,
+)
+from fogml.twin.chain import logged, through_chain
+from fogml.twin.effect import Effect
+from fogml.twin.inputs import REST, Inputs
+from fogml.twin.memory import Memory
+from fogml.twin.plant.estimate import EstimateState, estimate_nodes
+from fogml.twin.plant.network import ThermalNetwork
+from fogml.twin.plant.power import PowerWindows
+from fogml.twin.replay import Replayer
+from fogml.twin.twin import EffectSetting, Twin
+
+
+def replay_after(
+    twin: Twin, run: Run, after: Sequence[Run], *, only: str | None = None, storage: Storage | None = None
+) -> FloatArray:
+    """What the twin's gyro would have put out in a run, after others of the same unit.
+
+    Parameters
+    ----------
+    twin
+        The twin.
+    run
+        The run.
+    after
+        The unit's runs before it; each states when it ``started``.
+    only
+        Id of an effect: the difference that it makes, in place of the whole output.
+    storage
+        Where the unit was between; off at 25 degC if None.
+
+    Returns
+    -------
+    FloatArray
+        Output [deg/h], shape (n,).
+
+    Raises
+    ------
+    InputError
+        If a run does not state when it started, two of them overlap, units differ, or `only` is not on.
+    """
+    if only is not None:
+        without = replay_after(twin.without_effect(only), run, after, storage=storage)
+        return replay_after(twin, run, after, storage=storage) - without
+    whole, nominal, rows = _joined(twin, run, after, Storage() if storage is None else storage)
+
+    def signature(declared: Effect, setting: EffectSetting, inputs: Inputs) -> FloatArray:
+        return declared.in_hindsight(inputs.afresh(), **setting.shape)
+
+    output = through_chain(twin, whole.afresh(), nominal.afresh(), signature=signature, trusting=True).output
+    last = slice(len(whole) - rows, None)
+    own = replace(
+        whole,
+        time=whole.time[last],
+        temperatures=_cut(whole.temperatures, last),
+        table_rate=whole.table_rate[last],
+        drives=_cut(whole.drives, last),
+        memory=Memory(),
+        cache={},
+    )
+    return logged(twin, output[last], own).output
+
+
+def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tuple[Inputs, Inputs, int]:
+    """Inputs of all runs and of the storage between them, one after the other on the unit's clock."""
+    runs = _in_order(run, after)
+    parts: list[tuple[FloatArray, dict[str, FloatArray], FloatArray, dict[str, FloatArray]]] = []
+    windows: PowerWindows = ()
+    left: dict[str, float] | None = None
+    ended, network = 0.0, twin.network
+    for number, one in enumerate(runs):
+        replayer = Replayer(one)
+        clock = later_s(one.facts, runs[0].facts, one.name)
+        given = replayer.surrounded(twin, replayer.recorded)
+        time = clock + given.time
+        own = tuple((on + clock, off + clock) for on, off in replayer.windows)
+        if number:
+            if time[0] < ended:
+                raise InputError(f"{one.name}: it starts before {runs[number - 1].name} has ended")
+            windows = windows_with_history(windows, own, clock, ended, storage)
+            assert left is not None
+            between = storage_times(ended, clock)
+            if len(between):
+                state = plant_state(network, ended - _step(one), left)
+                nodes = stored_nodes(network, between, storage, windows, state)
+                last = {name: float(values[-1]) for name, values in parts[-1][3].items()}
+                drives = storage_drives(between, storage, last)
+                parts.append((between, nodes, np.zeros(len(between)), drives))
+                left = {name: float(values[-1]) for name, values in nodes.items()}
+        else:
+            windows = own
+        nodes = estimate_nodes(
+            network,
+            time,
+            given.temperatures,
+            powered=windows,
+            fan=given.drives.get("fan"),
+            table_rate=given.afresh().turning_deg_s,
+            state=_state_after(network, given.temperatures, parts[-1][0] if parts else None, left),
+        )
+        left = {name: float(values[-1]) for name, values in nodes.items()}
+        parts.append((time, {**nodes, **given.temperatures}, given.table_rate, dict(given.drives)))
+        ended = float(time[-1]) + _step(one)
+    target = Replayer(run)
+    given = target.surrounded(twin, target.recorded)
+    names = set.intersection(*(set(part[1]) for part in parts))
+    whole = replace(
+        given,
+        time=np.concatenate([part[0] for part in parts]),
+        temperatures={name: np.concatenate([part[1][name] for part in parts]) for name in sorted(names)},
+        table_rate=np.concatenate([part[2] for part in parts]),
+        drives={name: np.concatenate([_drive(part, name) for part in parts]) for name in given.drives},
+        sensors={},
+        powered_on_s=windows[0][0],
+        power_ons_s=tuple(on for on, _ in windows[1:]),
+        power_offs_s=tuple(off for _, off in windows[:-1]),
+        memory=Memory(),
+        cache={},
+    )
+    seen = {name: values for name, values in whole.temperatures.items() if name in given.temperatures}
+    nominal = replace(whole, temperatures=seen)
+    return whole, nominal, len(run)
+
+
+def _in_order(run: Run, after: Sequence[Run]) -> list[Run]:
+    """The runs by when they started, `run` last."""
+    for one in after:
+        later_s(run.facts, one.facts, f"{run.name} after {one.name}")
+        if None not in (run.facts.unit, one.facts.unit) and run.facts.unit != one.facts.unit:
+            raise InputError(
+                f"{one.name}: it is of unit {one.facts.unit}, and {run.name} of {run.facts.unit}"
+            )
+    return [*sorted(after, key=lambda one: -later_s(run.facts, one.facts, one.name)), run]
+
+
+def _state_after(
+    network: ThermalNetwork,
+    recorded: Mapping[str, FloatArray],
+    time: FloatArray | None,
+    left: Mapping[str, float] | None,
+) -> EstimateState | None:
+    """Where nodes that are not recorded go on from; at rest where nothing went before."""
+    if time is None or left is None:
+        return None
+    known = [name for name in network.names if name in recorded]
+    if "T" in recorded and "T_in" not in known:
+        known.append("T_in")
+    return EstimateState(nodes=plant_state(network.held_at(*known), float(time[-1]), left))
+
+
+def _drive(
+    part: tuple[FloatArray, dict[str, FloatArray], FloatArray, dict[str, FloatArray]], name: str
+) -> FloatArray:
+    """A drive over a part; at rest where that part did not record it."""
+    return part[3][name] if name in part[3] else np.full(len(part[0]), REST.get(name, 0.0))
+
+
+def _cut(columns: Mapping[str, FloatArray], rows: slice) -> dict[str, FloatArray]:
+    return {name: values[rows] for name, values in columns.items()}
+
+
+def _step(run: Run) -> float:
+    """Sample interval [s]; what the last sample holds ends with it."""
+    return float(np.median(np.diff(run.time))) if len(run) > 1 else 0.0

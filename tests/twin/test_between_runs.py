@@ -1,0 +1,165 @@
+"""What a unit remembers from run to run, and over a time without power."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts
+from fogml.twin.between_runs import Storage, storage_times
+from fogml.twin.effect import NoiseEffect, SensorEffect, ThermalEffect
+from fogml.twin.inputs import Inputs
+from fogml.twin.registry import effect, effects
+from fogml.twin.replay_after import replay_after
+from fogml.twin.simulate import simulate
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin
+
+BEGUN = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
+RAMP = [{"ramp to 55 degC at 1 degC/min": ["turn at 10 deg/s for 60 s from minute 10"]}]
+DOWN = [{"soak at 25 degC for 60 min": ["turn at -10 deg/s for 60 s from minute 10"]}]
+REMEMBERING = (
+    "thermal_hysteresis",
+    "stress_relaxation",
+    "moisture",
+    "ageing",
+    "warmup_bias",
+    "sf_hysteresis",
+    "hidden_thermal_node",
+    "rate_ramp",
+)
+
+
+def facts(hours: float = 0.0) -> Facts:
+    started = BEGUN + timedelta(hours=hours)
+    return Facts(unit="FOG-1", latitude=39.9, input_axis="up", started=started)
+
+
+def unit(*ids: str) -> Twin:
+    twin = Twin("unit", plant=load_twin("tactical").plant)
+    for id in ids:
+        twin = twin.with_effect(id)
+    return twin
+
+
+def test_a_minute_off_brings_back_a_minutes_worth_of_the_warm_up() -> None:
+    """An exponential that fades while on and comes back while off, integrated in small steps."""
+    time = np.arange(0.0, 7200.0)
+    windows = ((0.0, 3600.0), (3660.0, 5000.0), (6500.0, np.inf))
+    given = Inputs(
+        time,
+        {"T": np.full(len(time), 25.0)},
+        np.zeros(len(time)),
+        powered_on_s=0.0,
+        power_ons_s=(3660.0, 6500.0),
+        power_offs_s=(3600.0, 5000.0),
+    )
+    shape = {"fast_time_constant": 200.0, "slow_time_constant": 1500.0, "slow_ratio": 0.8}
+    found = effect("warmup_bias").signature(given, **shape)
+    cold, wanted, step = np.ones(2), [], 1.0
+    for t in time:
+        wanted.append(cold[0] + 0.8 * cold[1])
+        on = any(start <= t < stop for start, stop in windows)
+        kept = np.exp(-step / np.array([200.0, 1500.0]))
+        cold = cold * kept if on else 1.0 - (1.0 - cold) * kept
+    on = np.array([any(start <= t < stop for start, stop in windows) for t in time])
+    assert found[on] == pytest.approx(np.array(wanted)[on], abs=1e-9)
+    assert found[3660] < 0.4 < found[6500]
+
+
+def test_a_run_that_follows_at_once_is_the_rest_of_one_long_run() -> None:
+    """No gap and power left on: two runs are one programme, for every effect that has no draw of its own."""
+    ids = [
+        id
+        for id, declared in effects().items()
+        if not isinstance(declared, NoiseEffect | SensorEffect | ThermalEffect)
+        and declared.stage in ("rig", "bias", "scale_factor", "loop")
+        and not declared.seeded
+        and id not in ("fringe_jump", "loop_gain")
+    ]
+    twin = unit(*ids)
+    # The table's angle would begin anew with a run.
+    ramp = ["ramp to 55 degC at 1 degC/min"]
+    long = simulate([*ramp, "hold for 30 min"], twin, facts=facts()).run
+    first = simulate(ramp, twin, facts=facts())
+    second = simulate(
+        {"start_temperature": "55 degC", "steps": ["hold for 30 min"]},
+        twin,
+        facts=facts(len(first.run) / 3600.0),
+        after=first,
+        storage=Storage(powered=True),
+    ).run
+    assert second.time[0] == 0.0
+    rest = long.gyro[len(first.run) :]
+    assert second.gyro == pytest.approx(rest, abs=2e-6)
+
+
+@pytest.mark.parametrize("id", ["stress_relaxation", "moisture", "hidden_thermal_node", "warmup_bias"])
+def test_after_a_very_long_storage_what_fades_has_faded(id: str) -> None:
+    twin = unit(id)
+    first = simulate(RAMP, twin, facts=facts())
+    later = simulate(DOWN, twin, facts=facts(2e5), after=first).run
+    (soak,) = DOWN[0]
+    alone = simulate({"power": "off", "steps": [{soak: ["power on", *DOWN[0][soak]]}]}, twin).run
+    assert later.gyro == pytest.approx(alone.gyro, abs=1e-5)
+
+
+def test_hysteresis_stays_in_storage_and_ageing_goes_on() -> None:
+    twin = Twin().with_effect("thermal_hysteresis")
+    first = simulate(["soak at 55 degC for 4 h"], twin, sample_s=10.0, facts=facts())
+    later, virgin = (simulate(DOWN, twin, facts=facts(240.0), after=after).run for after in (first, None))
+    # Warmed by 30 degC and cooled: the play operator is still on the upper branch.
+    amplitude = effect("thermal_hysteresis").amplitude.typical()
+    assert later.gyro[-1] - virgin.gyro[-1] == pytest.approx(amplitude, rel=1e-3)
+    old = Twin().with_effect("ageing", 1.0, time_constant=36e4)
+    aged = simulate(DOWN, old, facts=facts(240.0), after=simulate(RAMP, old, facts=facts())).run
+    fresh = simulate(DOWN, Twin(), facts=facts()).run
+    wanted = np.log1p((240.0 * 3600.0 + aged.time) / 36e4)
+    assert aged.gyro - fresh.gyro == pytest.approx(wanted, abs=1e-9)
+
+
+@pytest.mark.parametrize("hours", [0.75, 30.0])
+@pytest.mark.parametrize("id", REMEMBERING)
+def test_replay_after_a_run_is_the_simulation_after_it(id: str, hours: float) -> None:
+    twin = unit(id)
+    first = simulate(RAMP, twin, facts=facts())
+    second = simulate(DOWN, twin, facts=facts(hours), after=first)
+    found = replay_after(twin, second.run, [first.run])
+    size = np.abs(second.run.gyro - replay_after(twin.without_effect(id), second.run, [first.run])).max()
+    assert np.abs(found - second.run.gyro).max() < 2e-3 * size
+    only = replay_after(twin, second.run, [first.run], only=id)
+    assert np.abs(only).max() == pytest.approx(size, rel=5e-3)
+
+
+def test_turn_on_biases_of_a_units_runs_differ_and_follow_from_the_first_seed() -> None:
+    twin = Twin().with_effect("turn_on_bias", 1.0)
+    levels = []
+    for seed in (1, 1, 2):
+        made = [simulate(["hold for 30 s"], twin, facts=facts(), seed=seed, columns=())]
+        for hour in (1.0, 2.0):
+            made.append(simulate(["hold for 30 s"], twin, facts=facts(hour), after=made[-1], columns=()))
+        levels.append([one.run.gyro[0] for one in made])
+    assert levels[0] == levels[1] and levels[0] != levels[2]
+    assert len(set(levels[0])) == 3
+
+
+def test_runs_without_their_times_or_out_of_order_are_refused() -> None:
+    first = simulate(RAMP, Twin(), facts=facts())
+    with pytest.raises(InputError, match="needs the fact 'started'"):
+        simulate(DOWN, Twin(), after=first)
+    with pytest.raises(InputError, match="before the unit's run before it has ended"):
+        simulate(DOWN, Twin(), facts=facts(0.1), after=first)
+    with pytest.raises(InputError, match="one twin"):
+        simulate(DOWN, Twin().with_nominal(b0=1.0), facts=facts(5.0), after=first)
+    second = simulate(DOWN, Twin(), facts=facts(5.0), after=first)
+    with pytest.raises(InputError, match="started before"):
+        replay_after(Twin(), first.run, [second.run])
+
+
+def test_samples_of_a_storage_lie_within_it() -> None:
+    found = storage_times(100.0, 1e6)
+    assert found[0] == 100.0 and found[-1] < 1e6 and np.all(np.diff(found) > 0.0)
+    assert not len(storage_times(5.0, 5.0))
