@@ -14,16 +14,15 @@ _ARC_SECOND = math.pi / 180.0 / 3600.0
 
 
 class TableWobble(RigEffect):
-    """The table's axis tilts to and fro as it turns, and modulates Earth rate across it.
+    """A table whose plate is not square to its axis tilts the unit round with it.
 
     ::
 
         w = eps E(phase, table angle),      and a loss of eps**2 / 2 of the rate
 
-    eps is the amplitude: 1 to 10 arcsec for a good table, 30 to 60 for a shaft through a chamber's wall. The
-    table's plate is not square to its axis and goes round with it; E is what such a tilt picks up, as in
-    ``mount_tilt``: Earth rate once a turn with the axis upright, with a horizontal one the table's rate too.
-    The loss is below 0.1 ppm and left out.
+    eps is the amplitude: 1 to 10 arcsec for a good table, 30 to 60 for a shaft through a chamber's wall. E
+    is what such a tilt picks up, as in ``mount_tilt``: Earth rate once a turn with the axis upright, with a
+    horizontal one the table's rate too. The loss is below 0.1 ppm and left out.
 
     Source: geometry (derived); ranges are engineering ones.
     """
