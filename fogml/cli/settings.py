@@ -199,6 +199,10 @@ def absolute(path: str) -> str:
 def _message(settings: type[Settings], error: ValidationError, source: str, stated: Mapping[str, Any]) -> str:
     first = error.errors()[0]
     key = str(first["loc"][0]) if first["loc"] else "?"
+    # A key within an entry of a list, such as runs.0.started.
+    within = ".".join(str(part) for part in first["loc"])
+    if first["type"] == "extra_forbidden" and len(first["loc"]) > 1:
+        return f"{source}: unknown key {quoted(within)}"
     if first["type"] == "extra_forbidden":
         known = [field.alias or name for name, field in settings.model_fields.items()]
         near = get_close_matches(key, known, n=1)
@@ -206,6 +210,6 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
         return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
-        return f"{place}nothing is given for '{key}'"
+        return f"{place}nothing is given for '{within}'"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
     return f"{place}'{key}': {reason} (found {quoted(first['input'])})"

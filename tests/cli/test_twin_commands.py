@@ -224,7 +224,7 @@ def test_a_units_runs_in_one_file_and_a_replay_after_the_first(tmp_path, invoke_
     [
         ({"programme": STEPS}, "there are 'runs'; state it in each of them"),
         ({"storage": {"temperature": 300.0}}, "storage: temperature is 300"),
-        ({"runs": [{"programme": STEPS, "out": "a.csv"}]}, "started"),
+        ({"runs": [{"programme": STEPS, "out": "a.csv"}]}, "nothing is given for 'runs.0.started'"),
     ],
 )
 def test_faulty_runs_are_refused(tmp_path, invoke, change, message):
