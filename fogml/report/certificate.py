@@ -109,13 +109,10 @@ def _sheet(judgement: Judgement) -> Sheet:
     figure, words = _figure(worst)
     card = dict(model_card(judgement.model))
     about = [
-        ("Unit", worst.unit or _NOT_STATED),
-        ("Axis", worst.axis or _NOT_STATED),
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
         ("Size", ", ".join(card_line(card))),
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
-        ("Data", "synthetic, from a simulation" if is_synthetic(judgement) else "recorded"),
         ("Attitude", _attitude(worst)),
         ("Span", _span(worst)),
         ("Rates", _rates(worst)),
@@ -198,10 +195,10 @@ def _figures(run: RunJudgement) -> Table:
     def add(name: str, value: str, interval: str, how: str) -> None:
         rows.append(Row((name, value, interval, how)))
 
-    per = f"averages over {run.averaging_s:.4g} s, over n - 1"
+    per = "over n \N{MINUS SIGN} 1"
     for name, values, how in (
-        ("Bias stability over temperature", run.series.after, f"all of the run; {per}"),
-        ("Bias stability at constant temperature", at_constant_temperature(run), f"the longest soak; {per}"),
+        ("Bias stability over temperature", run.series.after, f"all of the run, {per}"),
+        ("Bias stability at constant temperature", at_constant_temperature(run), f"the longest soak, {per}"),
     ):
         found = None if values is None else sample_deviation(values)
         if found is None:
@@ -211,7 +208,7 @@ def _figures(run: RunJudgement) -> Table:
             add(name, f"{number(deviation)} deg/h", f"{number(low)} to {number(high)}", how)
     if run.after.bias_stability_10s is not None:
         ten = number(run.after.bias_stability_10s)
-        add("Bias stability, 10 s averages", f"{ten} deg/h", "", "all of the run; over n")
+        add("Bias stability, 10 s averages", f"{ten} deg/h", "", "all of the run, over n")
     error = run.after.scale_factor_error
     add(
         "Scale factor error",
@@ -224,7 +221,6 @@ def _figures(run: RunJudgement) -> Table:
             ends = term.get("ci") or (None,)
             told = "" if None in ends else " to ".join(number(end) for end in ends)
             add(_TERMS[name], f"{number(term['value'])} {term['unit']}", told, "Allan deviation of the run")
-    add("Noise floor", f"{number(run.floor)} deg/h", "", f"of averages over {run.averaging_s:.4g} s")
     names = (("Figure", "text"), ("Value", "figure"), ("90 % interval", "figure"), ("Of", "text"))
     return Table(tuple((name, "", kind) for name, kind in names), tuple(rows))
 
@@ -242,16 +238,21 @@ def _span(run: RunJudgement) -> str:
     hours = float(np.ptp(series.time) + run.averaging_s) / 3600.0
     low, high = float(series.temperature.min()), float(series.temperature.max())
     begun = f"started {started.isoformat(sep=' ', timespec='minutes')}, " if started else "start not stated, "
-    return f"{begun}{hours:.3g} h, T {low:.1f} to {high:.1f} degC"
+    return f"{begun}{hours:.3g} h, T {signed(low)} to {signed(high)} °C"
 
 
 def _rates(run: RunJudgement) -> str:
     steepest = float(np.abs(run.series.rate).max(initial=0.0))
-    told = f"temperature up to {steepest:.2g} degC/min"
+    told = f"temperature up to {steepest:.2g} °C/min"
     if run.table_rates is None:
         return f"{told}; table rate not recorded"
     low, high = run.table_rates
-    return f"{told}; table {low:g} to {high:g} deg/s"
+    return f"{told}; table {signed(low)} to {signed(high)} deg/s"
+
+
+def signed(value: float) -> str:
+    """A number in few digits with a typeset sign."""
+    return f"{value:.4g}".replace("-", "\N{MINUS SIGN}")
 
 
 def card_line(card: dict[str, str]) -> list[str]:

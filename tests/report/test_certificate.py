@@ -99,7 +99,7 @@ def test_the_sheet_tells_synthetic_data_set_up_and_figures_over_n_less_one() -> 
         "synthetic data",
         "input axis down, latitude 39.9 deg",
         "started 2026-03-02 08:00",
-        "table -10 to 100 deg/s",
+        "table \N{MINUS SIGN}10 to 100 deg/s",
         "Bias stability, 10 s averages",
         "12.5 ppm",
         "Angle random walk",
