@@ -10,13 +10,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn
 
-from fogml.errors import InputError
+from fogml.errors import InputError, printable, quoted
 
 MOST_BYTES = 256 << 20
 """Largest file that is read [bytes]: the results of a thousand units take a tenth of it."""
 MOST_DEPTH = 64
 """Most brackets within each other: what the toolkit writes has at most a dozen."""
-_MOST_QUOTED = 60
 _LONE_SURROGATE = re.compile(r"\\u[dD][89a-fA-F]")
 
 
@@ -109,7 +108,7 @@ def json_object(value: Any, source: str, schema: str, remedy: str) -> dict[str, 
     """
     if not isinstance(value, dict) or value.get("schema") != schema:
         found = value.get("schema") if isinstance(value, dict) else type(value).__name__
-        raise InputError(f"{source}: schema '{str(found)[:_MOST_QUOTED]}', expected '{schema}'; {remedy}")
+        raise InputError(f"{source}: schema {quoted(found)}, expected '{schema}'; {remedy}")
     return value
 
 
@@ -129,21 +128,21 @@ def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         seen: set[str] = set()
         for key, _ in pairs:
             if key in seen:
-                raise ValueError(f"key '{key[:_MOST_QUOTED]}' is stated twice")
+                raise ValueError(f"key {quoted(key)} is stated twice")
             seen.add(key)
     return found
 
 
 def _whole(text: str) -> int:
     if len(text) > 20 or not -(2**63) <= int(text) < 2**64:
-        raise ValueError(f"the number {text[:_MOST_QUOTED]} is too large")
+        raise ValueError(f"the number {printable(text)} is too large")
     return int(text)
 
 
 def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
-        raise ValueError(f"the number {text[:_MOST_QUOTED]} is too large")
+        raise ValueError(f"the number {printable(text)} is too large")
     return value
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
@@ -20,6 +19,7 @@ from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
 from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.json_files import finite_json, write_json
+from fogml.json_text import read_json
 from fogml.outputs import sole_writer, whole_folder
 from fogml.runs.sources import sources_stamp
 
@@ -68,6 +68,7 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
 
     if settings.manifest is None:
         raise InputError("no manifest is given; name a CSV or YAML file of units")
+    _check(settings)
     units = read_manifest(settings.manifest)
     tasks = _tasks(settings, units)
     home = Path(settings.out)
@@ -92,15 +93,8 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
 
 
 def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
-    from fogml.features.parse import parse_features
-    from fogml.models.names import make_model
-
     shared = None if settings.prior is None else _shared(settings.prior)
-    parse_features(settings.form)
     own = settings.for_units()
-    if settings.device is not None:
-        _check_device(settings)
-    make_model(settings.model, settings.features, settings.seed, own["parameters"])
     work = UnitWork(own, settings.form, shared)
     # A twin is a file, or one that ships.
     twin = sources_stamp([Path(settings.twin)]) if Path(settings.twin).is_file() else None
@@ -109,13 +103,19 @@ def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
     return [Task(unit, work, str(Path(settings.out).absolute()), told) for unit in units]
 
 
+def _check(settings: FleetSettings) -> None:
+    """Check what can be checked before a file is read."""
+    from fogml.features.parse import parse_features
+    from fogml.models.names import make_model
+
+    parse_features(settings.form)
+    if settings.device is not None:
+        _check_device(settings)
+    make_model(settings.model, settings.features, settings.seed, settings.for_units()["parameters"])
+
+
 def _shared(path: str) -> dict[str, Any]:
-    try:
-        values = json.loads(Path(path).read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"--prior {path}: no such file; a fleet.json was expected") from None
-    except ValueError:
-        raise InputError(f"--prior {path}: is no JSON; a fleet.json was expected") from None
+    values = read_json(Path(path), "--prior takes a fleet.json")
     if not isinstance(values, dict) or "shared" not in values:
         raise InputError(
             f"--prior {path}: tells no shared constants; a fleet.json of three units or more does"

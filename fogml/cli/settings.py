@@ -22,7 +22,9 @@ SHIPPED = "shipped:"
 class Settings(BaseModel):
     """What every command takes. Unknown keys are errors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, protected_namespaces=())
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, allow_inf_nan=False, protected_namespaces=()
+    )
     path_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ("out",)

@@ -83,6 +83,10 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
         from fogml.features.parse import parse_features
 
         parse_features(settings.features)
+    if isinstance(settings, TrainSettings):
+        from fogml.models.names import make_model
+
+        make_model(settings.model, settings.features, settings.seed, settings.parameters)
 
 
 def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:

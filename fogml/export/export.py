@@ -158,7 +158,7 @@ def _check(settings: ExportSettings, dtype: str) -> None:
         raise InputError("--with-pipeline is for --to onnx; C code always takes raw temperatures")
     if settings.budget is not None and settings.budget < 1:
         raise InputError(f"--bytes {settings.budget}: a positive number was expected")
-    if settings.tolerance is not None and not settings.tolerance >= 0.0:
+    if settings.tolerance is not None and not 0.0 <= settings.tolerance < np.inf:
         raise InputError(f"--tolerance {settings.tolerance}: a number of deg/h from 0 was expected")
 
 

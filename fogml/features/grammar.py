@@ -26,8 +26,9 @@ from __future__ import annotations
 
 import re
 from itertools import product as all_products
+from math import prod
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.features.atoms import DEFAULT_WINDOW, HYSTERESIS_DEGC, METHODS, Atom, Method, Window
 from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal
 from fogml.features.terms import Term
@@ -35,10 +36,16 @@ from fogml.features.tokens import Token, TokenReader
 from fogml.runs.columns import is_temperature
 
 HIGHEST_POWER = 20
+MOST_PARENTHESES = 10
+"""Most parentheses within each other."""
+MOST_FACTORS = 20
+"""Most factors of a product."""
+MOST_TERMS = 1000
+"""Most terms, ranges of powers spread out: a fit takes time in their square."""
 FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on")
 WINDOW_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
 
-_RATE_NAME = re.compile(r"d(T\w*)\Z")
+_RATE_NAME = re.compile(r"d(T\w*)\Z", re.ASCII)
 
 
 def parse_terms(text: str) -> tuple[Term, ...]:
@@ -60,7 +67,7 @@ class _Parser(TokenReader):
         terms: dict[Term, None] = {}
         while True:
             at = self.token.at
-            for term in self.product():
+            for term in self.product(MOST_TERMS - len(terms)):
                 if term in terms:
                     self.fail(f"{term.text} is there twice", at, "name each feature once")
                 terms[term] = None
@@ -69,10 +76,15 @@ class _Parser(TokenReader):
             if self.take(",") is None:
                 self.fail(f"unexpected {self.found()}", self.token.at, "features are separated by commas")
 
-    def product(self) -> list[Term]:
+    def product(self, most: int) -> list[Term]:
+        at = self.token.at
         factors = [self.factor()]
-        while self.take("*"):
+        while star := self.take("*"):
+            if len(factors) == MOST_FACTORS:
+                self.fail(f"a product of more than {MOST_FACTORS} factors", star.at, "write powers: x^3")
             factors.append(self.factor())
+        if prod(len(factor) for factor in factors) > most:
+            self.fail(f"more than {MOST_TERMS} terms", at, "state fewer, or narrower ranges of powers")
         return [Term(choice) for choice in all_products(*factors)]
 
     def factor(self) -> list[tuple[Atom, int]]:
@@ -149,7 +161,7 @@ class _Parser(TokenReader):
             self.fail("the half width must be more than 0", token.at)
         return half_width
 
-    def primary(self) -> Atom:
+    def primary(self, depth: int = 0) -> Atom:
         token = self.token
         if token.kind == "name" and token.text in ("lag", "play", "since_on"):
             return self.memory()
@@ -164,8 +176,10 @@ class _Parser(TokenReader):
         if self.is_rate(token):
             return self.rate()
         if token.text == "(":
+            if depth == MOST_PARENTHESES:
+                self.fail(f"more than {MOST_PARENTHESES} parentheses within each other", token.at)
             self.next += 1
-            atom = self.primary()
+            atom = self.primary(depth + 1)
             self.expect(")", "to close the parenthesis")
             return atom
         return Atom("value", self.signal())
@@ -185,7 +199,7 @@ class _Parser(TokenReader):
         else:
             sensor = token.text[1:]
             if not is_temperature(sensor):
-                self.fail(f"'{sensor}' is not a temperature", token.at + 1, self.known())
+                self.fail(f"{quoted(sensor)} is not a temperature", token.at + 1, self.known())
             atom = Atom("d", Signal.of(sensor))
         self.no_sum_of_rates()
         return atom
@@ -254,7 +268,8 @@ class _Parser(TokenReader):
 
     def power(self) -> int:
         token = self.token
-        if token.kind != "number" or not token.text.isdigit() or not 1 <= int(token.text) <= HIGHEST_POWER:
+        small = token.kind == "number" and token.text.isdigit() and len(token.text) < 5
+        if not small or not 1 <= int(token.text) <= HIGHEST_POWER:
             self.fail(
                 f"a whole power from 1 to {HIGHEST_POWER} expected, found {self.found()}",
                 token.at,

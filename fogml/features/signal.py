@@ -47,6 +47,8 @@ class Signal:
             if not np.isfinite(coefficient):
                 raise InputError(f"signal: {name} has the coefficient {coefficient}; a number was expected")
             coefficients[name] = coefficients.get(name, 0.0) + float(coefficient)
+        if not np.isfinite(list(coefficients.values())).all():
+            raise InputError("signal: the coefficients of a column add up to more than a number can be")
         kept = [(name, coefficient) for name, coefficient in coefficients.items() if coefficient != 0.0]
         if not kept:
             raise InputError("signal: nothing is left of the columns; they cancel")

@@ -6,13 +6,18 @@ import re
 from dataclasses import dataclass
 from typing import NoReturn, cast
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.features.atoms import METHODS
 from fogml.features.signal import known_temperatures
 
+MOST_CHARACTERS = 10_000
+"""Longest feature text: what the toolkit writes itself has some hundreds of characters."""
+_SHOWN = 40
+# Characters of a text to each side of the place that a message points at.
 _TOKEN = re.compile(
     r"\s*(?:(?P<number>(?:\d+(?:\.(?!\.)\d*)?|\.\d+)(?:[eE][+-]?\d+)?)"
-    r"|(?P<name>[A-Za-z_]\w*)|(?P<range>\.\.)|(?P<sign>[-+*^,()\[\]]))"
+    r"|(?P<name>[A-Za-z_]\w*)|(?P<range>\.\.)|(?P<sign>[-+*^,()\[\]]))",
+    re.ASCII,
 )
 _SPACE = re.compile(r"\s*")
 
@@ -31,12 +36,15 @@ class TokenReader:
 
     def __init__(self, text: str) -> None:
         self.text = text
+        if len(text) > MOST_CHARACTERS:
+            hint = f"at most {MOST_CHARACTERS} are read"
+            self.fail(f"{len(text)} characters long", MOST_CHARACTERS, hint)
         self.tokens: list[Token] = []
         at = _SPACE.match(text).end()  # type: ignore[union-attr]  # matches always
         while at < len(text):
             match = _TOKEN.match(text, at)
             if match is None:
-                self.fail(f"unexpected '{text[at]}'", at, self.known())
+                self.fail(f"unexpected {quoted(text[at])}", at, self.known())
             kind = cast(str, match.lastgroup)
             self.tokens.append(Token(kind, match[kind], match.start(kind)))
             at = _SPACE.match(text, match.end()).end()  # type: ignore[union-attr]
@@ -45,8 +53,10 @@ class TokenReader:
 
     def fail(self, message: str, at: int, hint: str = "") -> NoReturn:
         """Raise an InputError that points at a place of the text."""
-        shown = re.sub(r"\s", " ", self.text)
-        lines = [f"feature text: {message}", f"  {shown}", f"  {' ' * at}^"]
+        start, end = max(0, at - _SHOWN), at + _SHOWN
+        before, after = "..." if start else "", "..." if end < len(self.text) else ""
+        shown = before + re.sub(r"\s", " ", self.text[start:end]) + after
+        lines = [f"feature text: {message}", f"  {shown}", f"  {' ' * (at - start + len(before))}^"]
         raise InputError("\n".join([*lines, hint] if hint else lines))
 
     @staticmethod
@@ -79,4 +89,4 @@ class TokenReader:
 
     def found(self) -> str:
         """The next token as messages name it."""
-        return f"'{self.token.text}'" if self.token.kind != "end" else "the end"
+        return quoted(self.token.text) if self.token.kind != "end" else "the end"

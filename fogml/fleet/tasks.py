@@ -13,6 +13,7 @@ from fogml import __version__
 from fogml.errors import FogmlError, InputError
 from fogml.fleet.manifest import Unit
 from fogml.json_files import write_json
+from fogml.json_text import read_json
 from fogml.outputs import NO_ROOM, whole_file
 from fogml.runs.sources import run_sources, sources_stamp
 
@@ -121,8 +122,8 @@ def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | Non
     Units that failed are tried again.
     """
     try:
-        outcome = json.loads((task.folder / OUTCOME).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        outcome = read_json(task.folder / OUTCOME, "run the fleet again")
+    except InputError:
         return None
     if not isinstance(outcome, dict) or outcome.get("status") != DONE:
         return None

@@ -17,6 +17,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
@@ -25,6 +26,7 @@ from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.score import choose
 from fogml.models.trial import Trial, fit_candidate
 from fogml.runs.run import Run
+from fogml.strict import Strict, strictly
 
 Progress = Callable[[int, int, str], None]
 
@@ -162,11 +164,37 @@ class AutoModel(DriftModel):
         """The model that `to_saved` gave."""
         from fogml.models.saved import model_of_form
 
-        chosen = values["chosen"]
-        own = {"kind": str(chosen["kind"]), **chosen["model"]}
+        saved = strictly(_Saved, values, "model")
+        chosen = saved.chosen
+        if chosen.form == cls.form:
+            raise InputError("key 'model.chosen.form': an automatic choice is of no automatic choice")
         model = cls()
-        model.chosen_ = model_of_form(str(chosen["form"])).from_saved(own, arrays, card)
+        model.chosen_ = model_of_form(chosen.form, chosen.kind).from_saved(
+            {"kind": chosen.kind, **chosen.model}, arrays, card
+        )
         model.chosen_.card_ = card
         model.features_ = model.chosen_.features_
-        model.selection_ = list(values["selection"])
+        model.selection_ = [score.model_dump() for score in saved.selection]
         return model
+
+
+class _Scored(Strict):
+    """A candidate as `Score.as_dict` tells of it."""
+
+    name: str
+    parameters: int
+    held_out_rms: float
+
+
+class _Chosen(Strict):
+    form: str
+    kind: str
+    model: dict[str, Any]
+
+
+class _Saved(Strict):
+    """What `AutoModel.to_saved` writes beside the arrays."""
+
+    kind: str
+    chosen: _Chosen
+    selection: list[_Scored]

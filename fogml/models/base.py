@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from sklearn.base import BaseEstimator
 from sklearn.exceptions import NotFittedError
 
+from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
@@ -81,8 +82,28 @@ class Compensation:
 
 
 def compensation_of(run: Run, evaluation: Evaluation) -> Compensation:
-    """What an evaluation makes of a run's output."""
-    return Compensation(evaluation.drift, run.gyro_deg_h - evaluation.drift, evaluation.flag)
+    """What an evaluation makes of a run's output.
+
+    Raises
+    ------
+    InputError
+        If the compensated output is not finite at some sample.
+    """
+    with np.errstate(over="ignore"):
+        compensated = run.gyro_deg_h - evaluation.drift
+    _check_finite(run, compensated, "compensated output")
+    return Compensation(evaluation.drift, compensated, evaluation.flag)
+
+
+def _check_finite(run: Run, values: FloatArray, what: str) -> None:
+    """Hold that there is a number at every sample of a run."""
+    finite = np.isfinite(values)
+    if not finite.all():
+        place = int(np.argmin(finite))
+        raise InputError(
+            f"{run.name}, row {place + 1} (time {run.time[place]:.10g} s): the {what} is {values[place]}: "
+            "the model's numbers and the run's are too large for each other; train it again on such runs"
+        )
 
 
 class DriftModel(BaseEstimator, ABC):
@@ -123,15 +144,34 @@ class DriftModel(BaseEstimator, ABC):
         """
 
     def evaluate(self, run: Run) -> Evaluation:
-        """Drift with window fullness and distance from the trained box, at every sample."""
+        """Drift with window fullness and distance from the trained box, at every sample.
+
+        Raises
+        ------
+        InputError
+            If the run lacks what the features need, or the drift is not finite at some sample.
+        """
         self._check_fitted()
         if self.features_ is None:
             everywhere = np.ones(len(run), dtype=np.bool_)
-            return self.evaluate_atoms(run, AtomValues(np.empty((len(run), 0)), everywhere, everywhere))
-        return self.evaluate_atoms(run, self.features_.atom_values(run))
+            return self.evaluate_from(run, AtomValues(np.empty((len(run), 0)), everywhere, everywhere))
+        return self.evaluate_from(run, self.features_.atom_values(run))
+
+    def evaluate_from(self, run: Run, atoms: AtomValues) -> Evaluation:
+        """As `evaluate_atoms`, a drift at every sample being held.
+
+        Raises
+        ------
+        InputError
+            If the drift is not finite at some sample.
+        """
+        with np.errstate(over="ignore", invalid="ignore"):
+            evaluation = self.evaluate_atoms(run, atoms)
+        _check_finite(run, evaluation.drift, "model's drift")
+        return evaluation
 
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
-        """As `evaluate`, from the values of the features' atoms.
+        """As `evaluate`, from the values of the features' atoms, unchecked.
 
         Parameters
         ----------

@@ -10,11 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.features.atoms import AtomValues
+from fogml.models.arrays import expect_arrays
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, row_count, usable_rows
 from fogml.runs.run import FloatArray, Run
+from fogml.strict import Strict, strictly
+
+
+class _Saved(Strict):
+    kind: str
 
 
 class _ConstantModel(DriftModel):
@@ -79,6 +85,8 @@ class NoCompensation(_ConstantModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> NoCompensation:
         """The model that `to_saved` gave."""
+        strictly(_Saved, values, "model")
+        expect_arrays(arrays, {})
         model = cls()
         model.bias_ = 0.0
         return model
@@ -111,6 +119,8 @@ class MeanModel(_ConstantModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> MeanModel:
         """The model that `to_saved` gave."""
+        strictly(_Saved, values, "model")
+        expect_arrays(arrays, {"bias": (np.float64, (1,))})
         model = cls()
-        model.bias_ = float(np.asarray(arrays["bias"]).reshape(()))
+        model.bias_ = float(arrays["bias"][0])
         return model

@@ -6,11 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from operator import attrgetter
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from annotated_types import Len
+from pydantic import Field
 
 import fogml
 from fogml.errors import InputError
 from fogml.runs.run import Run
+from fogml.strict import Strict, strictly
 
 
 @dataclass(frozen=True)
@@ -79,14 +83,42 @@ class TrainingCard:
 
         Raises
         ------
-        KeyError, TypeError, ValueError
+        InputError
             If it is not such a card.
         """
-        values = dict(values)
-        runs = tuple(TrainingRun(str(run["name"]), str(run["sha256"])) for run in values.pop("runs"))
-        box = {str(name): (float(low), float(high)) for name, (low, high) in values.pop("box").items()}
-        notes = tuple(str(note) for note in values.pop("notes"))
-        return cls(runs=runs, box=box, notes=notes, **values)
+        saved = strictly(_Saved, values, "card")
+        return cls(
+            unit=saved.unit,
+            axis=saved.axis,
+            gyro_unit=saved.gyro_unit,
+            runs=tuple(TrainingRun(run.name, run.sha256) for run in saved.runs),
+            fogml_version=saved.fogml_version,
+            sample_s=saved.sample_s,
+            earth_known=saved.earth_known,
+            rows=saved.rows,
+            box={name: (low, high) for name, (low, high) in saved.box.items()},
+            notes=tuple(saved.notes),
+        )
+
+
+class _SavedRun(Strict):
+    name: str
+    sha256: str = Field(pattern="^[0-9a-f]{64}$")
+
+
+class _Saved(Strict):
+    """A card as `TrainingCard.as_dict` writes it."""
+
+    unit: str | None
+    axis: str | None
+    gyro_unit: Literal["deg/h", "count"]
+    runs: list[_SavedRun]
+    fogml_version: str
+    sample_s: float = Field(gt=0.0)
+    earth_known: bool
+    rows: int = Field(ge=0)
+    box: dict[str, Annotated[list[float], Len(2, 2)]]
+    notes: list[str]
 
 
 def training_card(

@@ -49,5 +49,5 @@ def compensate_blocks(
         if atoms is None:
             evaluation = model.evaluate(block)
         else:
-            evaluation = model.evaluate_atoms(block, atoms.push(block))
+            evaluation = model.evaluate_from(block, atoms.push(block))
         yield block, compensation_of(block, evaluation)

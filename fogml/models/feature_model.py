@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 from sklearn.base import clone
 
 from fogml.errors import InputError
@@ -46,10 +47,21 @@ from fogml.models.tall_least_squares import Part
 from fogml.models.threads import one_thread
 from fogml.runs.columns import coil_sensor_number
 from fogml.runs.run import FloatArray, Run
+from fogml.strict import Strict, strictly
 
 _EACH_SENSOR = "{sensor}"
 _PREDICTED_VALUES = 1 << 19
 # Feature values composed at once: 4 MiB, which stays in the cache.
+
+
+class SavedFeatures(Strict):
+    """What `FeatureModel.to_saved` writes beside the arrays."""
+
+    kind: str
+    features: str
+    asked_features: str
+    max_rows: Annotated[int, Field(ge=2)] | None
+    regressor: dict[str, Any]
 
 
 class FeatureModel(DriftModel):
@@ -232,23 +244,32 @@ class FeatureModel(DriftModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> FeatureModel:
         """The model that `to_saved` gave."""
-        model = cls(
-            features=str(values["asked_features"]),
-            kind=str(values.get("kind", "features")),
-            regressor=clone(regressor_from_saved(values["regressor"], arrays)),
-            max_rows=values["max_rows"],
-        )
-        model._restore(values, arrays, card)
+        saved = strictly(SavedFeatures, values, "model")
+        model = cls(saved.asked_features, None, saved.kind, saved.max_rows)
+        model._restore(saved, arrays, card)
+        model.regressor = clone(model.regressor_)
         return model
 
-    def _restore(self, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard) -> None:
+    def _restore(self, saved: SavedFeatures, arrays: dict[str, NDArray[Any]], card: TrainingCard) -> None:
         """Set what a fit learned."""
-        self.features_ = parse_features(str(values["features"]))
+        check_feature_text(saved.asked_features)
+        self.features_ = parse_features(saved.features)
         self.features_.set_box(card.box)
-        self.regressor_ = regressor_from_saved(values["regressor"], arrays)
-        columns = getattr(self.regressor_, "n_features_in_", len(self.features_))
+        self.regressor_ = regressor_from_saved(saved.regressor, arrays)
+        columns = getattr(self.regressor_, "n_features_in_", None)
         if columns != len(self.features_):
-            raise ValueError(f"the regressor takes {columns} features, {len(self.features_)} are stated")
+            raise InputError(f"the regressor takes {columns} features, {len(self.features_)} are stated")
+
+
+def check_feature_text(text: str) -> None:
+    """Hold that text of features is understood, ``{sensor}`` standing for any sensor.
+
+    Raises
+    ------
+    InputError
+        Pointing at what is not.
+    """
+    parse_features(text.replace(_EACH_SENSOR, "T1"))
 
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:

@@ -18,13 +18,15 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import Field
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
+from fogml.strict import Strict, strictly
 
 LEVELS = (*(round(0.05 * i, 2) for i in range(1, 20)), 0.975, 0.99, 0.995)
 WIDENING_PER_SPAN = 10.0
@@ -93,15 +95,24 @@ class Intervals:
 
         Raises
         ------
-        KeyError, TypeError, ValueError
+        InputError
             If they are not such intervals.
         """
-        values = dict(values)
-        levels = tuple(float(level) for level in values.pop("levels"))
-        half_widths = tuple(float(half) for half in values.pop("half_widths"))
-        if len(levels) != len(half_widths) or list(levels) != sorted(levels):
-            raise ValueError("levels and half_widths do not match")
-        return cls(levels=levels, half_widths=half_widths, **values)
+        saved = strictly(_Saved, values, "interval")
+        levels, half_widths = tuple(saved.levels), tuple(saved.half_widths)
+        if len(levels) != len(half_widths) or sorted(set(levels)) != list(levels):
+            raise InputError("key 'interval': levels and half_widths do not match")
+        return cls(saved.averaging_s, half_widths, saved.count, saved.folds, levels)
+
+
+class _Saved(Strict):
+    """Intervals as `Intervals.as_dict` writes them."""
+
+    averaging_s: float = Field(gt=0.0)
+    levels: list[Annotated[float, Field(gt=0.0, lt=1.0)]] = Field(min_length=1)
+    half_widths: list[Annotated[float, Field(ge=0.0)]]
+    count: int = Field(ge=1)
+    folds: str
 
 
 def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: str) -> Intervals:

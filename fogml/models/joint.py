@@ -23,6 +23,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
@@ -39,10 +40,22 @@ from fogml.models.table import RunRows, TrainingTable, row_count
 from fogml.models.tall_least_squares import Part
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.transitions import transition_mask
+from fogml.strict import Strict, strictly
 
 _LEAST_TURN_DEG_S = 0.1
 # Under this a turn tells the scale factor worse than 100 ppm at 0.1 deg/h of drift: no calibration.
 _LEAST_TURNING_ROWS = 10
+
+
+class _Saved(Strict):
+    """What `JointModel.to_saved` writes beside the arrays."""
+
+    kind: str
+    patent: bool
+    product: bool
+    rate_window_s: float = Field(gt=0.0)
+    gradient: bool
+    regressor: dict[str, Any]
 
 
 class JointModel(DriftModel):
@@ -188,14 +201,14 @@ class JointModel(DriftModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> JointModel:
         """The model that `to_saved` gave."""
-        window_s = float(values.get("rate_window_s", 64.0))
-        model = cls(bool(values["patent"]), bool(values["product"]), window_s)
-        model.gradient_ = bool(values["gradient"])
+        saved = strictly(_Saved, values, "model")
+        model = cls(saved.patent, saved.product, saved.rate_window_s)
+        model.gradient_ = saved.gradient
         model.features_ = parse_features(model._feature_text())
         model.features_.set_box(card.box)
-        model.regressor_ = LinearRegressor.from_saved(values["regressor"], arrays)
+        model.regressor_ = LinearRegressor.from_saved(saved.regressor, arrays)
         if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
-            raise ValueError("coefficients and columns differ in number")
+            raise InputError("coefficients and columns differ in number")
         return model
 
     def _feature_text(self) -> str:

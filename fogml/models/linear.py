@@ -3,21 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, Self
+from numbers import Real
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.arrays import expect_arrays
 from fogml.models.folds import dealt_folds
+from fogml.models.parameters import check_parameters
 from fogml.models.tall_least_squares import Condensed, Part, condense
 from fogml.runs.run import FloatArray
+from fogml.strict import Strict, strictly
 
 RIDGE_GRID = (0.0, *np.logspace(-8, 1, 19).tolist())
 """Ridges that ``ridge="auto"`` chooses from."""
 _RANK_TOLERANCE = 1e-12
+
+
+class SavedLinear(Strict):
+    """What `LinearRegressor.to_saved` writes beside the arrays."""
+
+    ridge: Annotated[float, Field(ge=0.0)] | Literal["auto"]
+    fit_intercept: bool
+    ridge_used: float = Field(ge=0.0)
+    rank: int = Field(ge=0)
+    residual_std: float = Field(ge=0.0)
+    standard_errors: list[Annotated[float, Field(ge=0.0)]] = Field(min_length=1)
 
 
 class LinearRegressor(RegressorMixin, BaseEstimator):
@@ -57,6 +74,10 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
     """
 
     linear_beyond = True
+    _parameter_constraints: ClassVar[dict[str, Any]] = {
+        "ridge": [StrOptions({"auto"}), Interval(Real, 0.0, None, closed="left")],
+        "fit_intercept": ["boolean"],
+    }
 
     def __init__(self, ridge: float | Literal["auto"] = 0.0, fit_intercept: bool = True) -> None:
         self.ridge = ridge
@@ -88,11 +109,8 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
 
     def fit_parts(self, parts: Sequence[Part]) -> Self:
         """Fit to rows whose columns are built piece by piece, so that they never exist at once."""
+        check_parameters(type(self), self.get_params(deep=False))
         automatic = isinstance(self.ridge, str)
-        if automatic and self.ridge != "auto":
-            raise InputError(f"ridge '{self.ridge}': must be 'auto', 0 or a positive number")
-        if not automatic and not float(self.ridge) >= 0.0:
-            raise InputError(f"ridge {self.ridge}: must be 'auto', 0 or a positive number")
         if not automatic:
             parts = [Part(part.target, part.columns, np.zeros_like(part.folds)) for part in parts]
         n_folds = 1 + max(int(part.folds.max(initial=0)) for part in parts)
@@ -150,18 +168,24 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
 
     @classmethod
     def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
-        """The regressor that `to_saved` gave; of the covariance its diagonal remains."""
-        model = cls(ridge=values["ridge"], fit_intercept=bool(values["fit_intercept"]))
-        model.coef_ = np.asarray(arrays["coef"], dtype=np.float64).reshape(-1)
-        model.intercept_ = float(np.asarray(arrays["intercept"]).reshape(()))
-        model.n_features_in_ = len(model.coef_)
-        model.ridge_ = float(values["ridge_used"])
-        model.rank_ = int(values["rank"])
-        model.residual_std_ = float(values["residual_std"])
-        errors = np.asarray(values["standard_errors"], dtype=np.float64)
-        if errors.shape != (len(model.coef_) + 1,):
-            raise ValueError("standard_errors do not match the coefficients")
-        model.covariance_ = np.diag(errors**2)
+        """The regressor that `to_saved` gave; of the covariance its diagonal remains.
+
+        Raises
+        ------
+        InputError
+            If it is no such regressor.
+        """
+        saved = strictly(SavedLinear, values, "regressor")
+        width = len(saved.standard_errors) - 1
+        expect_arrays(arrays, {"coef": (np.float64, (width,)), "intercept": (np.float64, (1,))})
+        model = cls(ridge=saved.ridge, fit_intercept=saved.fit_intercept)
+        model.coef_ = arrays["coef"]
+        model.intercept_ = float(arrays["intercept"][0])
+        model.n_features_in_ = width
+        model.ridge_ = saved.ridge_used
+        model.rank_ = saved.rank
+        model.residual_std_ = saved.residual_std
+        model.covariance_ = np.diag(np.array(saved.standard_errors) ** 2)
         return model
 
     def _choose_ridge(self, condensed: Condensed) -> float:

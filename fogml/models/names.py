@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -86,17 +85,18 @@ def make_model(
             f"{', '.join(PARAMETRIC)} and scikit-learn's regressors by their dotted names"
         )
     if "." in name:
-        from fogml.models.sklearn_model import SklearnModel, sklearn_regressor_class
+        from fogml.models.sklearn_model import SklearnModel
 
-        sklearn_regressor_class(name)
         options = dict(parameters) if parameters else None
-        return SklearnModel(name, _understood(features or RBF_FEATURES), options, seed=seed)
+        model = SklearnModel(name, _understood(features or RBF_FEATURES), options, seed=seed)
+        model.check_options()
+        return model
     if name not in MODEL_NAMES:
         raise InputError(_unknown(name))
     if name == "auto":
         from fogml.models.auto import AutoModel
 
-        return AutoModel(features=features, seed=seed)
+        return AutoModel(features if features is None else _understood(features), seed=seed)
     if name == "polynomial":
         return _linear(name, features or POLYNOMIAL_FEATURES, {"ridge": "auto", **(parameters or {})})
     if name in ("rbf", "rbf-patent"):
@@ -139,19 +139,18 @@ def _rbf(kind: str, features: str | None, parameters: Mapping[str, Any]) -> Drif
 
 
 def _configured(regressor: Any, kind: str, parameters: Mapping[str, Any]) -> Any:
-    """A regressor of a class with these parameters, each of which the class has to know."""
-    known = list(inspect.signature(regressor).parameters)
-    for name in parameters:
-        if name not in known:
-            raise InputError(f"{kind}: no parameter '{name}'; parameters are {', '.join(known)}")
+    """A regressor of a class with these parameters, once they are known to be allowed."""
+    from fogml.models.parameters import check_parameters
+
+    check_parameters(regressor, parameters, kind)
     return regressor(**parameters)
 
 
 def _understood(features: str) -> str:
     """The text itself, once it is known to be understood; a fault is told before any run is read."""
-    from fogml.features.parse import parse_features
+    from fogml.models.feature_model import check_feature_text
 
-    parse_features(features.replace("{sensor}", "T1"))
+    check_feature_text(features)
     return features
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from scipy.special import chdtrc
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
-from fogml.models.linear import LinearRegressor
+from fogml.models.linear import LinearRegressor, SavedLinear
 from fogml.models.rbf.search import independent_share
 from fogml.runs.run import FloatArray
+from fogml.strict import Strict, strictly
 
 _SPREADS = np.logspace(0.0, 8.0, 33)
 # Factors by which a unit's prior covariance may be wider than its fleet's.
@@ -60,15 +62,27 @@ class Prior:
             If the numbers do not make a prior.
         """
         try:
-            arrays = {name: np.asarray(values[name], dtype=np.float64) for name in cls.__annotations__}
-            width = len(arrays["mean"])
+            saved = strictly(_SavedPrior, values, "prior")
+            arrays = {name: np.array(value, dtype=np.float64) for name, value in saved}
+            width = len(saved.mean)
             shapes = [arrays[name].shape for name in ("covariance", "shift", "scale")]
             if shapes != [(width, width), (width - 1,), (width - 1,)]:
                 raise ValueError("shapes do not match")
+            if not np.all(arrays["scale"]):
+                raise ValueError("a scale is 0")
             np.linalg.cholesky(arrays["covariance"])
-        except (KeyError, TypeError, ValueError, np.linalg.LinAlgError) as error:
+        except (ValueError, InputError, np.linalg.LinAlgError) as error:
             raise InputError(f"the fleet's prior is not understood ({error})") from None
         return cls(**arrays)
+
+
+class _SavedPrior(Strict):
+    """A prior as `Prior.as_dict` writes it."""
+
+    mean: list[float] = Field(min_length=1)
+    covariance: list[list[float]]
+    shift: list[float]
+    scale: list[float]
 
 
 class PriorRegressor(LinearRegressor):
@@ -95,6 +109,8 @@ class PriorRegressor(LinearRegressor):
     agreement_ : float
         Probability of a unit of the fleet lying at least as far out, see `agreement`.
     """
+
+    _parameter_constraints: ClassVar[dict[str, Any]] = {"prior": [None, dict]}
 
     def __init__(self, prior: dict[str, Any] | None = None) -> None:
         self.prior = prior
@@ -147,15 +163,31 @@ class PriorRegressor(LinearRegressor):
 
     @classmethod
     def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
-        """The regressor that `to_saved` gave."""
-        plain = LinearRegressor.from_saved(values, arrays)
-        model = cls(prior=values["prior"])
+        """The regressor that `to_saved` gave.
+
+        Raises
+        ------
+        InputError
+            If it is no such regressor.
+        """
+        saved = strictly(_SavedShared, values, "regressor")
+        plain = LinearRegressor.from_saved({name: values[name] for name in SavedLinear.model_fields}, arrays)
+        Prior.from_dict(saved.prior)
+        model = cls(prior=saved.prior)
         for name, value in vars(plain).items():
             if name.endswith("_"):
                 setattr(model, name, value)
-        model.spread_ = float(values["spread"])
-        model.agreement_ = float(values.get("agreement", np.nan))
+        model.spread_ = saved.spread
+        model.agreement_ = saved.agreement
         return model
+
+
+class _SavedShared(SavedLinear):
+    """What `PriorRegressor.to_saved` writes beside the arrays."""
+
+    prior: dict[str, Any]
+    spread: float
+    agreement: float
 
 
 def posterior(

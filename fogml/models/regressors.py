@@ -30,8 +30,9 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.features.features import Features
+from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
@@ -130,13 +131,18 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
         If the form is not known or holds types that are not scikit-learn's.
     """
     values = dict(values)
-    form = values.pop("form")
+    form = values.pop("form", None)
     if form == SKOPS:
         from fogml.models.sklearn_saving import load_sklearn
 
+        if values:
+            raise InputError(f"key {quoted('regressor.' + next(iter(values)))} does not belong there")
+        expect_arrays(arrays, {"skops": (np.uint8, np.shape(arrays.get("skops", (0,))))})
         return load_sklearn(arrays["skops"])
-    if form not in FORMS:
-        raise InputError(f"regressor form '{form}' is not known; known are {', '.join([*FORMS, SKOPS])}")
+    if not isinstance(form, str) or form not in FORMS:
+        raise InputError(
+            f"regressor form {quoted(form)} is not known; known are {', '.join([*FORMS, SKOPS])}"
+        )
     module, name = FORMS[form].split(":")
     return getattr(import_module(module), name).from_saved(values, arrays)
 

@@ -1,51 +1,76 @@
 """Saved models: ``model.json`` and ``weights.safetensors`` in a folder, whole or not at all.
 
-``model.json`` (schema ``fogml.model/1``)::
+``model.json`` (schema ``fogml.model/2``)::
 
-    {"schema": "fogml.model/1",
+    {"schema": "fogml.model/2",
      "kind": "M2",                      the name by which the model was asked for
      "form": "features",                which class reads it: a key of FORMS
      "model": {...},                    features' text and settings, as the class writes them
      "card": {...},                     unit, axis, hashes of the training runs, version, box, ...
      "interval": {...},                 half-widths of the prediction interval
      "parameters": 9, "bytes": 72,      size of the weights
-     "weights_sha256": "..."}           of weights.safetensors, so that the two files belong together
+     "sha256": "..."}                   over all of the above and the bytes of the weights
 
-Loading reads numbers and text and executes nothing. Scikit-learn's regressors are kept in
-skops' form inside the weights, and only scikit-learn's own types are read back.
+Loading reads numbers and text and executes nothing. The hash tells whether anything was changed
+since the model was saved, not who saved it; so every number and text is checked beside: kinds are
+known, types are as they stand, numbers are finite, arrays are of the stated type and shape.
+Scikit-learn's regressors are kept in skops' form inside the weights, and only a fixed list of types
+is read back.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
+from pydantic import Field
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.json_files import json_text
+from fogml.json_text import content_hash, json_object, read_bytes, read_json
+from fogml.models.arrays import arrays_from_bytes, arrays_to_bytes
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
 from fogml.models.intervals import Intervals
+from fogml.models.names import PRESETS
 from fogml.outputs import whole_folder
+from fogml.strict import Strict, strictly
 
-SCHEMA = "fogml.model/1"
+SCHEMA = "fogml.model/2"
 MODEL_FILE = "model.json"
 WEIGHTS_FILE = "weights.safetensors"
-FORMS = {
-    "none": "fogml.models.baselines:NoCompensation",
-    "mean": "fogml.models.baselines:MeanModel",
-    "features": "fogml.models.feature_model:FeatureModel",
-    "sklearn": "fogml.models.sklearn_model:SklearnModel",
-    "joint": "fogml.models.joint:JointModel",
-    "auto": "fogml.models.auto:AutoModel",
+FORMS: dict[str, tuple[str, tuple[str, ...] | None]] = {
+    "none": ("fogml.models.baselines:NoCompensation", ("none",)),
+    "mean": ("fogml.models.baselines:MeanModel", ("mean",)),
+    "features": (
+        "fogml.models.feature_model:FeatureModel",
+        ("features", "polynomial", *PRESETS, "rbf", "rbf-patent", "mixed-effects", "shared"),
+    ),
+    "sklearn": ("fogml.models.sklearn_model:SklearnModel", None),
+    "joint": ("fogml.models.joint:JointModel", ("joint", "joint-patent")),
+    "auto": ("fogml.models.auto:AutoModel", ("auto",)),
 }
-"""Forms of saved models, and where their classes are."""
-_KEYS = {"schema", "kind", "form", "model", "card", "interval", "parameters", "bytes", "weights_sha256"}
+"""Forms of saved models: where their classes are, and the kinds that they can be; None: the class tells."""
+_REMEDY = "name the folder that 'fogml train' wrote the model into, e.g. DIR/model; or train again"
+_MOST_MODEL_BYTES = 16 << 20
+_MOST_WEIGHT_BYTES = 1 << 30
+# The largest regressors of scikit-learn, forests, take a tenth of it.
+
+
+class _Document(Strict):
+    """The content of `MODEL_FILE`."""
+
+    schema_: str = Field(alias="schema")
+    kind: str
+    form: str
+    model: dict[str, Any]
+    card: dict[str, Any]
+    interval: dict[str, Any]
+    parameters: int = Field(ge=0)
+    bytes: int = Field(ge=0)
+    sha256: str
 
 
 def save_model(model: DriftModel, folder: str | Path) -> None:
@@ -54,17 +79,19 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
     Raises
     ------
     InputError
-        If the folder can't be written, or the model holds what can't be saved without pickle.
+        If the folder can't be written, the model is of no known kind, or holds what can't be saved
+        without pickle.
     """
     values, arrays = model_to_saved(model)
-    weights = _weights_bytes(arrays)
+    model_of_form(values["form"], values["kind"])
+    weights = arrays_to_bytes(arrays)
     document = {
         "schema": SCHEMA,
         **values,
         "parameters": model.parameter_count(),
         "bytes": sum(array.nbytes for array in arrays.values()),
-        "weights_sha256": hashlib.sha256(weights).hexdigest(),
     }
+    document["sha256"] = content_hash(document, {WEIGHTS_FILE: weights})
     text = json_text(document, MODEL_FILE, indent=1)
     with whole_folder(folder) as staging:
         (staging / MODEL_FILE).write_text(text + "\n", encoding="utf-8")
@@ -77,14 +104,41 @@ def load_model(folder: str | Path) -> DriftModel:
     Raises
     ------
     InputError
-        If a file is missing, cut short, damaged, or not of this schema.
+        If a file is missing, not of this schema, or anything was changed since the model was saved.
     """
     folder = Path(folder)
     if folder.name == MODEL_FILE:
         folder = folder.parent
-    document = _read_document(folder / MODEL_FILE)
-    arrays = _read_weights(folder / WEIGHTS_FILE, document["weights_sha256"])
-    return model_from_saved(document, arrays, str(folder / MODEL_FILE))
+    path = folder / MODEL_FILE
+    values = read_json(path, _REMEDY, _MOST_MODEL_BYTES)
+    if isinstance(values, dict) and values.get("schema") == "fogml.model/1":
+        raise InputError(
+            f"{path}: was saved by a version of fogml that kept no hash of the whole model; train it again"
+        )
+    json_object(values, str(path), SCHEMA, _REMEDY)
+    weights = read_bytes(
+        folder / WEIGHTS_FILE, f"it belongs beside {MODEL_FILE}: copy the whole folder", _MOST_WEIGHT_BYTES
+    )
+    stated = values.get("sha256")
+    hashed = {key: value for key, value in values.items() if key != "sha256"}
+    if content_hash(hashed, {WEIGHTS_FILE: weights}) != stated:
+        raise InputError(
+            f"{folder}: {MODEL_FILE} or {WEIGHTS_FILE} was changed, cut short or damaged after the model was "
+            "saved, or they are of two models; copy the whole folder again or train again"
+        )
+    try:
+        document = strictly(_Document, values)
+        try:
+            arrays = arrays_from_bytes(weights)
+        except InputError as error:
+            raise InputError(f"{WEIGHTS_FILE}: {error}") from None
+        model = model_from_saved(document.model_dump(), arrays)
+        sizes = model.parameter_count(), sum(array.nbytes for array in arrays.values())
+        if sizes != (document.parameters, document.bytes):
+            raise InputError("keys 'parameters' and 'bytes' are not those of the weights")
+    except InputError as error:
+        raise InputError(f"{path}: {error}; train it again") from None
+    return model
 
 
 def model_to_saved(model: DriftModel) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -101,96 +155,38 @@ def model_to_saved(model: DriftModel) -> tuple[dict[str, Any], dict[str, NDArray
     return values, arrays
 
 
-def model_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]], source: str) -> DriftModel:
-    """The model that `model_to_saved` gave; `source` names it in messages.
+def model_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> DriftModel:
+    """The model that `model_to_saved` gave.
 
     Raises
     ------
     InputError
         If the values are not those of a saved model.
     """
-    try:
-        model_class = model_of_form(str(values["form"]))
-        card = TrainingCard.from_dict(values["card"])
-        intervals = Intervals.from_dict(values["interval"])
-        own = {"kind": str(values["kind"]), **values["model"]}
-        model = model_class.from_saved(own, arrays, card)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from None
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise InputError(f"{source}: not a whole saved model ({error!r}); train it again") from None
+    model_class = model_of_form(values["form"], values["kind"])
+    card = TrainingCard.from_dict(values["card"])
+    intervals = Intervals.from_dict(values["interval"])
+    model = model_class.from_saved({**values["model"], "kind": values["kind"]}, arrays, card)
+    if model.kind != values["kind"]:
+        raise InputError(f"key 'kind': {quoted(values['kind'])}, but the model is of kind '{model.kind}'")
     model.card_ = card
     model.intervals_ = intervals
     return model
 
 
-def model_of_form(form: str) -> type[DriftModel]:
-    """The class of saved models of a form.
+def model_of_form(form: str, kind: str) -> type[DriftModel]:
+    """The class of saved models of a form and kind.
 
     Raises
     ------
     InputError
-        If the form is not known.
+        If the form is not known, or has no such kind.
     """
     if form not in FORMS:
-        raise InputError(
-            f"form '{form}' is not known (known are {', '.join(FORMS)}); "
-            "the model was written by another version of fogml, or damaged: train it again"
-        )
-    module, name = FORMS[form].split(":")
+        raise InputError(f"form {quoted(form)} is not known; known are {', '.join(FORMS)}")
+    home, kinds = FORMS[form]
+    if kinds is not None and kind not in kinds:
+        raise InputError(f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}")
+    module, name = home.split(":")
     found: type[DriftModel] = getattr(import_module(module), name)
     return found
-
-
-def _read_document(path: Path) -> dict[str, Any]:
-    try:
-        document = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such file; name the folder that 'fogml train' wrote the model into, e.g. DIR/model"
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise InputError(f"{path}: is not text; name the folder of a saved model") from None
-    except json.JSONDecodeError as error:
-        raise InputError(
-            f"{path}, line {error.lineno}: cut short or damaged ({error.msg}); copy it again or train again"
-        ) from None
-    if not isinstance(document, dict) or document.get("schema") != SCHEMA:
-        found = document.get("schema") if isinstance(document, dict) else type(document).__name__
-        raise InputError(f"{path}: schema '{found}', expected '{SCHEMA}'; name the folder of a saved model")
-    missing, unknown = _KEYS - document.keys(), document.keys() - _KEYS
-    if missing or unknown:
-        fault = f"key '{min(missing)}' is missing" if missing else f"unknown key '{min(unknown)}'"
-        raise InputError(f"{path}: {fault}; copy the model again or train again")
-    return document
-
-
-def _weights_bytes(arrays: dict[str, NDArray[Any]]) -> bytes:
-    from safetensors.numpy import save
-
-    return bytes(save({name: np.ascontiguousarray(array) for name, array in arrays.items()}))
-
-
-def _read_weights(path: Path, sha256: str) -> dict[str, NDArray[Any]]:
-    from safetensors import SafetensorError
-    from safetensors.numpy import load
-
-    try:
-        data = path.read_bytes()
-    except FileNotFoundError:
-        raise InputError(
-            f"{path}: no such file; it belongs beside {MODEL_FILE}: copy the whole folder"
-        ) from None
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror})") from None
-    if hashlib.sha256(data).hexdigest() != sha256:
-        raise InputError(
-            f"{path}: cut short, damaged, or of another model than {MODEL_FILE}; "
-            "copy the whole folder again or train again"
-        )
-    try:
-        return dict(load(data))
-    except SafetensorError as error:
-        raise InputError(f"{path}: damaged ({error}); train it again") from None

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, ClassVar
 
+import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
@@ -17,11 +18,21 @@ from sklearn.preprocessing import StandardScaler
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard
-from fogml.models.feature_model import FeatureModel
+from fogml.models.feature_model import FeatureModel, SavedFeatures
+from fogml.models.parameters import check_parameters
 from fogml.models.table import TrainingTable
+from fogml.strict import strictly
 
 MAX_ROWS = 800
 """Averages that training runs are brought down to: kernel methods take time in its cube."""
+
+
+class _Saved(SavedFeatures):
+    """What `SklearnModel.to_saved` writes beside the arrays."""
+
+    name: str
+    options: dict[str, Any]
+    seed: int
 
 
 class SklearnModel(FeatureModel):
@@ -69,25 +80,38 @@ class SklearnModel(FeatureModel):
 
     def unfitted_regressor(self, width: int) -> Any:
         """An unfitted regressor for `width` columns."""
-        kind = sklearn_regressor_class(self.name)
-        options = dict(self.options or {})
-        known = inspect.signature(kind).parameters
-        unknown = [option for option in options if option not in known]
-        if unknown:
-            raise InputError(f"{self.name}: no option '{unknown[0]}'; options are {', '.join(known)}")
-        if "random_state" in known:
-            options.setdefault("random_state", self.seed)
+        kind, options = self.check_options()
         if kind.__name__ == "GaussianProcessRegressor" and options.get("kernel") is None:
             options["kernel"] = _drift_kernel(width)
         scaled = make_pipeline(StandardScaler(), kind(**options))
         return TransformedTargetRegressor(scaled, transformer=StandardScaler())
+
+    def check_options(self) -> tuple[type, dict[str, Any]]:
+        """The regressor's class and its arguments, the seed among them.
+
+        Raises
+        ------
+        InputError
+            If an argument is not known or its value not allowed.
+        """
+        kind = sklearn_regressor_class(self.name)
+        options = dict(self.options or {})
+        if "random_state" in inspect.signature(kind).parameters:
+            options.setdefault("random_state", self.seed)
+        check_parameters(kind, options, self.name)
+        return kind, options
 
     def _fit_regressor(self, regressor: Any, table: TrainingTable) -> Any:
         from sklearn.exceptions import ConvergenceWarning
 
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always", ConvergenceWarning)
-            fitted = regressor.fit(table.X, table.y)
+            try:
+                fitted = regressor.fit(table.X, table.y)
+            except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+                # What only the rows tell: more neighbours than rows, a target of the wrong sign.
+                reason = str(error).strip().split("\n")[0]
+                raise InputError(f"{self.name}: can't be fitted to these runs: {reason}") from None
         told = {str(warning.message).strip().split("\n")[0] for warning in caught}
         self._convergence = [f"{self.name}: {message}" for message in sorted(told)]
         return fitted
@@ -115,14 +139,14 @@ class SklearnModel(FeatureModel):
         cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]], card: TrainingCard
     ) -> SklearnModel:
         """The model that `to_saved` gave."""
-        model = cls(
-            name=str(values["name"]),
-            features=str(values["asked_features"]),
-            options=dict(values["options"]) or None,
-            max_rows=values["max_rows"],
-            seed=int(values["seed"]),
-        )
-        model._restore(values, arrays, card)
+        saved = strictly(_Saved, values, "model")
+        kind = sklearn_regressor_class(saved.name)
+        model = cls(saved.name, saved.asked_features, saved.options or None, saved.max_rows, saved.seed)
+        model._restore(saved, arrays, card)
+        found = model.regressor_
+        steps = [type(step) for _, step in getattr(getattr(found, "regressor_", None), "steps", ())]
+        if not isinstance(found, TransformedTargetRegressor) or steps != [StandardScaler, kind]:
+            raise InputError(f"the saved regressor is not a scaled {saved.name}")
         return model
 
 

@@ -10,6 +10,43 @@ from sklearn.base import RegressorMixin
 
 from fogml.errors import InputError
 
+_KERNELS = (
+    "CompoundKernel",
+    "ConstantKernel",
+    "DotProduct",
+    "Exponentiation",
+    "ExpSineSquared",
+    "Matern",
+    "PairwiseKernel",
+    "Product",
+    "RationalQuadratic",
+    "RBF",
+    "Sum",
+    "WhiteKernel",
+)
+_LOSSES = (
+    "HalfTweedieLossIdentity",
+    "HalfTweedieLoss",
+    "HalfGammaLoss",
+    "HalfPoissonLoss",
+    "HalfSquaredError",
+)
+_DISTANCES = ("EuclideanDistance64", "ManhattanDistance64", "MinkowskiDistance64", "ChebyshevDistance64")
+TYPES = frozenset(
+    [
+        *(f"sklearn.gaussian_process.kernels.{name}" for name in _KERNELS),
+        *(f"sklearn._loss.loss.{name}" for name in _LOSSES),
+        *(f"sklearn.metrics._dist_metrics.{name}" for name in _DISTANCES),
+        "sklearn.ensemble._hist_gradient_boosting.predictor.TreePredictor",
+        "sklearn.neighbors._ball_tree.BallTree",
+        "sklearn.neighbors._kd_tree.KDTree",
+        "sklearn.neural_network._stochastic_optimizers.AdamOptimizer",
+        "sklearn.neural_network._stochastic_optimizers.SGDOptimizer",
+        "sklearn.tree._tree.Tree",
+    ]
+)
+"""What scikit-learn's regressors are made of beside what skops vouches for; no function is among them."""
+
 
 def dump_sklearn(regressor: Any) -> NDArray[np.uint8]:
     """A fitted scikit-learn regressor in skops' form, as bytes of shape (n,).
@@ -50,7 +87,7 @@ def load_sklearn(stored: NDArray[Any]) -> Any:
 
 
 def _trusted(data: bytes) -> list[str]:
-    """The types that skops itself does not vouch for, all of them scikit-learn's."""
+    """The types that skops itself does not vouch for, all of them of `TYPES`."""
     import skops.io
 
     try:
@@ -59,10 +96,10 @@ def _trusted(data: bytes) -> list[str]:
         raise InputError(
             f"the saved scikit-learn regressor cannot be read ({error}); train it again"
         ) from None
-    foreign = [name for name in named if not name.startswith("sklearn.")]
+    foreign = sorted(set(named) - TYPES)
     if foreign:
         raise InputError(
-            f"the saved regressor holds types that are not scikit-learn's ({', '.join(sorted(foreign))}); "
+            f"the saved regressor holds what none of scikit-learn's regressors needs ({foreign[0][:100]}); "
             "it is not loaded"
         )
     return list(named)

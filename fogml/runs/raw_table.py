@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -11,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, quoted
+from fogml.json_text import parse_json
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import NAMES, Facts, facts_from
 from fogml.runs.findings import Finding
@@ -44,10 +44,9 @@ def facts_from_json(text: str | bytes, source: str) -> Facts:
     InputError
         If it is not JSON, or states what is no set-up fact or a wrong value.
     """
-    try:
-        values = json.loads(text)
-    except (TypeError, ValueError, RecursionError):
-        raise InputError(f"{source}: the set-up facts are not JSON; write the file again") from None
+    if not isinstance(text, str | bytes):
+        raise InputError(f"{source}: the set-up facts are {quoted(text)}, JSON was expected")
+    values = parse_json(text, f"{source}: the set-up facts are not JSON", "write the file again")
     return facts_from(values, source)
 
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel, ConfigDict, field_validator, model_validator
+from pydantic import BaseModel, ConfigDict, FiniteFloat, field_validator, model_validator
 
 from fogml.errors import InputError
 
@@ -26,8 +26,8 @@ class Range(BaseModel):
     where `log` is set."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-    low: int | float
-    high: int | float
+    low: int | FiniteFloat
+    high: int | FiniteFloat
     log: bool = False
 
     @model_validator(mode="after")
@@ -78,7 +78,7 @@ class Space(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     features: dict[str, list[str]]
     builder: list[str] = ["block"]
-    window: Range | list[float] | float = 64.0
+    window: Range | list[FiniteFloat] | FiniteFloat = 64.0
     models: dict[str, dict[str, Values]]
 
     @field_validator("features", mode="before")
@@ -108,6 +108,8 @@ class Space(BaseModel):
             raise ValueError("'features' needs at least one text in each part")
         if not self.models:
             raise ValueError("'models' needs at least one model")
+        if any(values == [] for part in self.models.values() for values in part.values()):
+            raise ValueError("'models' needs at least one value for each parameter")
         if not self.builder:
             raise ValueError("'builder' needs at least one of block, slope, exp")
         return self
@@ -154,8 +156,11 @@ class Space(BaseModel):
                     f"space: model '{name}' leaves nothing to choose; sweep polynomial, rbf, rbf-patent "
                     "or a scikit-learn regressor by its dotted name"
                 )
-            first = {key: _first(values) for key, values in parameters.items()}
-            make_model(name, None if name == "mean" else "T", 0, first)
+            features = None if name == "mean" else "T"
+            make_model(name, features, 0, {key: _ends(values)[0] for key, values in parameters.items()})
+            for key, values in parameters.items():
+                for value in _ends(values):
+                    make_model(name, features, 0, {key: value})
 
     def fingerprint(self) -> str:
         """SHA-256 of what the space offers."""
@@ -186,7 +191,8 @@ def _greatest(values: Range | list[float] | float) -> float:
     return float(max(values)) if isinstance(values, list) else float(values)
 
 
-def _first(values: Any) -> Any:
+def _ends(values: Any) -> list[Any]:
+    """Every value of a list, both ends of a range, or the one value."""
     if isinstance(values, Range):
-        return values.low
-    return values[0] if isinstance(values, list) else values
+        return [values.low, values.high]
+    return values if isinstance(values, list) else [values]

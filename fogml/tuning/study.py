@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError
+from fogml.json_text import parse_json
 from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
@@ -71,7 +72,10 @@ def _check_identity(study: optuna.Study, plan: Plan, runs: Sequence[Run]) -> Non
             warnings.simplefilter("ignore")
             study.set_metric_names(list(plan.objectives))
         return
-    was = json.loads(stored)
+    place = f"study '{plan.name}' in {shown(plan.storage)}"
+    was = parse_json(str(stored), place, "state another --name, or another --out")
+    if not isinstance(was, dict):
+        raise InputError(f"{place}: was not made by fogml sweep")
     other = [key for key, value in wanted.items() if was.get(key) != value]
     if other:
         raise InputError(

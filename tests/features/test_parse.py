@@ -220,3 +220,46 @@ def test_objects_refuse_what_text_cannot_say() -> None:
         Term(())
     with pytest.raises(InputError, match="a text such as"):
         Features(["T"])  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("(" * 3000 + "T" + ")" * 3000, "more than 10 parentheses within each other"),
+        ("(" * 3000, "more than 10 parentheses within each other"),
+        ("*".join(["T"] * 1000), "a product of more than 20 factors"),
+        ("T1^1..20*T2^1..20*T3^1..20*T4^1..20*T5^1..20*T6^1..20", "more than 1000 terms"),
+        (", ".join(f"T{i}" for i in range(1, 1003)), "more than 1000 terms"),
+        ("T," * 6000, "12000 characters long"),
+        ("T" + " " * 20_000, "20001 characters long"),
+        ("1e999*T", "coefficient inf"),
+        ("1e308*T+1e308*T", "add up to more"),
+        ("T^" + "9" * 5000, "a whole power from 1 to 20"),
+        ("T" + "9" * 5000 + ", (", "expected, found the end"),
+        ("dT[block, " + "9" * 400 + " s]", "window"),
+        ("dT[block, 1e308 h]", "window"),
+        ("T^\u0663", "unexpected"),
+        ("T\u0661", "unexpected|unknown"),
+        ("\u0663*T", "unexpected"),
+        ("\x00", "unexpected"),
+        ("\ud800", "unexpected"),
+    ],
+)
+def test_text_without_bounds_is_told_with_its_place(text, told):
+    with pytest.raises(InputError, match=told) as error:
+        parse_features(text)
+    message = str(error.value)
+    assert len(message) < 1000 and message.count("\n") <= 3
+    if len(text) > 100:
+        shown, mark = message.split("\n")[1:3]
+        assert mark.strip() == "^" and len(shown) < 100
+
+
+@given(st.text(st.sampled_from("T12_indof()[]*^.,+-d 0"), max_size=60))
+@settings(max_examples=300)
+def test_any_text_is_features_or_one_message(text):
+    try:
+        features = parse_features(text)
+    except InputError:
+        return
+    assert parse_features(features.text) == features

@@ -66,7 +66,7 @@ def test_options_and_seed_reach_the_regressor(train):
     )
     forest = model.fit(train).regressor_.regressor_[-1]
     assert len(forest.estimators_) == 3 and forest.random_state == 7
-    with pytest.raises(InputError, match="no option 'trees'"):
+    with pytest.raises(InputError, match="no parameter 'trees'"):
         SklearnModel("sklearn.ensemble.RandomForestRegressor", options={"trees": 3}).fit(train)
 
 

@@ -10,12 +10,12 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from fogml import json_text
 from fogml.errors import InputError
 
 DIAGNOSIS = "diagnosis"
@@ -118,12 +118,7 @@ def read_json(path: Path) -> dict[str, Any]:
     InputError
         If it can't be read or holds no mapping.
     """
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such file") from None
-    except ValueError as error:
-        raise InputError(f"{path}: is not JSON ({error})") from None
+    values = json_text.read_json(path, "fogml blind makes, answers and scores cases")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a JSON object was expected")
     return values

@@ -95,7 +95,7 @@ class RunPlan:
         told = read_json(outcome)
         if _FILES in told and told[_FILES] != case_stamp(self.folder.cases / name):
             return False  # the case is another one by now
-        return not self.retry or bool(told.get("done"))
+        return not self.retry or told.get("done") is True
 
 
 @dataclass

@@ -2,21 +2,48 @@
 
 from __future__ import annotations
 
-from typing import Any, Self
+from numbers import Integral
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
 from sklearn.base import BaseEstimator, RegressorMixin
+from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.parameters import check_parameters
 from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.network import Network, Solution, solve_network
+from fogml.strict import Strict, strictly
 
 FloatArray = NDArray[np.float64]
 
 _ROUNDING_OF_NOISE = 1e-3
 # Greatest change by rounding to float32, as a share of the noise, for keeping float32.
+
+
+class Fitted(Strict):
+    """Fitted attributes that are saved beside the arrays."""
+
+    n_features_in_: int = Field(ge=1)
+    ridge_: float = Field(ge=0.0)
+    rows_: int = Field(ge=1)
+    noise_std_: float = Field(ge=0.0)
+    spread_: float = Field(ge=0.0)
+    rounding_error_: float = Field(ge=0.0)
+    weights_dtype_: Literal["float32", "float64"]
+    notes_: list[str]
+
+
+class _Saved(Strict):
+    """What `NetworkRegressor.to_saved` writes beside the arrays."""
+
+    parameters: dict[str, Any]
+    fitted: dict[str, Any]
+    columns: list[int]
+    edge_columns: list[int]
 
 
 class NetworkRegressor(RegressorMixin, BaseEstimator):
@@ -40,6 +67,11 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
     """
 
     _linear_part = True
+    _fitted: ClassVar[type[Fitted]]
+    _parameter_constraints: ClassVar[dict[str, Any]] = {
+        "seed": [Interval(Integral, 0, None, closed="left")],
+        "threads": [None, Interval(Integral, 1, None, closed="left")],
+    }
     threads: int | None
     network_: Network
     solution_: Solution | None
@@ -111,7 +143,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         check_is_fitted(self)
         values = {
             "parameters": {name: _plain(value) for name, value in self.get_params().items()},
-            "fitted": {name: _plain(getattr(self, name)) for name in self._saved()},
+            "fitted": {name: _plain(getattr(self, name)) for name in self._fitted.model_fields},
             "columns": self.network_.columns.tolist(),
             "edge_columns": self.network_.edge.columns.tolist(),
         }
@@ -119,32 +151,24 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
 
     @classmethod
     def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
-        """The regressor that `to_saved` gave."""
-        regressor = cls(**values["parameters"])
-        for name in cls._saved():
-            setattr(regressor, name, values["fitted"][name])
-        columns, edge_columns = (
-            np.array(values[name], dtype=np.intp) for name in ("columns", "edge_columns")
+        """The regressor that `to_saved` gave.
+
+        Raises
+        ------
+        InputError
+            If it is no such regressor.
+        """
+        saved = strictly(_Saved, values, "regressor")
+        fitted = strictly(cls._fitted, saved.fitted, "regressor.fitted")
+        check_parameters(cls, saved.parameters)
+        regressor = cls(**saved.parameters)
+        for name, value in fitted:
+            setattr(regressor, name, value)
+        regressor.network_ = Network.from_arrays(
+            fitted.n_features_in_, saved.columns, saved.edge_columns, arrays, fitted.weights_dtype_
         )
-        regressor.network_ = Network.from_arrays(columns, edge_columns, arrays)
-        if len(regressor.network_.linear) != regressor.n_features_in_:
-            raise ValueError("arrays of the network do not match its number of inputs")
         regressor.solution_ = None
         return regressor
-
-    @classmethod
-    def _saved(cls) -> tuple[str, ...]:
-        """Fitted attributes that are saved beside the arrays."""
-        return (
-            "n_features_in_",
-            "ridge_",
-            "rows_",
-            "noise_std_",
-            "spread_",
-            "rounding_error_",
-            "weights_dtype_",
-            "notes_",
-        )
 
     def _solve(
         self,

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.errors import InputError
+from fogml.models.arrays import expect_arrays
 from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.evaluate import basis_functions, evaluate_network
 from fogml.models.rbf.objective import LINEAR_PRECISION
@@ -109,25 +112,40 @@ class Network:
 
     @classmethod
     def from_arrays(
-        cls, columns: IndexArray, edge_columns: IndexArray, arrays: dict[str, NDArray[Any]]
+        cls,
+        inputs: int,
+        columns: Sequence[int],
+        edge_columns: Sequence[int],
+        arrays: dict[str, NDArray[Any]],
+        dtype: str,
     ) -> Network:
-        """The network that `arrays` gave.
+        """The network that `arrays` gave in a dtype, of so many inputs.
 
         Raises
         ------
-        ValueError
-            If the arrays do not match each other.
+        InputError
+            If the arrays are not those of such a network: kernels index by them without looking.
         """
+        for stated in (columns, edge_columns):
+            if sorted(set(stated)) != list(stated) or any(not 0 <= column < inputs for column in stated):
+                raise InputError(f"columns {list(stated)} of the network: there are inputs 0 to {inputs - 1}")
+        count, dimensions = np.size(arrays.get("weights", ())), len(columns)
+        shapes = {"centres": (count, dimensions), "widths": (count, dimensions), "weights": (count,)}
+        expected = {name: (dtype, shape) for name, shape in {**shapes, "linear": (inputs + 1,)}.items()}
+        if edge_columns:
+            expected["edge"] = ("float32", (2, len(edge_columns)))
+        expect_arrays(arrays, expected)
         values = {name: np.asarray(array, dtype=np.float64) for name, array in arrays.items()}
-        linear = values["linear"]
-        count, dimensions = len(values["weights"]), len(columns)
-        if values["centres"].shape != (count, dimensions) or values["widths"].shape != (count, dimensions):
-            raise ValueError("arrays of the network do not match")
+        if not np.all(values["widths"] > 0.0):
+            raise InputError("array 'widths' holds a width that is not positive")
         edge = Edge.none()
-        if len(edge_columns):
+        if edge_columns:
             low, high = values["edge"]
-            edge = Edge(edge_columns, low, high)
-        shape = columns, values["centres"], values["widths"]
+            if not (np.all(low <= 0.0) and np.all(high >= 0.0)):
+                raise InputError("array 'edge' is not a range about 0")
+            edge = Edge(np.array(edge_columns, dtype=np.intp), low, high)
+        shape = np.array(columns, dtype=np.intp), values["centres"], values["widths"]
+        linear = values["linear"]
         return cls(*shape, values["weights"], linear[:-1], float(linear[-1]), edge)
 
 

@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Self
+from numbers import Integral, Real
+from typing import Any, ClassVar, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from pydantic import Field
+from sklearn.utils._param_validation import Interval
 from sklearn.utils.validation import validate_data
 
 from fogml.errors import InputError
 from fogml.models.folds import dealt_folds
+from fogml.models.parameters import check_parameters
 from fogml.models.rbf.centres import orthogonal_least_squares, thinned, thinned_rows
 from fogml.models.rbf.evaluate import basis_functions
-from fogml.models.rbf.fitted import NetworkRegressor
+from fogml.models.rbf.fitted import Fitted, NetworkRegressor
 from fogml.models.rbf.levels import Frame
 
 FloatArray = NDArray[np.float64]
@@ -24,6 +28,11 @@ WIDTHS = (0.25, 0.5, 1.0, 2.0, 4.0)
 _CANDIDATES = 300
 _SEARCH_ROWS = 50_000
 _PIECE = 1 << 13
+
+
+class _Fitted(Fitted):
+    width_: float = Field(gt=0.0)
+    held_out_mse_: float
 
 
 class PatentRBFRegressor(NetworkRegressor):
@@ -59,6 +68,13 @@ class PatentRBFRegressor(NetworkRegressor):
     """
 
     _linear_part = False
+    _fitted = _Fitted
+    _parameter_constraints: ClassVar[dict[str, Any]] = {
+        "max_centres": [Interval(Integral, 1, None, closed="left")],
+        "width": [None, Interval(Real, 0.0, None, closed="neither")],
+        "goal": [None, Interval(Real, 0.0, None, closed="left")],
+        **NetworkRegressor._parameter_constraints,
+    }
 
     def __init__(
         self,
@@ -87,8 +103,7 @@ class PatentRBFRegressor(NetworkRegressor):
         folds
             Fold of each row, shape (n,); by default 20 blocks of time dealt to 5 folds.
         """
-        if not (self.max_centres >= 1 and (self.width is None or self.width > 0.0)):
-            raise InputError("max_centres must be at least 1, and width positive")
+        check_parameters(type(self), self.get_params(deep=False))
         inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         inputs, target = np.ascontiguousarray(inputs), np.asarray(target, dtype=np.float64)
         label = dealt_folds(len(target)) if folds is None else np.asarray(folds, dtype=np.intp)
@@ -130,10 +145,6 @@ class PatentRBFRegressor(NetworkRegressor):
             "weights_dtype": self.weights_dtype_,
             "rounding_error": self.rounding_error_,
         }
-
-    @classmethod
-    def _saved(cls) -> tuple[str, ...]:
-        return (*super()._saved(), "width_", "held_out_mse_")
 
     def _choose(self, paths: list[_Path]) -> tuple[int, int]:
         """Position of the width, and number of centres."""

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Literal, Self
+from numbers import Integral, Real
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from sklearn.utils._param_validation import Interval, StrOptions
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.parameters import Device, WholeNumbers, check_parameters
 from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.blocks import average_in_blocks
-from fogml.models.rbf.fitted import NetworkRegressor
+from fogml.models.rbf.fitted import Fitted, NetworkRegressor
 from fogml.models.rbf.levels import Frame
 from fogml.models.rbf.rates import RATES_THAT_TELL, followed_columns, restrained_inputs, training_rates
 from fogml.models.rbf.search import COARSE_ROWS, COARSE_ROWS_PER_CENTRE, Search, SearchSettings
@@ -26,6 +29,11 @@ FloatArray = NDArray[np.float64]
 PRUNE_NATS = 1.1
 SIZES = (16, 32, 64)
 """Numbers of centres among which ``centres="evidence"`` chooses."""
+
+
+class _Fitted(Fitted):
+    sizes_tried_: dict[str, float]
+    independent_share_: float
 
 
 class RBFRegressor(NetworkRegressor):
@@ -88,6 +96,27 @@ class RBFRegressor(NetworkRegressor):
 
     Further attributes are those of `NetworkRegressor`.
     """
+
+    _fitted = _Fitted
+    _parameter_constraints: ClassVar[dict[str, Any]] = {
+        "centres": [
+            StrOptions({"evidence"}),
+            Interval(Integral, 0, None, closed="left"),
+            WholeNumbers(0, few=1),
+        ],
+        "centre_choice": [StrOptions({"kmeans", "ols"})],
+        "tune": ["boolean"],
+        "objective": [StrOptions({"evidence", "validation"})],
+        "ridge": [StrOptions({"evidence"}), Interval(Real, 0.0, None, closed="left")],
+        "network_inputs": [None, WholeNumbers(0)],
+        "wide_inputs": [None, WholeNumbers(0)],
+        "average_rows": [Interval(Integral, 10, None, closed="left")],
+        "prune": [Interval(Real, 0.0, None, closed="left")],
+        "width_prior": [Interval(Real, 0.0, None, closed="neither")],
+        "device": [Device()],
+        "dtype": [StrOptions({"float64", "float32"})],
+        **NetworkRegressor._parameter_constraints,
+    }
 
     def __init__(
         self,
@@ -171,7 +200,7 @@ class RBFRegressor(NetworkRegressor):
         time
             Times of the rows [s], shape (n,); by default rows follow each other evenly.
         """
-        self._check_parameters()
+        check_parameters(type(self), self.get_params(deep=False))
         inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True, ensure_min_samples=2)
         inputs, target = np.ascontiguousarray(inputs), np.asarray(target, dtype=np.float64)
         seen = self._seen(inputs.shape[1])
@@ -222,10 +251,6 @@ class RBFRegressor(NetworkRegressor):
             "rounding_error": self.rounding_error_,
         }
 
-    @classmethod
-    def _saved(cls) -> tuple[str, ...]:
-        return (*super()._saved(), "sizes_tried_", "independent_share_")
-
     def _seen(self, width: int) -> NDArray[np.intp]:
         """Indices of the network's inputs."""
         if self.network_inputs is None:
@@ -263,23 +288,3 @@ class RBFRegressor(NetworkRegressor):
             dtype=self.dtype,
             worth=float(self.prune),
         )
-
-    def _check_parameters(self) -> None:
-        choices = {
-            "centre_choice": ("kmeans", "ols"),
-            "objective": ("evidence", "validation"),
-            "dtype": ("float64", "float32"),
-        }
-        for name, known in choices.items():
-            if getattr(self, name) not in known:
-                raise InputError(f"{name} '{getattr(self, name)}': must be {' or '.join(map(repr, known))}")
-        if isinstance(self.centres, str) and self.centres != "evidence":
-            raise InputError(f"centres '{self.centres}': must be 'evidence', a number, or several numbers")
-        if isinstance(self.ridge, str) and self.ridge != "evidence":
-            raise InputError(f"ridge '{self.ridge}': must be 'evidence', 0 or a positive number")
-        if not isinstance(self.ridge, str) and not float(self.ridge) >= 0.0:
-            raise InputError(f"ridge {self.ridge}: must be 'evidence', 0 or a positive number")
-        if min(self._settings().sizes, default=-1) < 0:
-            raise InputError(f"centres {self.centres}: must not be negative")
-        if not (self.average_rows >= 10 and self.width_prior > 0.0 and self.prune >= 0.0):
-            raise InputError("average_rows must be at least 10, width_prior positive, and prune not negative")

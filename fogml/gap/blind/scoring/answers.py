@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
@@ -12,6 +11,7 @@ from fogml.errors import InputError
 from fogml.gap.blind.folders import OUTCOME, read_json
 from fogml.gap.blind.truth import Amount
 from fogml.gap.confidence import Support
+from fogml.strict import Strict, strictly
 
 NAMED = 0.5
 """Probability from which an effect counts as named."""
@@ -19,7 +19,9 @@ NAMED = 0.5
 
 class _Answered(BaseModel):
     # Further keys are welcome in gap.json.
-    model_config = ConfigDict(extra="ignore", frozen=True, protected_namespaces=(), populate_by_name=True)
+    model_config = ConfigDict(
+        extra="ignore", frozen=True, allow_inf_nan=False, protected_namespaces=(), populate_by_name=True
+    )
 
 
 class Fitted(Amount):
@@ -119,18 +121,30 @@ class Answer:
     code: str | None = None
 
 
+class _Outcome(Strict):
+    """The keys of ``outcome.json`` that are scored, as `fogml.gap.blind.run` writes them."""
+
+    model_config = ConfigDict(extra="ignore")
+    done: bool
+    reason: str | None = None
+    message: str = ""
+    seconds: float | None = Field(default=None, ge=0.0)
+    samples: int | None = Field(default=None, ge=0)
+    code: str | None = None
+
+
 def read_answer(folder: Path) -> Answer:
     """The answer in a folder; one that is missing or breaks the schema is a failure."""
-    outcome: dict[str, Any] = {}
+    outcome = _Outcome(done=True)
 
     def failed(reason: str) -> Answer:
-        return Answer(None, reason, outcome.get("seconds"), code=outcome.get("code"))
+        return Answer(None, reason, outcome.seconds, code=outcome.code)
 
     try:
         if (folder / OUTCOME).is_file():
-            outcome = read_json(folder / OUTCOME)
-        if outcome and not outcome.get("done"):
-            return failed(f"{outcome.get('reason')}: {outcome.get('message')}")
+            outcome = strictly(_Outcome, read_json(folder / OUTCOME), OUTCOME)
+        if not outcome.done:
+            return failed(f"{outcome.reason}: {outcome.message}")
         gap = Gap.model_validate(read_json(folder / "gap.json"))
     except InputError as error:
         return Answer(None, f"no answer: {error}")
@@ -138,4 +152,4 @@ def read_answer(folder: Path) -> Answer:
         first = error.errors()[0]
         key = ".".join(str(part) for part in first["loc"])
         return failed(f"gap.json, key '{key}': {first['msg']}")
-    return Answer(gap, "", outcome.get("seconds"), outcome.get("samples"), outcome.get("code"))
+    return Answer(gap, "", outcome.seconds, outcome.samples, outcome.code)

@@ -22,10 +22,12 @@ import fogml
 from fogml.errors import InputError
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.truth import KINDS, Truth
+from fogml.json_text import MOST_BYTES, parse_json
 from fogml.outputs import whole_file
 
 MARKS = "marks.json.gz"
 SCHEMA = "fogml.blind_marks/1"
+_REMEDY = "fogml blind score writes it"
 _EFFECT_KEYS = {"id", "name", "stage", "d_prime"}
 _TRUTH_KEYS: dict[str, Any] = {
     **dict.fromkeys(("schema_", "case", "seed", "kind", "runs", "sample_s", "turning"), True),
@@ -150,11 +152,16 @@ def read_marks(path: Path) -> Marks:
         If it can't be read or breaks the schema; names the file and the key.
     """
     try:
-        values = json.loads(gzip.decompress(path.read_bytes()))
+        # Some bytes of a packed file may stand for gigabytes.
+        with gzip.open(path) as file:
+            text = file.read(MOST_BYTES + 1)
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file; fogml blind score writes it") from None
-    except (OSError, EOFError, zlib.error, ValueError) as error:
-        raise InputError(f"{path}: holds no marks ({error}); fogml blind score writes them") from None
+        raise InputError(f"{path}: no such file; {_REMEDY}") from None
+    except (OSError, EOFError, zlib.error) as error:
+        raise InputError(f"{path}: holds no marks ({error}); {_REMEDY}") from None
+    if len(text) > MOST_BYTES:
+        raise InputError(f"{path}: is larger than {MOST_BYTES >> 20} MB; {_REMEDY}")
+    values = parse_json(text, str(path), _REMEDY)
     try:
         content = _Content.model_validate(values)
     except ValidationError as error:

@@ -1,0 +1,49 @@
+"""Content of files that were written by the toolkit: exactly the stated keys, and types as they stand."""
+
+from __future__ import annotations
+
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+
+from fogml.errors import InputError, quoted
+
+
+class Strict(BaseModel):
+    """A mapping of a file: no unknown key, no text for a number, no bool for a number, numbers finite.
+
+    A whole number stands for a float too, as JSON does not tell them apart.
+    """
+
+    model_config = ConfigDict(
+        strict=True, extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=()
+    )
+
+
+Content = TypeVar("Content", bound=Strict)
+
+
+def strictly(kind: type[Content], values: Any, key: str = "") -> Content:
+    """Values as a kind of content.
+
+    Parameters
+    ----------
+    kind
+        What they should be.
+    values
+        What was read.
+    key
+        Where they stand in the file, for the message.
+
+    Raises
+    ------
+    InputError
+        Naming the first key that is not as it should be, what it is, and what was expected.
+    """
+    try:
+        return kind.model_validate(values)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in ((key,) if key else ()) + first["loc"]) or "content"
+        found = "" if first["type"] == "missing" else f" (found {quoted(first['input'])})"
+        raise InputError(f"key '{place}': {first['msg']}{found}") from None
