@@ -25,6 +25,7 @@ from typing import Any
 from fogml.errors import FogmlError, InputError
 from fogml.folders import exchange_whole, has_to_stay, is_folder, nearest_folder
 from fogml.locks import FileLock
+from fogml.processes import process_is_alive, process_start
 
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more."""
@@ -119,8 +120,9 @@ def scratch_folder() -> Iterator[Path]:
 def sole_writer(path: str | Path) -> Iterator[None]:
     """Hold the lock on an output, a file ``.NAME.lock`` beside it that names process and host.
 
-    The lock of a process that has ended is taken over; that of another host is not, as only that
-    host knows whether its process lives.
+    The system takes the lock back from a process that has ended, on whichever host of a shared file
+    system. Where the file system has no locks, what the file states counts: a process of this host by
+    whether it lives, one of another host as living.
 
     Raises
     ------
@@ -138,14 +140,15 @@ def sole_writer(path: str | Path) -> Iterator[None]:
     try:
         told = lock.read() if free else _read(lock.path)
         owner = _owner(told)
-        if not free or (told and owner.get("host") != socket.gethostname()):
+        if not free or (not lock.sure and _may_live(owner)):
             lock.release()
             who = f"process {owner['pid']} on {owner['host']}" if owner else "another process"
             raise InputError(
                 f"{path}: {who} is writing it; wait for that to end, or choose another --out "
-                f"(if it has died on another machine, remove {lock.path})"
+                f"(if no such process runs any more, remove {lock.path})"
             )
-        lock.write(json.dumps({"pid": os.getpid(), "host": socket.gethostname()}))
+        pid = os.getpid()
+        lock.write(json.dumps({"pid": pid, "host": socket.gethostname(), "started": process_start(pid)}))
         yield
     finally:
         lock.remove()
@@ -299,6 +302,14 @@ def _owner(told: str) -> dict[str, Any]:
     """Process and host as a lock file states them; nothing where it does not."""
     try:
         values = json.loads(told)
-        return {"pid": int(values["pid"]), "host": str(values["host"])}
-    except (ValueError, TypeError, KeyError):
+        started = str(values.get("started", ""))
+        return {"pid": int(values["pid"]), "host": str(values["host"]), "started": started}
+    except (ValueError, TypeError, KeyError, AttributeError):
         return {}
+
+
+def _may_live(owner: dict[str, Any]) -> bool:
+    """Whether the process that a lock file states may still run, as far as this host can tell."""
+    if not owner:
+        return False
+    return owner["host"] != socket.gethostname() or process_is_alive(owner["pid"], owner["started"])

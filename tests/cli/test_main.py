@@ -100,6 +100,7 @@ def test_an_unknown_option_is_a_usage_error():
         (OSError(errno.ENOSPC, "No space left on device", "/tmp/x"), "/tmp/x: No space left on device"),
         (PermissionError(errno.EACCES, "Permission denied", "out"), "out: Permission denied"),
         (MemoryError(), "not enough memory"),
+        (UnicodeEncodeError("utf-8", "a\udcff.csv", 1, 2, "surrogates not allowed"), "no text in UTF-8"),
     ],
 )
 def test_errors_are_one_message_and_status_2(monkeypatch, error, message):
@@ -129,7 +130,7 @@ def test_an_interrupt_is_status_130(monkeypatch):
         (AssertionError("a defect"), "AssertionError: a defect"),
         (TypeError("x" * 500 + "\nsecond line"), "TypeError: xxx"),
         (RecursionError("too deep"), "RecursionError: too deep"),
-        (UnicodeEncodeError("utf-8", "\udcff", 0, 1, "surrogates not allowed"), "UnicodeEncodeError"),
+        (UnicodeDecodeError("utf-8", b"\xff", 0, 1, "invalid start byte"), "UnicodeDecodeError"),
     ],
 )
 def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp_path, error, told):

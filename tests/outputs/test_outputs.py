@@ -194,15 +194,23 @@ def test_the_second_writer_is_told_who_the_first_is(tmp_path):
     assert tree(tmp_path) == {"out/a": "first", "other/a": "other"}
 
 
-def test_the_lock_of_a_dead_process_is_taken_over_but_not_that_of_another_host(tmp_path):
-    lock = tmp_path / ".out.lock"
-    lock.write_text(json.dumps({"pid": 1, "host": socket.gethostname()}))
-    with sole_writer(tmp_path / "out"):
-        assert json.loads(lock.read_text())["pid"] == os.getpid()
-    assert not lock.exists()
-    lock.write_text(json.dumps({"pid": 1, "host": "elsewhere"}))
-    who = r"process 1 on elsewhere .* remove .*\.out\.lock"
-    with pytest.raises(InputError, match=who), sole_writer(tmp_path / "out"):
+def test_the_lock_of_a_dead_process_is_taken_over(tmp_path, monkeypatch):
+    lock, out = tmp_path / ".out.lock", tmp_path / "out"
+    here, gone = socket.gethostname(), {"pid": 999999999, "started": "1"}
+    for host in (here, "a container that is gone"):
+        lock.write_text(json.dumps({**gone, "host": host}))
+        with sole_writer(out):
+            assert json.loads(lock.read_text())["pid"] == os.getpid()
+        assert not lock.exists()
+    # On a file system without locks there is only what the file states.
+    monkeypatch.setattr("fogml.locks._locked", lambda handle, wait: False)
+    for text in ("", "garbage", json.dumps({**gone, "host": here})):
+        lock.write_text(text)
+        with sole_writer(out), pytest.raises(InputError, match=f"process {os.getpid()} on"), sole_writer(out):
+            raise AssertionError
+    lock.write_text(json.dumps({**gone, "host": "elsewhere"}))
+    who = r"process 999999999 on elsewhere .* remove .*\.out\.lock"
+    with pytest.raises(InputError, match=who), sole_writer(out):
         raise AssertionError
 
 
