@@ -14,8 +14,11 @@ app = typer.Typer(**options.APP_SETTINGS)
 
 @app.command()
 def noise(
-    run: Annotated[
-        str | None, typer.Argument(metavar="RUN", help="A run, best at constant temperature.")
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(
+            metavar="RUN...", help="A run, best at constant temperature; several share their terms."
+        ),
     ] = None,
     overlapping: Annotated[
         bool | None, typer.Option("--overlapping/--not-overlapping", help="Kind of estimator (overlapping).")
@@ -36,7 +39,7 @@ def noise(
     settings = NoiseSettings.gather(
         config,
         {
-            "run": run,
+            "run": runs,
             "overlapping": overlapping,
             "repair": repair,
             "out": str(out) if out else None,

@@ -18,7 +18,7 @@ class NoiseSettings(Settings):
     """Settings of ``fogml noise``."""
 
     path_keys: ClassVar[tuple[str, ...]] = ("run",)
-    run: str | None = None
+    run: str | list[str] | None = None
     overlapping: bool = True
     repair: bool = False
     out: str | None = None
@@ -29,10 +29,10 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
     if not settings.run:
         raise InputError("no run is given; name one")
     if settings.out is None:
-        values = _noise(settings.run, settings, terminal)
+        values = _noise(settings, terminal)
     else:
         with whole_folder(settings.out) as folder:
-            values = _noise(settings.run, settings, terminal)
+            values = _noise(settings, terminal)
             write_json(folder / "noise.json", values)
             with terminal.work("drawing"):
                 from fogml.report import noise_page
@@ -45,11 +45,17 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
         terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'noise.html'}")
 
 
-def _noise(path: str, settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
-    with terminal.work(f"reading {path}") as work:
-        run = open_run(path, repair=settings.repair)
+def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
+    paths = [settings.run] if isinstance(settings.run, str) else list(settings.run or ())
+    if len(set(paths)) < len(paths):
+        raise InputError(f"{', '.join(paths)}: a run is named more than once; give each run once")
+    with terminal.work(f"reading {paths[0]}") as work:
+        runs = []
+        for path in paths:
+            work.doing(f"reading {path}")
+            runs.append(open_run(path, repair=settings.repair))
         work.doing("averaging")
-        return finite_json(noise_report(run, overlapping=settings.overlapping))
+        return finite_json(noise_report(runs, overlapping=settings.overlapping))
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
@@ -69,6 +75,16 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         for name, term in values["terms"].items()
     ]
     terminal.table("IEEE 952 terms", ["term", "value", f"{level} from", "to", "unit"], rows)
+    if len(values["runs"]) > 1:
+        rows = [
+            [
+                one["run"],
+                *(number(one["terms"]["N"][key]) for key in ("value",)),
+                *map(number, one["terms"]["N"]["ci"]),
+            ]
+            for one in values["runs"]
+        ]
+        terminal.table("N of each run alone [deg/sqrt(h)]", ["run", "N", f"{level} from", "to"], rows)
     minimum = values["minimum"]
     terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s")
     for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):

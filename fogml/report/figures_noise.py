@@ -70,6 +70,7 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
             )
         )
     shown = _term_lines(figure, noise, taus, adev)
+    shown += _model_lines(figure, noise, taus)
     figure.add_trace(
         go.Scatter(
             x=taus,
@@ -114,6 +115,36 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
             + (" Star: the lowest deviation that enough averages support." if lowest else "")
         ),
     )
+
+
+def _model_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray) -> str:
+    """Draw the fitted model and shade where its terms alone do not make the curve; say so."""
+    model = noise.get("model") or {}
+    told = ""
+    if len(model.get("adev", ())) == len(taus):
+        figure.add_trace(
+            go.Scatter(
+                x=taus,
+                y=model["adev"],
+                mode="lines",
+                name="noise model",
+                line={"color": style.BLACK, "width": 1.2},
+            )
+        )
+        told = " Thin black: the fitted model"
+        if noise.get("filter") and noise["filter"]["kind"] != "other":
+            told += f" behind its output filter ({noise['filter']['words']})"
+        told += "."
+    holds = noise.get("holds_from_s")
+    if holds and len(taus) and holds > taus[0] * 1.001:
+        figure.add_vrect(x0=taus[0], x1=holds, fillcolor="rgba(0, 0, 0, 0.07)", line_width=0, layer="below")
+        why = (
+            "values are repeated"
+            if noise.get("hold") and not noise.get("filter")
+            else "the output is filtered"
+        )
+        told += f" Shaded: up to {number(holds)} s {why}, and the terms alone do not make the curve."
+    return told
 
 
 def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, adev: FloatArray) -> str:

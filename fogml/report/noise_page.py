@@ -45,6 +45,7 @@ def noise_page(noise: Mapping[str, Any]) -> str:
         warnings=[warning["message"] for warning in noise.get("warnings", ())],
         notes=[note for note in noise.get("notes", ()) if note not in warned],
         about=_about(noise),
+        replicates=_replicates(noise),
     )
 
 
@@ -135,7 +136,36 @@ def _about(noise: Mapping[str, Any]) -> list[tuple[str, str]]:
             rows.append((words, duration(float(noise[key]))))
     if int(noise.get("stretches") or 1) > 1:
         rows.append(("stretches", str(noise["stretches"])))
+    gaps = noise.get("gaps") or {}
+    if gaps.get("count"):
+        rows.append(("gaps", f"{gaps['count']}, {duration(float(gaps['lost_s']))} lost"))
+    told = noise.get("filter")
+    if told:
+        corner = f" at {number(told['corner_hz'])} Hz" if told.get("corner_hz") else ""
+        rows.append(("output filter", f"{told['words']}{corner}"))
+    if noise.get("hold"):
+        rows.append(("new values every", duration(float(noise["hold"]["interval_s"]))))
+    if noise.get("correlated"):
+        found = noise["correlated"]
+        text = f"{number(found['deviation'])} deg/h, {duration(float(found['correlation_s']))}"
+        rows.append(("correlated noise (Gauss-Markov)", text))
+    for line in noise.get("sinusoids", ()):
+        rows.append(("sinusoid", f"{number(line['amplitude'])} deg/h at {number(line['frequency_hz'])} Hz"))
+    if "fit_p_value" in noise:
+        rows.append(("chance of a worse fit", number(noise["fit_p_value"], 2)))
     return rows
+
+
+def _replicates(noise: Mapping[str, Any]) -> Table | None:
+    """N of each run alone, where several share their terms."""
+    runs = noise.get("runs") or ()
+    if len(runs) < 2:
+        return None
+    terms = [(str(one["run"]), one["terms"]["N"]) for one in runs]
+    return Table(
+        columns=(("Run", "", "text"), ("N alone", _unit(terms[0][1]), "figure"), ("Interval", "", "figure")),
+        rows=tuple(Row((name, number(term["value"]), _interval(term))) for name, term in terms),
+    )
 
 
 def _unit(term: Mapping[str, Any]) -> str:

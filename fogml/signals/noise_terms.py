@@ -1,4 +1,4 @@
-"""The noise terms of IEEE Std 952 from an Allan deviation: Q, N, B, K, R, with intervals."""
+"""The noise terms of IEEE Std 952 from a spectrum: Q, N, B, K, R, with intervals."""
 
 from __future__ import annotations
 
@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
-from fogml.signals.allan import AllanResult
-from fogml.signals.allan_fit import fit_variances, interval
+from fogml.signals.allan import AllanResult, allan_deviation
+from fogml.signals.noise_search import NoiseSearch, search_noise
+from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.spectrum_fit import AFTER, SpectrumFit, term_shapes
 
 FloatArray = NDArray[np.float64]
 TermName = Literal["Q", "N", "B", "K", "R"]
@@ -22,6 +24,8 @@ FLICKER_FLOOR = float(np.sqrt(2 * np.log(2) / np.pi))
 """Allan deviation of flicker noise over B: 0.664."""
 _TRUSTED = 5.0
 """Degrees of freedom from which a point may be the minimum; below, low ones are chance."""
+_BENT = 0.1
+"""Share of an Allan variance that a filter may take away where the terms are said to hold."""
 
 _UNITS: dict[TermName, str] = {
     "Q": "urad",
@@ -66,58 +70,72 @@ class NoiseTerm:
 
 @dataclass(frozen=True)
 class NoiseTerms:
-    """The noise terms of a gyro, and the curve that they make.
+    """The noise terms of a gyro, and the model that they are of.
 
     Attributes
     ----------
     terms
         Q, N, B, K and R.
     minimum_adev, minimum_tau_s
-        The lowest Allan deviation [deg/h] with at least 5 degrees of freedom, and its time.
+        The lowest Allan deviation [deg/h] with at least 5 degrees of freedom, where the terms hold, and its
+        time.
     misfit
-        Relative standard deviation of the Allan deviation about the fitted curve, beyond what
-        its degrees of freedom explain: 0 where the five terms describe the data.
+        Relative standard deviation of the root of the density about the model's, beyond what chance
+        explains: 0 where the model describes the data.
+    fit_p_value
+        Chance of a misfit as large under the model.
     level
         Coverage of the intervals.
+    holds_from_s
+        Averaging time from which the terms alone make the Allan deviation; below, an output filter bends it.
+    search
+        The models and their weights; None where there was no noise at all.
     """
 
     terms: Mapping[TermName, NoiseTerm]
     minimum_adev: float
     minimum_tau_s: float
     misfit: float
+    fit_p_value: float
     level: float
+    holds_from_s: float
+    search: NoiseSearch | None
 
-    def deviation(self, taus_s: ArrayLike) -> FloatArray:
-        """Allan deviation of the fitted terms [deg/h] at times [s]."""
-        shapes = _shapes(np.asarray(taus_s, dtype=np.float64))
-        variances = np.array([(self.terms[name].fitted / _SCALES[name]) ** 2 for name in TERM_NAMES])
-        return np.asarray(np.sqrt(shapes @ variances))
+    def deviation(self, taus_s: ArrayLike, *, filtered: bool = True) -> FloatArray:
+        """Allan deviation of the fitted model [deg/h] at times [s], behind its filter or without."""
+        taus = np.atleast_1d(np.asarray(taus_s, dtype=np.float64))
+        if self.search is None:
+            return np.zeros_like(taus)
+        ramp = self.terms["R"].fitted / _SCALES["R"]
+        variance = _allan_variance(self.search.best, self.search.spectrum.sample_s, taus, filtered=filtered)
+        return np.asarray(np.sqrt(variance + 0.5 * (ramp * taus) ** 2))
 
 
-def noise_terms(allan: AllanResult, level: float = 0.9) -> NoiseTerms:
-    """Noise terms from an overlapping Allan deviation of a rate in deg/h.
+def noise_terms(
+    spectrum: Spectrum, allan: AllanResult, level: float = 0.9, *, least_tau_s: float = 0.0
+) -> NoiseTerms:
+    """Noise terms from the spectrum of a rate in deg/h.
 
-    The curve ``sigma^2 = 3 Q^2/tau^2 + N^2/tau + (2 ln 2/pi) B^2 + K^2 tau/3 + R^2 tau^2/2``
-    (IEEE Std 952, annex C) with coefficients that are not negative, of greatest likelihood
-    for chi-square variances with their degrees of freedom. Intervals are those of the profile
-    likelihood, widened for the correlation between averaging times, which follows from the
-    spectrum of the fitted terms; where the points scatter more than they should, the excess
-    counts as error of every point.
+    The density of quantisation, white noise, flicker and random walk (IEEE Std 952, annex C) behind an
+    output filter if the data show one, of greatest likelihood with coefficients that are not negative; the
+    ramp is the constant of the spectrum's only columns, straight lines. Intervals are those of the profile
+    likelihood, with models weighed by their evidence; where rows scatter more than they should, the excess
+    counts as error of every row.
 
-    B is the minimum over 0.664, the value that data sheets give, and its interval covers
-    both that and the flicker of the fitted curve. A term whose interval reaches 0 is not
-    supported by the data; B has no value then if the curve has no minimum within its times.
+    B is the minimum of the Allan deviation over 0.664, the value that data sheets give, and its interval
+    covers both that and the flicker of the model. A term whose interval reaches 0 is not supported by
+    the data; B has no value then if the curve has no minimum within its times.
 
     Parameters
     ----------
+    spectrum
+        Of values in deg/h, with the lines that the ramp of each run makes [s] as columns.
     allan
-        Overlapping Allan deviation of values in deg/h.
+        Overlapping Allan deviation of the same values.
     level
         Coverage of the intervals.
-
-    Returns
-    -------
-    NoiseTerms
+    least_tau_s
+        Averaging time below which the Allan deviation says nothing, as values are repeated [s].
 
     Raises
     ------
@@ -126,32 +144,110 @@ def noise_terms(allan: AllanResult, level: float = 0.9) -> NoiseTerms:
     """
     if not allan.overlapping:
         raise InputError("noise terms are read from overlapping windows: take overlapping=True")
-    seen = allan.adev > 0
-    trusted = seen & (allan.edf >= _TRUSTED) if np.any(seen & (allan.edf >= _TRUSTED)) else seen
-    if not np.any(seen):
+    if not np.any(spectrum.power > 0.0) or not np.any(allan.adev > 0.0):
         nothing = {name: NoiseTerm(None, 0.0, 0.0, _UNITS[name], 0.0) for name in TERM_NAMES}
-        return NoiseTerms(nothing, 0.0, float(allan.taus_s[-1]), 0.0, level)
-    lowest = np.flatnonzero(trusted)[np.argmin(allan.adev[trusted])]
-    taus, variances = allan.taus_s[seen], allan.adev[seen] ** 2
-    sample_s = float(allan.taus_s[0] / allan.factors[0])
-    fit = fit_variances(
-        _shapes(taus),
-        variances,
-        allan.edf[seen],
-        lambda coefficients: _correlation(coefficients, allan.factors[seen], sample_s),
-    )
+        return NoiseTerms(nothing, 0.0, float(allan.taus_s[-1]), 0.0, 1.0, level, 0.0, None)
+    search = search_noise(spectrum)
     terms: dict[TermName, NoiseTerm] = {}
-    for column, name in enumerate(TERM_NAMES):
-        low, high = interval(fit, column, level)
-        fitted, lower, upper = (
-            _SCALES[name] * float(np.sqrt(v)) for v in (fit.coefficients[column], low, high)
-        )
+    for name in TERM_NAMES[:-1]:
+        low, high = _interval(search, name, level)
+        fitted, lower, upper = (_SCALES[name] * float(np.sqrt(v)) for v in (search.best[name], low, high))
         terms[name] = NoiseTerm(fitted if fitted > 0 else None, lower, upper, _UNITS[name], fitted)
+    terms["R"] = _ramp(search.best, spectrum.removed, level)
+    taus = allan.taus_s
+    holds = _holds_from(search, taus)
+    seen = (allan.adev > 0) & (taus >= max(holds, least_tau_s) * (1.0 - 1e-9))
+    if not np.any(seen):
+        seen = allan.adev > 0
+    trusted = seen & (allan.edf >= _TRUSTED) if np.any(seen & (allan.edf >= _TRUSTED)) else seen
+    lowest = np.flatnonzero(trusted)[np.argmin(allan.adev[trusted])]
     falling = lowest == np.flatnonzero(trusted)[-1]
     terms["B"] = _bias_instability(terms["B"], allan, int(lowest), still_falling=bool(falling))
     return NoiseTerms(
-        terms, float(allan.adev[lowest]), float(allan.taus_s[lowest]), 0.5 * float(np.sqrt(fit.excess)), level
+        terms,
+        float(allan.adev[lowest]),
+        float(taus[lowest]),
+        0.5 * float(np.sqrt(search.excess)),
+        search.fit_p_value,
+        level,
+        holds,
+        search,
     )
+
+
+def noise_terms_of(values: FloatArray, sample_s: float, level: float = 0.9) -> NoiseTerms:
+    """As `noise_terms`, of evenly sampled values [deg/h] without gaps, shape (n,)."""
+    series = np.asarray(values, dtype=np.float64)
+    ramp = sample_s * np.arange(len(series), dtype=np.float64)[:, None]
+    return noise_terms(spectrum_of([series], sample_s, [ramp]), allan_deviation(series, sample_s), level)
+
+
+def _holds_from(search: NoiseSearch, taus: FloatArray) -> float:
+    """Shortest of the times at which no filter bends the Allan deviation, and no row left out counts [s]."""
+    spectrum, fit = search.spectrum, search.best
+    plain = _allan_variance(fit, spectrum.sample_s, taus, filtered=False)
+    bent = np.flatnonzero(_allan_variance(fit, spectrum.sample_s, taus) < (1.0 - _BENT) * plain)
+    first = float(taus[min(bent[-1] + 1, len(taus) - 1)]) if len(bent) else spectrum.sample_s
+    if fit.filter.kind == "none" and not np.all(fit.used):
+        first = max(first, 1.0 / float(spectrum.frequency_hz[fit.used].max()))
+    return first
+
+
+def _interval(search: NoiseSearch, name: str, level: float) -> tuple[float, float]:
+    """Profile likelihood interval of a coefficient; from 0 where models without it fit as well."""
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+
+    allowed = float(ndtri(0.5 + 0.5 * level))
+    value = search.best[name]
+    names = search.best.terms.names
+    model = search.candidates[0].model
+    shape = model.design(search.best.log_corner)[0][:, names.index(name)]
+    # The scale on which the term alone would be told from the others' scatter.
+    information = 0.5 * float(np.sum(model.freedom * (shape / search.best.density) ** 2))
+    scale = allowed / np.sqrt(information) if information > 0.0 else max(value, 1e-300)
+    fits: dict[int, SpectrumFit] = {}
+    least = search.profile_loss(name, value, fits)
+
+    def beyond(coefficient: float) -> float:
+        """Standard errors beyond the allowed ones: straight in the coefficient, nearly."""
+        lost = search.profile_loss(name, coefficient, fits) - least
+        return float(np.sqrt(2.0 * max(lost, 0.0))) - allowed
+
+    reach, near = 1.1 * scale, value
+    while (at_far := beyond(value + reach)) <= 0.0 and reach < 1e12 * max(scale, value):
+        near = value + reach
+        # As far again as the straight line says, and a little more.
+        reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
+    upper = value + reach
+    if at_far > 0.0:
+        upper = float(brentq(beyond, near, upper, xtol=2e-2 * scale, rtol=1e-4))
+    fits.clear()
+    if value == 0.0 or beyond(0.0) <= 0.0:
+        return 0.0, upper
+    fits.clear()
+    far, reach, near = 0.0, 1.1 * scale, value
+    while value - reach > 0.0:
+        if (at_far := beyond(value - reach)) > 0.0:
+            far = value - reach
+            break
+        near = value - reach
+        reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
+    return float(brentq(beyond, far, near, xtol=2e-2 * min(scale, value), rtol=1e-4)), upper
+
+
+def _ramp(fit: SpectrumFit, removed: FloatArray, level: float) -> NoiseTerm:
+    """The ramp, from the slopes of all runs: their root mean square where there are several."""
+    from scipy.special import ndtri
+
+    count = len(fit.constants)
+    if count == 0:
+        return NoiseTerm(None, 0.0, 0.0, _UNITS["R"], 0.0)
+    z = float(ndtri(0.5 + 0.5 * level))
+    size = float(np.sqrt(np.mean((fit.constants + removed) ** 2))) * _SCALES["R"]
+    error = float(np.sqrt(np.trace(fit.covariance) / count)) / np.sqrt(count) * _SCALES["R"]
+    lower, upper = max(size - z * error, 0.0), size + z * error
+    return NoiseTerm(size if lower > 0.0 else None, lower, upper, _UNITS["R"], size if lower > 0.0 else 0.0)
 
 
 def _bias_instability(
@@ -166,36 +262,27 @@ def _bias_instability(
     return NoiseTerm(at_minimum, lower, upper, flicker.unit, flicker.fitted)
 
 
-def _shapes(taus: FloatArray) -> FloatArray:
-    """Allan variance of each term of coefficient 1, shape (k, 5)."""
-    one = np.ones_like(taus)
-    return np.column_stack((3 / taus**2, 1 / taus, FLICKER_FLOOR**2 * one, taus / 3, taus**2 / 2))
+def _allan_variance(
+    fit: SpectrumFit, sample_s: float, taus: FloatArray, *, filtered: bool = True
+) -> FloatArray:
+    """Allan variance of a fitted model [(deg/h)^2]: its density through the response of the variance.
 
-
-def _correlation(coefficients: FloatArray, factors: NDArray[np.int64], sample_s: float) -> FloatArray:
-    """Correlation of overlapping Allan variances of one run at several averaging factors.
-
-    The covariance is the integral of ``S^2 H_i H_j``, S the spectral density of the terms and
-    ``H = 2 sin^4(pi m f) / (m sin(pi f))^2`` the response of the Allan variance, for a run
-    much longer than the averaging times. A ramp is no noise and has no spectrum.
+    The response of m samples is ``2 sin^4(pi m x) / (m sin(pi x))^2``, x in cycles per sample.
     """
-    lowest = 1 / (50.0 * float(factors.max()))
-    points = int(200 * np.log10(0.5 / lowest)) + 1
-    frequency = np.geomspace(lowest, 0.5, points)  # cycles per sample
-    quantisation, white, flicker, walk = coefficients[:4]
-    hertz = frequency / sample_s
-    sine = np.sin(np.pi * frequency)
-    density = (
-        8 * quantisation / sample_s * sine**2
-        + 2 * white
-        + flicker / (np.pi * hertz)
-        + walk / (2 * np.pi**2 * hertz**2)
-    )
-    response = 2 * np.sin(np.pi * np.outer(frequency, factors)) ** 4 / (factors * sine[:, None]) ** 2
-    weighted = response * density[:, None]
-    # A logarithmic grid: df = f d(ln f).
-    covariance = weighted.T @ (weighted * frequency[:, None])
-    spread = np.sqrt(np.diag(covariance))
-    if not np.all(spread > 0):
-        return np.eye(len(factors))
-    return np.asarray(covariance / np.outer(spread, spread))
+    factors = np.maximum(taus / sample_s, 1.0)
+    lowest = 1.0 / (100.0 * float(factors.max()))
+    points = int(64 * np.log2(0.5 / lowest)) + 1
+    cycles = np.geomspace(lowest, 0.5, points)
+    shapes = term_shapes(cycles[:, None] / sample_s, sample_s, fit.terms)[:, 0]
+    gain = fit.filter.response(cycles, fit.log_corner)[0]
+    density = np.zeros(points)
+    for coefficient, name, shape in zip(fit.coefficients, fit.terms.names, shapes.T):
+        if name != "E":
+            density += coefficient * shape * (gain if filtered and name not in AFTER else 1.0)
+    variance = np.empty(len(factors))
+    for place, m in enumerate(factors):
+        # Where the grid no longer follows the fourth power, its mean does.
+        power = np.where(m * cycles < 8.0, np.sin(np.pi * m * cycles) ** 4, 0.375)
+        response = 2.0 * power / (m * np.sin(np.pi * cycles)) ** 2
+        variance[place] = np.trapezoid(density * response * cycles / sample_s, np.log(cycles))
+    return variance

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
 from fogml.errors import InputError
 from fogml.runs.facts import Facts, ScaleFactor
@@ -133,3 +134,49 @@ def test_too_short():
         noise_report(Run.from_columns("short", time=[0.0, 1.0], gyro=[1.0, 2.0]))
     with pytest.raises(InputError, match="still: Allan deviation: no averaging time"):
         noise_report(still_run(n=500), taus=[1e6])
+
+
+def test_each_value_four_times_and_a_filtered_output():
+    run = still_run(n=40_000)
+    held = still_run(n=10_000)
+    held = run.with_columns(gyro=np.repeat(9.0 + (held.gyro - 9.0) / 2.0, 4))
+    report = noise_report(held)
+    assert report["hold"] == {"samples": 4.0, "interval_s": pytest.approx(0.4)}
+    low, high = report["terms"]["N"]["ci"]
+    assert low <= 0.01 <= high < 1.1 * low
+    assert report["holds_from_s"] == pytest.approx(0.4)
+    assert any("stands for 4 samples" in note for note in report["notes"])
+    filtered = noise_report(run.with_columns(gyro=9.0 + lfilter(*butter(2, 0.06), run.gyro - 9.0)))
+    assert filtered["filter"]["order"] == 2
+    assert filtered["filter"]["corner_hz"] == pytest.approx(0.3, rel=0.05)
+    low, high = filtered["terms"]["N"]["ci"]
+    assert low <= 0.01 <= high < 1.1 * low
+    # The curve bends below what the terms alone make, and the model follows it.
+    modelled, ahead = (np.array(filtered["model"][key]) for key in ("adev", "ahead_of_filter"))
+    assert modelled[0] == pytest.approx(filtered["adev"][0], rel=0.1) and modelled[0] < 0.3 * ahead[0]
+    assert any("The output is filtered" in note for note in filtered["notes"])
+    json.dumps(filtered, allow_nan=False)
+
+
+def test_replicates_share_their_terms_or_are_told_apart():
+    one, other = still_run(1), still_run(2)
+    shared = noise_report([one, other])
+    assert [each["run"] for each in shared["runs"]] == ["still", "still"]
+    alone = noise_report(one)
+    widths = [np.diff(report["terms"]["N"]["ci"])[0] for report in (alone, shared)]
+    assert widths[1] == pytest.approx(widths[0] / np.sqrt(2), rel=0.2)
+    assert not shared["warnings"] and alone["runs"] == []
+    louder = other.with_columns(gyro=9.0 + 1.2 * (other.gyro - 9.0))
+    assert "replicates_differ" in [warning["code"] for warning in noise_report([one, louder])["warnings"]]
+    with pytest.raises(InputError, match="one sample interval"):
+        noise_report([one, Run.from_columns("slow", time=np.arange(2000.0), gyro=np.zeros(2000))])
+
+
+def test_noise_that_changes_and_gaps_are_told():
+    run = still_run(n=30_000)
+    louder = np.where(np.arange(30_000) < 15_000, 1.0, 1.5)
+    report = noise_report(run.with_columns(gyro=9.0 + louder * (run.gyro - 9.0)))
+    assert "not_stationary" in [warning["code"] for warning in report["warnings"]]
+    assert report["stationarity"]["thirds"][0] < report["stationarity"]["thirds"][2]
+    gapped = noise_report(run.with_columns(time=run.time + np.repeat([0.0, 50.0, 400.0], 10_000)))
+    assert gapped["gaps"] == {"count": 2, "lost_s": pytest.approx(400.0)}

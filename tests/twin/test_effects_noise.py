@@ -7,7 +7,7 @@ import pytest
 
 from fogml.runs.run import FloatArray
 from fogml.signals.allan import allan_deviation
-from fogml.signals.noise_terms import noise_terms
+from fogml.signals.noise_terms import noise_terms_of
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.optics import Coil
@@ -39,7 +39,7 @@ def draw(id: str, amplitude: float, seed: int = 3, sample_s: float = SAMPLE_S, *
 def test_term_is_read_back_in_its_unit(id: str) -> None:
     name, unit, amplitude = TERMS[id]
     assert effect(id).amplitude.unit == unit
-    found = noise_terms(allan_deviation(draw(id, amplitude), SAMPLE_S), level=0.99).terms[name]  # type: ignore[index]
+    found = noise_terms_of(draw(id, amplitude), SAMPLE_S, 0.99).terms[name]  # type: ignore[index]
     assert found.unit == unit
     assert found.fitted == pytest.approx(amplitude, rel=0.15)
     assert found.lower <= amplitude <= found.upper or id == "rate_ramp"

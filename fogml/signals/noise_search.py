@@ -1,0 +1,237 @@
+"""Which noise model a spectrum speaks for: terms behind an output filter, weighed by their evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.signals.noise_spectrum import Spectrum
+from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, OutputFilter
+from fogml.signals.spectrum_fit import (
+    SpectrumFit,
+    SpectrumModel,
+    Terms,
+    excess_of,
+    relative_errors,
+)
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+PLAIN = Terms()
+BEHIND = Terms(("N", "B", "K", "Q", "W"))
+FAR_BEHIND = Terms(("N", "B", "K", "Q", "W", "E"))
+"""Behind a filter, and behind one that lets so little pass at high frequencies that the ends are seen."""
+_STARTS = np.log([0.02, 0.2, 1.5])
+"""Warped corners to begin with."""
+_WORTH = 2.0
+"""Nats that a filter must bring before all forms are tried."""
+_ENDS = 0.01
+"""Share of a row's density that its series' ends may make."""
+_LIVE = 5.0
+"""Nats of evidence below the best at which a model no longer counts."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A fitted model and its evidence [nats], by Schwarz' criterion (Ann. Statist. 6 (1978) 461)."""
+
+    model: SpectrumModel
+    fit: SpectrumFit
+    penalty: float
+
+    @property
+    def evidence(self) -> float:
+        """Logarithm of the probability of the data, up to a constant of the data."""
+        return -self.fit.loss - self.penalty
+
+
+@dataclass(frozen=True)
+class NoiseSearch:
+    """Models that count.
+
+    Attributes
+    ----------
+    spectrum
+        The data.
+    candidates
+        The best first.
+    weights
+        Posterior probabilities, shape (candidates,).
+    excess
+        Variance of the rows' relative errors that the best model does not explain.
+    fit_p_value
+        Chance of errors as large as the best model's (portmanteau over all rows).
+    """
+
+    spectrum: Spectrum
+    candidates: tuple[Candidate, ...]
+    weights: FloatArray
+    excess: float
+    fit_p_value: float
+
+    @property
+    def best(self) -> SpectrumFit:
+        """The fit of the best model."""
+        return self.candidates[0].fit
+
+    def profile_loss(self, name: str, coefficient: float, fits: dict[int, SpectrumFit]) -> float:
+        """Nats lost where a term is held at a coefficient, the models weighed; `fits` are where to begin."""
+        lost = []
+        for place, (candidate, weight) in enumerate(zip(self.candidates, self.weights)):
+            names = candidate.fit.terms.names
+            if name not in names:
+                lost.append((0.0 if coefficient == 0.0 else np.inf) - np.log(weight))
+                continue
+            start = fits.get(place, candidate.fit)
+            held = (names.index(name), coefficient)
+            found = candidate.model.fit(start, held=held, excess=self.excess)
+            if np.isfinite(found.loss):
+                fits[place] = found
+            lost.append(found.loss - candidate.fit.loss - np.log(weight))
+        return float(-np.logaddexp.reduce(-np.array(lost)))
+
+
+def search_noise(
+    spectrum: Spectrum, *, filters: bool = True, misfit_level: float = 1e-3, correlated: bool = True
+) -> NoiseSearch:
+    """Fit and weigh noise models.
+
+    White noise, flicker, random walk and quantisation alone; behind low passes of first and second order
+    and a running mean; and, where none of those fits, from each octave on down, the rows above being left to
+    themselves. A Gauss-Markov term competes beside the best of them.
+
+    Parameters
+    ----------
+    spectrum
+        Of the data.
+    filters
+        Whether filters are looked for.
+    misfit_level
+        Chance of a right model's being doubted.
+    correlated
+        Whether a Gauss-Markov term competes.
+    """
+    size = np.log(max(float(spectrum.count.sum()), 2.0))
+    plain = SpectrumModel(spectrum, PLAIN)
+    found = [Candidate(plain, plain.fit(), 0.0)]
+    if filters and np.any(spectrum.power > 0.0):
+        found += _filtered(spectrum, found[0], size)
+        best = max(found, key=lambda c: c.evidence)
+        if fit_p_value(best.model, best.fit) < misfit_level:
+            found += _from_lower_on(spectrum)
+    if correlated:
+        found += _correlated(spectrum, max(found, key=lambda c: c.evidence), size)
+    found.sort(key=lambda c: -c.evidence)
+    live = [c for c in found if c.evidence > found[0].evidence - _LIVE]
+    weights = np.exp([c.evidence - live[0].evidence for c in live])
+    p_value = fit_p_value(live[0].model, live[0].fit)
+    # Scatter that chance explains is none: intervals would widen for nothing.
+    excess = excess_of(live[0].model, live[0].fit) if p_value < misfit_level else 0.0
+    if excess > 0.0:
+        live = [replace(c, fit=c.model.fit(c.fit, excess=excess)) for c in live]
+    return NoiseSearch(spectrum, tuple(live), weights / weights.sum(), excess, p_value)
+
+
+def fit_p_value(model: SpectrumModel, fit: SpectrumFit) -> float:
+    """Chance of errors of the rows as large as a fit's, by chi-square."""
+    from scipy.stats import chi2
+
+    errors, rows = relative_errors(model, fit)
+    freedom = len(rows) - fit.free
+    return float(chi2.sf(float(errors @ errors), freedom)) if freedom > 0 else 1.0
+
+
+def _filtered(spectrum: Spectrum, plain: Candidate, size: float) -> list[Candidate]:
+    first = [form for form in LOW_PASSES if form.kind == "butterworth" and form.warp == "bilinear"]
+    mean = _running_mean(spectrum)
+    if mean is not None:
+        first.append(mean)
+
+    def fitted(forms: Sequence[OutputFilter], corners: FloatArray, used: BoolArray | None) -> list[Candidate]:
+        models = [
+            SpectrumModel(spectrum, BEHIND if form.order == 1 else FAR_BEHIND, form, used) for form in forms
+        ]
+        penalty = 0.5 * size + _of_levels(spectrum, used)
+        tried = [Candidate(m, m.scanned(corners if m.filter.free else corners[:1]), penalty) for m in models]
+        # What lets more past than it holds back is no filter.
+        return [c for c in tried if c.fit["W"] <= 0.5 * c.fit["N"]]
+
+    found = fitted(first, _STARTS, None)
+    if all(c.fit.loss > plain.fit.loss - _WORTH for c in found):
+        return []
+    top = min(found, key=lambda c: c.fit.loss)
+    best = top.fit
+    begin = np.array([c.fit.log_corner for c in found if c.fit.filter.free] or _STARTS)
+    ends = best["E"] * top.model.design(best.log_corner)[0][:, -1] if best["E"] > 0.0 else np.zeros(1)
+    used = None
+    if np.any(ends > _ENDS * best.density):
+        # There the series' ends are seen, which are no noise, and not the noise; the same rows for all.
+        used = np.asarray(ends <= _ENDS * best.density)
+        found = fitted(first, begin, used)
+    return found + fitted([form for form in LOW_PASSES if form not in first], begin, used)
+
+
+def _running_mean(spectrum: Spectrum) -> OutputFilter | None:
+    """The running mean of white noise that fits best, if it beats the noise itself."""
+    cycles = spectrum.frequency_hz * spectrum.sample_s
+    rows = spectrum.count >= 8.0
+    freedom, power = spectrum.count[rows], spectrum.power[rows]
+
+    def loss(form: OutputFilter) -> float:
+        gain = form.response(cycles[rows], 0.0)[0].mean(axis=1)
+        level = float(freedom @ (power / gain)) / float(freedom.sum())
+        return float(freedom @ np.log(level * gain))
+
+    if not np.any(rows):
+        return None
+    forms = [OutputFilter("mean", order) for order in range(2, LONGEST_MEAN + 1)]
+    best = min(forms, key=loss)
+    return best if loss(best) < loss(NO_FILTER) else None
+
+
+def _of_levels(spectrum: Spectrum, used: BoolArray | None) -> float:
+    """Penalty for rows that are left to levels of their own."""
+    if used is None:
+        return 0.0
+    return 0.5 * float(np.sum(np.log(np.maximum(spectrum.count[~used], 2.0))))
+
+
+def _from_lower_on(spectrum: Spectrum) -> list[Candidate]:
+    """Plain models of the rows below an octave's end: the rows above have a level of their own each."""
+    found: list[Candidate] = []
+    top = 0.25 / spectrum.sample_s
+    low = spectrum.frequency_hz[:, -1]
+    while True:
+        used = low < top
+        if float(spectrum.count[used].sum()) < 64.0:
+            return found
+        model = SpectrumModel(spectrum, PLAIN, used=used)
+        found.append(Candidate(model, model.fit(), _of_levels(spectrum, used)))
+        top *= 0.5
+
+
+def _correlated(spectrum: Spectrum, best: Candidate, size: float, times: int = 10) -> list[Candidate]:
+    """Models with a Gauss-Markov term, where slow noise is there at all."""
+    fit = best.fit
+    slow = fit["B"] + fit["K"]
+    if slow == 0.0 and fit_p_value(best.model, fit) > 0.05:
+        return []
+    lowest = float(spectrum.frequency_hz.min())
+    longest, shortest = 1.0 / (4.0 * np.pi * lowest), 2.0 * spectrum.sample_s
+    if longest <= 2.0 * shortest:
+        return []
+    found: list[Candidate] = []
+    for tau in np.geomspace(shortest, longest, times):
+        terms = Terms((*fit.terms.names, "G"), float(tau))
+        model = SpectrumModel(spectrum, terms, fit.filter, best.model.used)
+        start = replace(fit, terms=terms, coefficients=np.append(fit.coefficients, 1e-6 * fit["N"] / tau))
+        fitted = model.fit(start)
+        # What makes the density at its upper end too is white noise behind a filter of first order.
+        top = int(np.flatnonzero(model.used)[-1])
+        if fitted["G"] * model.design(fitted.log_corner)[0][top, -1] < 0.5 * fitted.density[top]:
+            found.append(Candidate(model, fitted, best.penalty + size))
+    return sorted(found, key=lambda c: c.fit.loss)[:1]

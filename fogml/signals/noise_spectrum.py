@@ -1,0 +1,266 @@
+"""Power spectral density of a series in one pass: cosine transform, lines told apart, bins in frequency.
+
+The coefficients of the cosine transform (DCT-II) are independent for white noise and for a random walk
+alike, to the letter (the walk's Karhunen-Loeve basis), and nearly so in between: no taper is needed, and
+none of the run's information is lost.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+POINTS = 4
+"""Frequencies at which a model is asked in a bin."""
+_BLOCKS = 4096
+_LONG = 1 << 16
+"""Samples from which a series may lose a few at its end so that its transform is quick."""
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """How finely a spectrum is told.
+
+    Attributes
+    ----------
+    single
+        Lowest coefficients of a stretch that stand alone, each with its columns.
+    most_single
+        Such coefficients of all stretches together, at most; few of each are kept in any case.
+    per_octave
+        Bins in an octave of frequency above them: S may change by a tenth in one.
+    line_chance
+        Chance of taking noise for a line, of the whole spectrum.
+    """
+
+    single: int = 64
+    most_single: int = 1024
+    per_octave: int = 16
+    line_chance: float = 1e-3
+
+
+@dataclass(frozen=True)
+class Line:
+    """A sinusoid in the data: frequency [Hz] and amplitude, in the unit of the data."""
+
+    frequency_hz: float
+    amplitude: float
+
+
+@dataclass(frozen=True)
+class Spectrum:
+    """Estimated one-sided density of a series, row by row, with rising frequency in two parts.
+
+    Attributes
+    ----------
+    sample_s
+        Sample interval [s].
+    frequency_hz
+        Frequencies inside each row, shape (rows, POINTS).
+    power
+        Mean density of each row [(deg/h)^2/Hz], shape (rows,).
+    count
+        Coefficients behind each row: degrees of freedom, shape (rows,).
+    values
+        Signed coefficients of the first rows, whose count is 1, shape (single,); their squares are its power.
+    columns
+        Coefficients of given columns in the same rows, shape (single, p).
+    removed
+        Constants of the columns that were taken out beforehand by ordinary least squares, shape (p,).
+    lines
+        Sinusoids whose coefficients are left out.
+    """
+
+    sample_s: float
+    frequency_hz: FloatArray
+    power: FloatArray
+    count: FloatArray
+    values: FloatArray
+    columns: FloatArray
+    removed: FloatArray
+    lines: tuple[Line, ...] = ()
+
+
+def spectrum_of(
+    stretches: Sequence[FloatArray],
+    sample_s: float,
+    columns: Sequence[FloatArray] | None = None,
+    resolution: Resolution | None = None,
+) -> Spectrum:
+    """Spectrum of stretches of one series or of several, each about a mean of its own.
+
+    Parameters
+    ----------
+    stretches
+        Evenly sampled values [deg/h], shape (n,) each, without gaps.
+    sample_s
+        Sample interval [s].
+    columns
+        Regressors of each stretch, shape (n, p), that vary slowly: only the single coefficients know them.
+    resolution
+        How finely.
+    """
+    fine = resolution or Resolution()
+    kept = [i for i, y in enumerate(stretches) if len(y) >= 3]
+    single = max(min(fine.single, fine.most_single // max(len(kept), 1)), 4)
+    lengths = [_good_length(len(stretches[i])) for i in kept]
+    total, longest = sum(lengths), max(lengths)
+    columns = [np.empty((len(y), 0)) for y in stretches] if columns is None else columns
+    # Columns vary slowly: means over blocks tell all of them.
+    coarse = [
+        (_block_means(columns[i][:n], 64 * single), _block_means(stretches[i][:n, None], 64 * single), n)
+        for i, n in zip(kept, lengths)
+    ]
+    removed = _least_squares(coarse)
+    edges = _edges((single + 0.5) / longest, fine.per_octave)
+    sums = np.zeros(len(edges) - 1)
+    counts = np.zeros(len(edges) - 1)
+    low_f, low_v, low_x, lines = [], [], [], []
+    for i, n, (x, means, _) in zip(kept, lengths, coarse):
+        y = stretches[i][:n] - means.mean()
+        if len(removed):
+            y -= columns[i][:n] @ removed
+        coefficients = _cosine(y)
+        coefficients *= np.sqrt(2.0 * sample_s)
+        alone = min(single, n - 1)
+        low_f.append(np.arange(1, alone + 1) / (2.0 * n * sample_s))
+        low_v.append(coefficients[1 : alone + 1].copy())
+        scale = np.sqrt(2.0 * sample_s * n / len(x))
+        low_x.append(scale * np.array([_cosine(c)[1 : alone + 1] for c in x.T]).reshape(-1, alone).T)
+        square = coefficients[alone + 1 :]
+        square *= square
+        # In shares of the highest frequency, coefficient k of n is at k / n.
+        at = np.clip(np.ceil(edges * n).astype(np.int64) - alone - 1, 0, len(square))
+        square = square[: at[-1]]
+        used = np.flatnonzero(np.diff(at) > 0)
+        first = at[used]
+        if not len(used):
+            continue
+        masked, found = _lines(square, at, sample_s, n, alone + 1, fine.line_chance / total)
+        lines += found
+        if masked is not None:
+            square = np.where(masked, 0.0, square)
+            counts[used] += np.add.reduceat(~masked, first, dtype=np.float64)
+        else:
+            counts[used] += np.diff(at)[used]
+        sums[used] += np.add.reduceat(square, first)
+    seen = counts > 0
+    half = 0.5 / sample_s
+    points = (np.arange(POINTS) + 0.5) / POINTS
+    low, high = edges[:-1, None] * half, np.minimum(edges[1:, None], 1.0) * half
+    binned = low + (high - low) * points
+    below = np.concatenate(low_f)
+    values = np.concatenate(low_v)
+    return Spectrum(
+        sample_s,
+        np.vstack((np.repeat(below[:, None], POINTS, axis=1), binned[seen])),
+        np.concatenate((values**2, sums[seen] / counts[seen])),
+        np.concatenate((np.ones(len(values)), counts[seen])),
+        values,
+        np.vstack(low_x),
+        removed,
+        tuple(sorted(lines, key=lambda line: -line.amplitude)),
+    )
+
+
+def _good_length(samples: int) -> int:
+    """Length of nearly all of a series that is quickly transformed."""
+    from scipy.fft import next_fast_len
+
+    if samples < _LONG:
+        return samples
+    length = samples
+    while next_fast_len(length, real=True) != length:
+        length -= 1
+    return length
+
+
+def _block_means(values: FloatArray, least: int) -> FloatArray:
+    """Means over blocks of equal length, at least so many and enough for what varies slowly."""
+    n, blocks = len(values), max(_BLOCKS, least)
+    if n <= 2 * blocks:
+        return values
+    edges = np.linspace(0, n, blocks + 1).astype(np.intp)
+    return np.asarray(np.add.reduceat(values, edges[:-1], axis=0) / np.diff(edges)[:, None])
+
+
+def _least_squares(stretches: Sequence[tuple[FloatArray, FloatArray, int]]) -> FloatArray:
+    """Constants of the columns by ordinary least squares, each stretch about its mean."""
+    width = stretches[0][0].shape[1]
+    gram, image = np.zeros((width, width)), np.zeros(width)
+    for x, y, n in stretches:
+        centred = x - x.mean(axis=0)
+        gram += n / len(x) * centred.T @ centred
+        image += n / len(x) * centred.T @ (y[:, 0] - y.mean())
+    size = np.sqrt(np.maximum(np.diag(gram), 1e-300))
+    return np.asarray(np.linalg.lstsq(gram / np.outer(size, size), image / size, rcond=1e-12)[0] / size)
+
+
+def _edges(begin: float, per_octave: int) -> FloatArray:
+    """Edges of bins as shares of the highest frequency: even in its logarithm, and in that of its distance.
+
+    A digital filter may have a zero at half the sampling rate; the last few coefficients are left out.
+    """
+    if begin >= 0.5:
+        return np.array([min(begin, 1.0), 1.0])
+    octaves = -np.log2(2.0 * begin)
+    low = begin * 2.0 ** np.linspace(0.0, octaves, max(int(np.ceil(per_octave * octaves)), 1) + 1)
+    return np.concatenate((low, 1.0 - low[-2::-1]))
+
+
+def _cosine(values: FloatArray) -> FloatArray:
+    from scipy.fft import dct
+
+    return np.asarray(dct(np.ascontiguousarray(values), norm="ortho"))
+
+
+def _lines(
+    square: FloatArray, edges: NDArray[np.int64], sample_s: float, n: int, offset: int, chance: float
+) -> tuple[NDArray[np.bool_] | None, list[Line]]:
+    """Coefficients of sinusoids that stand out of their bins' noise, and what they are."""
+    from scipy.stats import chi2
+
+    # Median and limit of a squared normal value.
+    typical, limit = float(chi2.ppf(0.5, 1)), float(chi2.isf(chance, 1))
+    masked: NDArray[np.bool_] | None = None
+    lines: list[Line] = []
+    for low, high in pairwise(edges.tolist()):
+        # A median of few, or of one side of a line, says nothing.
+        if high - low < 32:
+            continue
+        part = square[low:high]
+        top = int(np.argmax(part))
+        peak = float(part[top])
+        if peak <= limit * float(part.mean()) * 0.1:
+            continue
+        level = float(np.median(part)) / typical
+        if level <= 0.0 or peak <= limit * level:
+            continue
+        if masked is None:
+            masked = np.zeros(len(square), dtype=np.bool_)
+        for place in low + np.flatnonzero(part > limit * level):
+            # A density that is steep or has zeros is no line: its neighbours are as large.
+            near = square[max(place - 24, 0) : place + 25]
+            if masked[place] or square[place] <= limit * float(np.median(near)) / typical:
+                continue
+            a = b = int(place)
+            # Every other coefficient of a line may be small: two quiet ones end it.
+            while a > 0 and max(square[a - 1], square[max(a - 2, 0)]) > 4.0 * level:
+                a -= 1
+            while (
+                b < len(square) - 1 and max(square[b + 1], square[min(b + 2, len(square) - 1)]) > 4.0 * level
+            ):
+                b += 1
+            masked[a : b + 1] = True
+            energy = square[a : b + 1] - level
+            weight = np.maximum(energy, 0.0)
+            middle = float(np.average(np.arange(a, b + 1), weights=weight))
+            frequency = (offset + middle) / (2.0 * n * sample_s)
+            lines.append(Line(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
+    return masked, lines

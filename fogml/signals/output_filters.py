@@ -1,0 +1,96 @@
+"""What an output filter makes of a gyro's noise: power responses with one free constant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+# How a digital or an analogue filter sees a frequency, in cycles per sample.
+_WARPS: dict[str, Callable[[FloatArray], FloatArray]] = {
+    "bilinear": lambda x: np.tan(np.pi * np.minimum(x, 0.5 - 1e-9)),
+    "recursive": lambda x: np.sin(np.pi * x),
+    "analogue": lambda x: np.pi * x,
+}
+
+
+@dataclass(frozen=True)
+class OutputFilter:
+    """A low pass by its power response, 1 at the frequency zero.
+
+    Attributes
+    ----------
+    kind
+        ``none``; ``butterworth`` or ``cascade`` (equal first-order stages); ``mean``, the running one.
+    order
+        Stages of the low pass, or samples of the running mean; 0 for none.
+    warp
+        ``bilinear`` and ``recursive`` (exponential smoothing) as a computer filters, ``analogue`` as a
+        circuit does.
+    """
+
+    kind: str = "none"
+    order: int = 0
+    warp: str = "bilinear"
+
+    @property
+    def free(self) -> bool:
+        """Whether it has a cut-off to be found."""
+        return self.kind in ("butterworth", "cascade")
+
+    def response(self, cycles: FloatArray, log_corner: float) -> tuple[FloatArray, FloatArray]:
+        """Power response and its slope over the logarithm of the corner, at cycles per sample.
+
+        The corner is in the warped frequency, `corner_cycles` tells it in plain ones.
+        """
+        if self.kind == "mean":
+            sine = self.order * np.sin(np.pi * cycles)
+            return (np.sin(np.pi * self.order * cycles) / sine) ** 2, np.zeros_like(cycles)
+        if not self.free:
+            return np.ones_like(cycles), np.zeros_like(cycles)
+        ratio = _WARPS[self.warp](cycles) / np.exp(log_corner)
+        if self.kind == "butterworth":
+            power = ratio ** (2 * self.order)
+            gain = 1.0 / (1.0 + power)
+            return gain, 2.0 * self.order * power * gain**2
+        gain = 1.0 / (1.0 + ratio**2)
+        return gain**self.order, 2.0 * self.order * ratio**2 * gain ** (self.order + 1)
+
+    def corner_cycles(self, log_corner: float) -> float | None:
+        """Frequency of half power in cycles per sample; None where all that is sampled passes."""
+        if self.kind == "mean":
+            return 0.443 / self.order
+        if not self.free:
+            return None
+        corner = float(np.exp(log_corner))
+        if self.kind == "cascade":
+            corner *= float(np.sqrt(2.0 ** (1.0 / self.order) - 1.0))
+        if self.warp == "bilinear":
+            return float(np.arctan(corner) / np.pi)
+        if self.warp == "recursive":
+            return float(np.arcsin(corner) / np.pi) if corner < 1.0 else None
+        return corner / np.pi if corner < 0.5 * np.pi else None
+
+    def words(self) -> str:
+        """What it is, for a reader."""
+        if self.kind == "mean":
+            return f"running mean of {self.order} samples"
+        if not self.free:
+            return "no output filter"
+        number = {1: "first", 2: "second"}[self.order]
+        return f"low pass of {number} order"
+
+
+NO_FILTER = OutputFilter()
+LOW_PASSES = tuple(
+    OutputFilter(kind, order, warp)
+    for kind, order in (("butterworth", 1), ("butterworth", 2), ("cascade", 2))
+    for warp in _WARPS
+)
+"""The forms that compete."""
+LONGEST_MEAN = 128
+"""Samples of the longest running mean that is looked for."""

@@ -1,0 +1,328 @@
+"""Noise terms of greatest likelihood for a spectrum, behind an output filter.
+
+Whittle's likelihood: each row of a spectrum is chi-square about the model's density. The constants of the
+columns are integrated out of the lowest rows (restricted likelihood), so that a ramp or a drift costs slow
+noise nothing but its own degrees of freedom.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.signals.noise_spectrum import Spectrum
+from fogml.signals.output_filters import NO_FILTER, OutputFilter
+
+FloatArray = NDArray[np.float64]
+
+AFTER = ("Q", "W", "E")
+"""Terms that a filter does not act on."""
+_ITERATIONS = 60
+_TOLERANCE = 1e-7
+
+
+@dataclass(frozen=True)
+class Terms:
+    """Which terms a model has.
+
+    Attributes
+    ----------
+    names
+        N, B, K, G (Gauss-Markov), filtered; Q, W (white rounding of the output), E (what the ends of a
+        smooth series add to its cosine transform, of no meaning) after the filter.
+    correlation_s
+        Correlation time of G [s].
+    """
+
+    names: tuple[str, ...] = ("N", "B", "K", "Q")
+    correlation_s: float | None = None
+
+
+@dataclass(frozen=True)
+class SpectrumFit:
+    """A fitted model.
+
+    Attributes
+    ----------
+    terms, filter, log_corner
+        The model; the corner as in `OutputFilter.response`.
+    coefficients
+        Squares: N^2 [(deg/h)^2 s], B^2 [(deg/h)^2], K^2 [(deg/h)^2/s], Q^2 [(deg/h s)^2], the variance of G
+        [(deg/h)^2], W^2 as N^2; in the order of the names.
+    density
+        Of the model at each row [(deg/h)^2/Hz].
+    loss
+        Negative logarithm of the likelihood, up to a constant of the data.
+    constants, covariance
+        Of the columns, by generalised least squares.
+    used
+        Rows that the fit stands on.
+    """
+
+    terms: Terms
+    filter: OutputFilter
+    log_corner: float
+    coefficients: FloatArray
+    density: FloatArray
+    loss: float
+    constants: FloatArray
+    covariance: FloatArray
+    used: NDArray[np.bool_]
+
+    def __getitem__(self, name: str) -> float:
+        """The coefficient of a term, 0 if the model has none."""
+        names = self.terms.names
+        return float(self.coefficients[names.index(name)]) if name in names else 0.0
+
+    @property
+    def free(self) -> int:
+        """Number of fitted constants: terms in use and the corner."""
+        extra = int(self.filter.free) + int(self.terms.correlation_s is not None)
+        return int(np.count_nonzero(self.coefficients)) + extra
+
+
+class SpectrumModel:
+    """A family of densities at the rows of a spectrum.
+
+    Parameters
+    ----------
+    spectrum
+        The data.
+    terms, output_filter
+        The family.
+    used
+        Rows that count; all if None.
+    """
+
+    def __init__(
+        self,
+        spectrum: Spectrum,
+        terms: Terms,
+        output_filter: OutputFilter = NO_FILTER,
+        used: NDArray[np.bool_] | None = None,
+    ) -> None:
+        self.spectrum, self.terms, self.filter = spectrum, terms, output_filter
+        rows = len(spectrum.power)
+        self.used = np.ones(rows, dtype=np.bool_) if used is None else used
+        self._single = len(spectrum.values)
+        self._cycles = spectrum.frequency_hz * spectrum.sample_s
+        shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, terms)
+        self._before = [i for i, name in enumerate(terms.names) if name not in AFTER]
+        after = [i for i, name in enumerate(terms.names) if name in AFTER]
+        self._ends = [i for i, name in enumerate(terms.names) if name == "E"]
+        self._shapes, self._end_shapes = shapes[..., self._before], shapes[..., self._ends]
+        self._design = np.empty((rows, len(terms.names)))
+        self._design[:, after] = shapes[..., after].mean(axis=1)
+        freedom = spectrum.count
+        if output_filter.kind == "mean":
+            # A row with a zero of the response stands on fewer coefficients.
+            gain = output_filter.response(self._cycles, 0.0)[0]
+            freedom = freedom * gain.mean(axis=1) ** 2 / np.mean(gain**2, axis=1)
+        self.freedom = np.where(self.used, freedom, 0.0)
+
+    def design(self, log_corner: float) -> tuple[FloatArray, FloatArray | None]:
+        """Density of each term of coefficient 1, shape (rows, terms); slopes of those over the corner."""
+        if self.filter.kind == "none":
+            self._design[:, self._before] = self._shapes.mean(axis=1)
+            return self._design.copy(), None
+        gain, slope = self.filter.response(self._cycles, log_corner)
+        design = self._design.copy()
+        design[:, self._before] = (self._shapes * gain[..., None]).mean(axis=1)
+        # Only where the filter lets next to nothing pass do the ends count.
+        design[:, self._ends] = (self._end_shapes * ((1.0 - gain) ** 2)[..., None]).mean(axis=1)
+        if not self.filter.free:
+            return design, None
+        slopes = np.zeros_like(design)
+        slopes[:, self._before] = (self._shapes * slope[..., None]).mean(axis=1)
+        return design, slopes
+
+    def fit(
+        self,
+        start: SpectrumFit | None = None,
+        log_corner: float = 0.0,
+        held: tuple[int, float] | None = None,
+        excess: float = 0.0,
+    ) -> SpectrumFit:
+        """The model of greatest likelihood, by Fisher scoring with coefficients that are not negative.
+
+        Parameters
+        ----------
+        start
+            A fit of this family to begin with.
+        log_corner
+            Where there is none: the corner to begin with.
+        held
+            A term that is held at a coefficient.
+        excess
+            Variance of the rows' relative errors beyond what chance explains.
+        """
+        from scipy.optimize import nnls
+
+        freedom = self.freedom / (1.0 + 0.5 * self.freedom * excess)
+        corner = start.log_corner if start is not None else log_corner
+        design, slopes = self.design(corner)
+        terms = design.shape[1]
+        free = [j for j in range(terms) if held is None or j != held[0]]
+        coefficients = np.zeros(terms) if start is None else start.coefficients.copy()
+        if held is not None:
+            coefficients[held[0]] = held[1]
+        density = design @ coefficients if start is not None else self._smoothed()
+        begun = start is not None and bool(np.all(density[self.used] > 0.0))
+        if not begun:
+            density = self._smoothed()
+        told = self._told(density, freedom)
+        loss = told[0] if begun else np.inf
+        for _ in range(_ITERATIONS):
+            power = told[1]
+            weight = np.sqrt(0.5 * freedom) / np.where(self.used, density, 1.0)
+            columns = design[:, free]
+            if slopes is not None:
+                along = slopes @ coefficients if np.any(coefficients) else np.zeros(len(power))
+                columns = np.column_stack((columns, along, -along))
+            target = power if held is None else power - design[:, held[0]] * held[1]
+            scaled = columns * weight[:, None]
+            norms = np.linalg.norm(scaled, axis=0)
+            norms[norms == 0.0] = 1.0
+            table = np.column_stack((scaled / norms, target * weight))
+            triangle = np.asarray(np.linalg.qr(table, mode="r"))
+            found = nnls(triangle[:, :-1], triangle[:, -1])[0] / norms
+            proposed = coefficients.copy()
+            proposed[free] = found[: len(free)]
+            moved = 0.0
+            if slopes is not None:
+                moved = float(np.clip(found[-2] - found[-1], -1.0, 1.0))
+            step, better = 1.0, False
+            while step > 1e-3:
+                new_corner = corner + step * moved
+                new_design, new_slopes = self.design(new_corner) if slopes is not None else (design, None)
+                mixed = proposed if not np.isfinite(loss) else coefficients + step * (proposed - coefficients)
+                new_density = new_design @ mixed
+                if np.all(new_density[self.used] > 0.0):
+                    new_told = self._told(new_density, freedom)
+                    if new_told[0] <= loss:
+                        better = True
+                        break
+                step *= 0.5
+            if not better:
+                break
+            gained = loss - new_told[0]
+            corner, design, slopes, coefficients = new_corner, new_design, new_slopes, mixed
+            density, told, loss = new_density, new_told, new_told[0]
+            if gained <= _TOLERANCE * (1.0 + abs(loss)):
+                break
+        return SpectrumFit(
+            self.terms, self.filter, corner, coefficients, density, float(loss), told[2], told[3], self.used
+        )
+
+    def scanned(self, corners: FloatArray) -> SpectrumFit:
+        """The best of fits that begin with several corners, told by few rounds each."""
+        fits = [self.fit(log_corner=float(c)) for c in corners]
+        return min(fits, key=lambda fit: fit.loss)
+
+    def _smoothed(self) -> FloatArray:
+        """Power of the rows about each, for first weights."""
+        frequency = np.log2(self.spectrum.frequency_hz[:, 0])
+        order = np.argsort(frequency, kind="stable")
+        rising = frequency[order]
+        low = np.searchsorted(rising, rising - 0.5)
+        high = np.searchsorted(rising, rising + 0.5, side="right")
+        freedom = np.maximum(self.freedom[order], 1e-9)
+        sums = np.concatenate(([0.0], np.cumsum(freedom)))
+        means = np.concatenate(([0.0], np.cumsum(freedom * self.spectrum.power[order])))
+        smooth = np.empty(len(order))
+        smooth[order] = (means[high] - means[low]) / (sums[high] - sums[low])
+        least = max(float(smooth.max()) * 1e-30, 1e-300)
+        return np.maximum(smooth, least)
+
+    def _told(
+        self, density: FloatArray, freedom: FloatArray
+    ) -> tuple[float, FloatArray, FloatArray, FloatArray]:
+        """Loss, power with what the columns take, constants and their covariance."""
+        s = self.spectrum
+        power = s.power
+        constants, covariance = np.empty(0), np.empty((0, 0))
+        loss = 0.0
+        if s.columns.shape[1]:
+            weight = np.where(self.used, 1.0 / density, 0.0)[: self._single]
+            weighed = s.columns * weight[:, None]
+            information = weighed.T @ s.columns
+            size = np.sqrt(np.maximum(np.diag(information), 1e-300))
+            values, vectors = np.linalg.eigh(information / np.outer(size, size))
+            kept = values > 1e-10 * max(float(values[-1]), 1e-300)
+            root = (vectors[:, kept] / np.sqrt(values[kept])) / size[:, None]
+            covariance = root @ root.T
+            constants = covariance @ (weighed.T @ s.values)
+            rest = s.values - s.columns @ constants
+            taken = np.sum((s.columns @ root) ** 2, axis=1)
+            power = power.copy()
+            power[: self._single] = rest**2 + taken
+            square = rest**2
+            loss += 0.5 * float(np.sum(np.log(values[kept])) + 2.0 * np.sum(np.log(size)))
+        else:
+            square = s.values**2
+        low = self.used[: self._single]
+        with np.errstate(divide="ignore"):
+            alone = density[: self._single][low]
+            loss += 0.5 * float(np.sum(np.log(alone) + square[low] / alone))
+            high = self.used.copy()
+            high[: self._single] = False
+            ratio = np.maximum(s.power[high], 1e-300) / density[high]
+            loss += 0.5 * float(freedom[high] @ (ratio - 1.0 - np.log(ratio)))
+        return loss, power, constants, covariance
+
+
+def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: Terms) -> FloatArray:
+    """Sampled one-sided density of each term of coefficient 1, shape of frequencies and (terms,).
+
+    Samples are means over the sample interval, as a gyro's are: what lies above half the sampling rate
+    folds back, ``sum_j S(f + j/T) sinc^2`` in closed form (Hurwitz' zeta function).
+    """
+    from scipy.special import zeta
+
+    x = frequency_hz * sample_s
+    sine = np.sin(np.pi * x) ** 2 / np.pi**2
+    columns = []
+    for name in terms.names:
+        if name in ("N", "W"):
+            columns.append(np.full_like(x, 2.0))
+        elif name == "B":
+            columns.append(sine * sample_s / np.pi * (zeta(3.0, x) + zeta(3.0, 1.0 - x)))
+        elif name == "K":
+            folded = zeta(4.0, x) + zeta(4.0, 1.0 - x)
+            columns.append(sine * sample_s**2 / (2.0 * np.pi**2) * folded)
+        elif name == "Q":
+            columns.append(8.0 / sample_s * np.pi**2 * sine)
+        elif name == "E":
+            columns.append((np.pi**2 * sine) ** -2.0)
+        else:
+            tau = float(terms.correlation_s or 0.0)
+            columns.append(4.0 * tau / (1.0 + (2.0 * np.pi * frequency_hz * tau) ** 2))
+    return np.stack(columns, axis=-1)
+
+
+def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, NDArray[np.intp]]:
+    """Standard normal errors of the rows that many coefficients stand behind, and which rows.
+
+    Cube roots of chi-square values are nearly normal (E. B. Wilson and M. M. Hilferty, PNAS 17 (1931) 684).
+    """
+    rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
+    scale = 2.0 / (9.0 * model.freedom[rows])
+    ratio = model.spectrum.power[rows] / fit.density[rows]
+    return (np.cbrt(ratio) - (1.0 - scale)) / np.sqrt(scale), rows
+
+
+def excess_of(model: SpectrumModel, fit: SpectrumFit) -> float:
+    """Variance of the rows' relative errors beyond chance (Mandel and Paule, 1970)."""
+    errors, rows = relative_errors(model, fit)
+    free = len(rows) - fit.free
+    if free <= 0 or float(errors @ errors) <= free:
+        return 0.0
+    relative = np.minimum(np.abs(model.spectrum.power[rows] / fit.density[rows] - 1.0), 1.0) ** 2
+    chance = 2.0 / model.freedom[rows]
+    low, high = 0.0, 4.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if np.sum(relative / (chance + middle)) > free else (low, middle)
+    return high

@@ -1,0 +1,30 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from fogml.signals.stationarity import stationarity
+
+
+def test_steady_noise_of_any_colour_passes():
+    rng = np.random.default_rng(1)
+    chances = []
+    for _ in range(40):
+        white = rng.normal(size=12_000)
+        coloured = lfilter([0.1], [1.0, -0.9], white)
+        chances += [stationarity([y], 0.1).p_value for y in (white, coloured)]
+    assert min(chances) > 1e-3
+    assert np.mean(np.array(chances) < 0.1) < 0.15
+
+
+def test_noise_that_grows_is_seen_with_its_size():
+    rng = np.random.default_rng(2)
+    growing = rng.normal(size=12_000) * np.repeat([1.0, 1.0, 1.5], 4000)
+    found = stationarity([growing], 0.1)
+    assert found.p_value < 1e-3
+    assert found.thirds[2] / found.thirds[0] == pytest.approx(1.5, rel=0.15)
+
+
+def test_too_short_to_tell():
+    assert stationarity([np.arange(20.0)], 1.0).tau_s is None
