@@ -103,8 +103,8 @@ def noise_report(
     for other in series[1:]:
         if abs(other.new_s / first.new_s - 1.0) > SAME_INTERVAL:
             raise InputError(
-                f"{other.run.name}: new values {other.new_s:g} s apart, in {first.run.name} {first.new_s:g} s: "
-                "runs can share noise terms only at one sample interval; give them one by one"
+                f"{other.run.name}: new values {other.new_s:g} s apart, in {first.run.name} {first.new_s:g} "
+                "s: runs can share noise terms only at one sample interval; give them one by one"
             )
     values, segments = _joined(series)
 
@@ -282,13 +282,15 @@ def _words(terms: NoiseTerms, series: _Series, runs: Sequence[Run]) -> list[str]
     if told is not None and told["kind"] == "other":
         words.append(
             f"Above {told['above_hz']:.3g} Hz the spectrum has a form of its own (a filter, a dither, a "
-            f"resonance): it is left out, and the terms hold for averaging times from {terms.holds_from_s:.3g} s on."
+            f"resonance): it is left out, and the terms hold for averaging "
+            f"times from {terms.holds_from_s:.3g} s on."
         )
     elif told is not None:
         corner = f" at {told['corner_hz']:.3g} Hz" if told["corner_hz"] else ""
         words.append(
             f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the "
-            f"filter, and the Allan deviation shows them from {max(terms.holds_from_s, series.new_s):.3g} s on."
+            f"filter, and the Allan deviation "
+            f"shows them from {max(terms.holds_from_s, series.new_s):.3g} s on."
         )
     gaps = _gaps(runs)
     if gaps["count"]:
@@ -321,7 +323,8 @@ def _doubts(
                 "code": "not_stationary",
                 "message": (
                     f"The noise changes during the run: its size at {steady.tau_s:.3g} s in the three "
-                    f"thirds is {thirds} of the whole run's (p = {steady.p_value:.1g}). The terms are means over it."
+                    f"thirds is {thirds} of the whole run's (p = {steady.p_value:.1g}). "
+                    "The terms are means over it."
                 ),
             }
         )
