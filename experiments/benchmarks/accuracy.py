@@ -66,7 +66,7 @@ def judged(case: Case, made: Mapping[str, DriftModel]) -> list[Row]:
         # A unit's constant is new at every power-on, and no model of temperature can know it.
         floor = float(noise.std())
     else:
-        floor = floor_of_run(run, used, run.error_deg_h, case.averaging_s)
+        floor = floor_of_run(run, used, run.error_deg_h, case.averaging_s).value
     rows = []
     for label, model in made.items():
         constant = 0.0

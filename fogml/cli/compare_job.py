@@ -11,7 +11,7 @@ from pydantic import field_validator
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import LimitSettings
 from fogml.cli.terminal import Terminal, number
-from fogml.cli.train_job import check_settings
+from fogml.cli.train_job import check_settings, noise_run
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
@@ -25,7 +25,7 @@ _OWN_CHOICE = ("auto", "polynomial", "rbf")
 class CompareSettings(LimitSettings):
     """Settings of ``fogml compare``."""
 
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test", "noise")
     runs: list[str] = []
     test: list[str] = []
     leave_one_out: bool = False
@@ -89,6 +89,7 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
     test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else None
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *(test_runs or []))])
+    noise = noise_run(settings, terminal)
     fits = len(makers) * (1 if test_runs is not None else len(train_runs) + 1)
     with terminal.work("comparing", total=fits) as work:
         begun: list[str] = []
@@ -106,6 +107,7 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
             limits=settings.limits,
             turn_on_band=settings.turn_on_band,
             any_unit=settings.any_unit,
+            noise=noise,
             step=step,
         )
     if settings.strict:

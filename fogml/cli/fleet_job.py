@@ -29,7 +29,7 @@ _SHOWN = 40
 class FleetSettings(LimitSettings):
     """Settings of ``fogml fleet``."""
 
-    path_keys: ClassVar[tuple[str, ...]] = ("manifest", "prior")
+    path_keys: ClassVar[tuple[str, ...]] = ("manifest", "prior", "noise")
     manifest: str | None = None
     model: str = "auto"
     features: str | None = None

@@ -45,6 +45,7 @@ class UnitWork:
             TrainSettings,
             check_settings,
             fit_and_judge,
+            noise_run,
             split_runs,
             write_results,
         )
@@ -71,6 +72,7 @@ class UnitWork:
                     design_index=settings.design_index,
                     limits=settings.limits,
                     any_unit=settings.any_unit,
+                    noise=noise_run(settings, terminal),
                 )
             write_results(staging, settings, model, judgement, terminal)
         return {**_told(judgement), "constants": self._constants(train_runs), "parameters": _count(model)}

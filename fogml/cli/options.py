@@ -30,6 +30,10 @@ AnyUnit = Annotated[
 Averaging = Annotated[
     float | None, typer.Option("--averaging", metavar="SECONDS", help="Averaging time of the figures (100).")
 ]
+Noise = Annotated[
+    str | None,
+    typer.Option("--noise", metavar="RUN", help="Static run of the unit: its noise makes the floor."),
+]
 Features = Annotated[str | None, typer.Option("--features", help='Feature text, e.g. "T, dT, T*dT".')]
 DesignIndex = Annotated[
     float | None,

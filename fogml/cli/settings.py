@@ -118,6 +118,7 @@ class LimitSettings(Settings):
     design_index: float | None = None
     limits: dict[str, float] = {}
     turn_on_band: float | None = None
+    noise: str | None = None
 
     @field_validator("limits", mode="before")
     @classmethod

@@ -33,6 +33,7 @@ def train(
         ),
     ] = None,
     averaging: options.Averaging = None,
+    noise: options.Noise = None,
     navigation: Annotated[
         float | None,
         typer.Option("--navigation", metavar="LATITUDE", help="Show what the drift costs a navigator there."),
@@ -66,6 +67,7 @@ def train(
             "turn_on_band": turn_on_band,
             "train_again": train_again,
             "averaging": averaging,
+            "noise": noise,
             "navigation": navigation,
             "repair": repair,
             "strict": strict,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -17,7 +18,7 @@ from fogml.runs.run import Run
 from fogml.validation.judge import judge
 from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.report_json import judgement_json
-from fogml.validation.results import Judgement
+from fogml.validation.results import Judgement, RunJudgement
 from fogml.validation.strict import hold_strict
 from fogml.validation.turn_on import check_turn_on_band
 
@@ -29,7 +30,7 @@ if TYPE_CHECKING:
 class TrainSettings(LimitSettings):
     """Settings of ``fogml train``."""
 
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test", "noise")
     runs: list[str] = []
     test: list[str] = []
     model: str = "auto"
@@ -102,6 +103,17 @@ def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], 
     return train_runs, test_runs
 
 
+def noise_run(settings: LimitSettings, terminal: Terminal) -> Run | None:
+    """The static run that makes the floor, read and checked; None where none is named."""
+    if settings.noise is None:
+        return None
+    from fogml.validation.floors import check_noise_run
+
+    (run,) = open_runs([settings.noise], terminal)
+    check_noise_run(run)
+    return run
+
+
 def _seen_before(train_runs: list[Run], test_runs: list[Run]) -> list[str]:
     """A note for each test run that is a training run too."""
     return [
@@ -119,6 +131,7 @@ def fit_and_judge(
     from fogml.models.names import make_model
 
     notes = _seen_before(train_runs, test_runs)
+    noise = noise_run(settings, terminal)
     with terminal.work(f"fitting {settings.model}") as work:
         if settings.train_again:
             from fogml.validation.index_search import train_until_index
@@ -150,6 +163,7 @@ def fit_and_judge(
             turn_on_band=settings.turn_on_band,
             any_unit=settings.any_unit,
             notes=notes,
+            noise=noise,
         )
     if settings.strict:
         hold_strict([(run.run, run.findings) for run in judgement.test])
@@ -194,6 +208,15 @@ def _report(settings: TrainSettings, judgement: Judgement) -> dict[str, Any]:
     return values
 
 
+def floor_words(run: RunJudgement, number: Callable[[float], str]) -> str:
+    """A run's floor with its interval."""
+    told = number(run.floor)
+    if run.floor_ci90 is None:
+        return told
+    low, high = run.floor_ci90
+    return f"{told} ({number(low)} to {number(high)})"
+
+
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
     from fogml.report.words import label, unit_of
@@ -203,7 +226,7 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         for when, figures in (("before", run.before), ("after", run.after)):
             values = (figures.bias, figures.bias_stability, figures.range, figures.rms)
             rows.append([f"{run.run} {when}", *(number(value) for value in values)])
-        rows.append([f"{run.run} noise floor", "–", number(run.floor), "–", "–"])
+        rows.append([f"{run.run} noise floor", "–", floor_words(run, number), "–", "–"])
     averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)

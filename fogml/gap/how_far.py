@@ -14,7 +14,7 @@ from fogml.gap.noise import Noise
 from fogml.gap.observation import Observation
 from fogml.gap.result import HowFar
 from fogml.runs.run import FloatArray
-from fogml.signals.noise_expectation import expected_mean_square, mean_square_draws
+from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
 
 AVERAGING_S = 100.0
 DRAWS, NOISES, CHOICES = 40, 200, 4000
@@ -95,11 +95,13 @@ def how_far(
 
     squares = {name: _mean_square(gap(f)) for name, f in (("rec", recalibrated), ("after", after))}
     before = _mean_square(gap(means))
-    floor = float(expected_mean_square(noise.fit.model, windows.time, windows.window_s))
+    floor = float(floor_square(noise.fit.model, windows.time, windows.window_s))
     floors, noises = _floors(windows, noise, rng)
     closed, interval, note = None, None, ""
     denominator = squares["rec"] - floor
-    if denominator <= _Z90 * np.std(noises):
+    # The gap keeps its mean, which noise alone moves too.
+    alone = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
+    if squares["rec"] - alone <= _Z90 * np.std(noises):
         note = "the recalibrated twin is at the floor within its noise: nothing left to close"
     else:
         closed = (squares["rec"] - squares["after"]) / denominator
@@ -133,8 +135,9 @@ def _mean_square(values: FloatArray) -> float:
 
 
 def _floors(windows: Averages, noise: Noise, rng: np.random.Generator) -> tuple[FloatArray, FloatArray]:
-    """Expected mean squares of the noise, as uncertain as its coefficients, and those of one run each."""
+    """Squares of floors, as uncertain as the noise is, and mean squares of one run's noise each."""
     models = noise.fit.draw(rng, NOISES)
     expected = np.array([expected_mean_square(m, windows.time, windows.window_s) for m in models])
+    floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
     drawn = mean_square_draws(noise.fit.model, windows.time, windows.window_s, NOISES, rng)
-    return expected, expected * drawn / drawn.mean()
+    return floors, expected * drawn / drawn.mean()

@@ -24,7 +24,7 @@ from fogml.gap.result import (
 )
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.search import Search
-from fogml.signals.noise_expectation import expected_mean_square
+from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness
 
 if TYPE_CHECKING:
@@ -142,7 +142,7 @@ def _series(p: Prepared, o: Observation, role: str, after: Fit) -> RunSeries:
         gap_before=windows.of(o.recorded - replays["before"]),
         gap_recalibrated=windows.of(o.recorded - replays["recalibrated"]),
         gap_after=windows.of(o.recorded - replays["after"]),
-        floor=expected_mean_square(p.noise.fit.model, windows.time, windows.window_s) ** 0.5,
+        floor=floor_square(p.noise.fit.model, windows.time, windows.window_s) ** 0.5,
         gyro=o.run.facts.unit,
         axis=o.run.facts.axis,
         note=o.run.facts.notes or "",

@@ -7,6 +7,7 @@ from typing import Any
 
 from fogml.report.tables import reference_of
 from fogml.report.words import averages, label, listed, number, percent, plural, stated, unit_of
+from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 SEEN = "seen_in_training"
@@ -68,6 +69,14 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
     before, after = number(worst.before.bias_stability), number(worst.after.bias_stability)
     over = averages(worst.averaging_s)
     floor = f"the noise floor is {number(worst.floor)} deg/h"
+    if worst.floor_ci90 is not None:
+        low, high = worst.floor_ci90
+        floor += f" ({number(low)} to {number(high)}, from {worst.floor_source})"
+    own = (
+        "What is left is the gyro's own noise, as far as these averages tell."
+        if left_is_noise(worst)
+        else "What is left is not the gyro's own noise alone."
+    )
     if kind in ("none", "mean"):
         left = f"{where} nothing is compensated"
         if kind == "mean":
@@ -85,7 +94,7 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
         did = f"leaves {after} deg/h of {before} deg/h (bias stability, {over})"
     sentence = f"{where} the {kind} model {did}; {floor}."
     harmed = [run.run for run in judgement.test if not improves(run)]
-    return [sentence, f"It makes {listed(harmed)} worse."] if harmed else [sentence]
+    return [sentence, own, *([f"It makes {listed(harmed)} worse."] if harmed else [])]
 
 
 def _bias(worst: RunJudgement) -> list[str]:

@@ -1,7 +1,19 @@
-"""The noise that stays in averages, told from the fast part of a series and not from its drift."""
+"""The noise floor: what a gyro's own noise leaves in averages, drift apart.
+
+Defined once, for every command: the expected standard deviation of the consecutive averages over the
+averaging time about their mean, under the noise model with white noise, flicker, quantisation and, where no
+drift can be mistaken for it, random walk. With the one-sided density S of the averages' input and M windows
+of T::
+
+    floor^2 = integral of S(f) sinc^2(f T) (1 - (sin(pi f M T) / (M sin(pi f T)))^2) df
+
+so that slow noise counts as far as it moves averages within a run, and not by the mean that is taken off.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from itertools import chain, combinations
 
 import numpy as np
@@ -9,63 +21,97 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
 from fogml.signals.allan import Segments, segment_bounds
-from fogml.signals.allan_fit import deviance, greatest_likelihood
 from fogml.signals.averages import block_averages
+from fogml.signals.noise_spectrum import spectrum_of
+from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, Terms, term_shapes
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
+Columns = Callable[[NDArray[np.int64]], FloatArray]
 
-_LONGEST_SHARE = 4
-"""The longest sub-average is the averaging time over this."""
-_OCTAVES = 5
-"""Sub-averages looked at: the longest, and halves of it."""
-_FEWEST = 20
-"""Independent differences that a sub-average needs to be looked at."""
-_BLOCKS = 32
-"""Blocks of time whose mean squares are compared, fewer where little is independent."""
-_PER_BLOCK = 10.0
-"""Independent differences that a block needs."""
-_LOUD = 4.0
-"""Blocks with more than this many times the median mean square are left out."""
-_CLIP = 25.0
-"""Squared differences above this many times the median mean square count as that much."""
-_FREEDOM = 0.5
-"""Degrees of freedom per independent sub-average: the least over noise types and strides."""
-_PENALTY = 4.0
-"""Deviance that a term must take away to be taken in."""
+LEVEL = 0.9
+"""Coverage of a floor's interval."""
+Z90 = 1.6448536269514722
+PER_WINDOW = 20
+"""Half periods in an averaging time of the fastest noise that is looked at: a faster one, an output filter, a
+dither or repeated values do not matter to the averages, and do not enter."""
 _SPIKE = 8.0
-"""A sample further than this many standard deviations from its neighbours' mean is a spike."""
+"""A sample, or a step of the sub-averages, further than this many standard deviations is no noise."""
+_BLOCKS, _LOUD = 32, 4.0
+"""Blocks of time, and the multiple of their median mean square from which one is left out."""
+_LIGHT = 1e-4
+"""Weight below which a model no longer counts."""
+_LEAST = 8
+"""Steps between means that tell a typical one."""
+_FEWEST = 64
+"""Coefficients of slow noise that are enough to leave the fast ones out."""
+_DRIFT = ("K", "D")
+"""Terms that drift makes: densities that fall with the second and fourth power of frequency."""
+
+
+@dataclass(frozen=True)
+class Floor:
+    """A noise floor with its interval, in the unit of the data.
+
+    Attributes
+    ----------
+    value, lower, upper
+        The floor and its 90 % interval.
+    source
+        Where the noise comes from.
+    """
+
+    value: float
+    lower: float
+    upper: float
+    source: str = "the run itself"
+
+
+@dataclass(frozen=True)
+class FloorModel:
+    """Noise models of a run, by their weights, which give a floor at the windows of any run."""
+
+    fits: tuple[tuple[SpectrumModel, SpectrumFit], ...]
+    weights: FloatArray
+    sample_s: float
+    counted: tuple[str, ...]
+
+    def floor(self, averaging_s: float, windows: int, source: str = "the run itself") -> Floor:
+        """The floor of so many windows over an averaging time."""
+        squares, errors = [], []
+        for model, fit in self.fits:
+            share = np.array(
+                [
+                    averages_variance(name, self.sample_s, averaging_s, windows)
+                    if name in self.counted
+                    else 0.0
+                    for name in fit.terms.names
+                ]
+            )
+            squares.append(float(share @ fit.coefficients))
+            errors.append(float(share @ _covariance(model, fit) @ share))
+        square = float(self.weights @ squares)
+        variance = float(self.weights @ (np.array(errors) + (np.array(squares) - square) ** 2))
+        if square <= 0.0:
+            return Floor(0.0, 0.0, 0.0, source)
+        spread = 0.5 * float(np.sqrt(np.log1p(variance / square**2)))
+        value = float(np.sqrt(square))
+        return Floor(value, value * float(np.exp(-Z90 * spread)), value * float(np.exp(Z90 * spread)), source)
 
 
 def noise_floor(
-    y: ArrayLike, sample_s: float, averaging_s: float, *, segments: Segments | None = None
-) -> float:
-    """Standard deviation of the noise in averages over `averaging_s`, in the unit of y.
+    y: ArrayLike,
+    sample_s: float,
+    averaging_s: float,
+    *,
+    segments: Segments | None = None,
+    columns: Columns | None = None,
+    drifts: bool = True,
+) -> Floor:
+    """The noise floor of averages of a series, drift kept out.
 
-    Sub-averages over 1/4, 1/8, ... 1/64 of the averaging time, or of what the stretches hold,
-    are differenced twice, which takes away a constant and a steady drift (the Hadamard
-    variance). Their mean squares are those of up to 32 blocks of time, without blocks of more
-    than 4 times the median and with single differences held to 5 standard deviations; spikes
-    of 8 standard deviations take their neighbours' mean. So steps, bursts, spikes and the
-    corners of a ramp do not count, while quantised data do. To the mean squares the local
-    noise model
-
-        ``h(tau) = 10/3 Q^2/tau^2 + N^2/tau + ln(256/27)/(2 pi) B^2 + D^2 tau^4``
-
-    is fitted: quantisation of the angle, white, flicker and the curvature of the drift; each of
-    Q, B and D only where it takes away a deviance of 4. The floor is then
-
-        ``floor^2 = 2 Q^2/T^2 + N^2/T + 2 ln 2/pi B^2`` at T, the averaging time
-
-    The drift's part D is left out. For flicker, whose averages wander without bound, this is its
-    Allan variance at T. The floor never exceeds the Hadamard deviation at T itself by more than
-    two standard errors, which holds for noise of another kind, such as a dither's.
-
-    On white noise the bias is under 1 %; the scatter is 0.5 % for 36,000 samples and 6 % for 2,200
-    in averages of 100, with one in some twenty runs 5 to 10 % too high for flicker by chance.
-    Flicker too weak to be told from white noise at a quarter of the averaging time is missed,
-    and the floor is then too low, by a tenth at most. Noise that rises faster than flicker
-    towards long times (rate random walk) counts as drift.
+    The density up to ten cycles in an averaging time is fitted by white noise, quantisation and flicker, and
+    beside them by what a drift makes; flicker is weighed by its evidence, so that nothing hangs on a hard choice and the floor moves with its data.
 
     Parameters
     ----------
@@ -77,11 +123,21 @@ def noise_floor(
         Averaging time [s].
     segments
         Parts of y between gaps, as slices or (start, stop); by default all of y is one.
+    columns
+        What a drift follows, slow: gives them at rows of y, shape (rows, p); their constants are integrated
+        out.
+    drifts
+        Whether noise that rises like a random walk counts as drift; for a static run it is the gyro's own.
 
     Raises
     ------
     InputError
         If a time is not positive, values are not finite, or no segment has three samples.
+
+    Notes
+    -----
+    Spikes, steps and loud bursts are left out. Flicker that the run does not tell from white noise is
+    missed in part, and the interval says so.
     """
     values = np.asarray(y, dtype=np.float64)
     if not (sample_s > 0 and averaging_s > 0 and np.isfinite(sample_s) and np.isfinite(averaging_s)):
@@ -92,22 +148,90 @@ def noise_floor(
     longest = int((stops - starts).max(initial=0))
     if longest < 3:
         raise InputError(f"noise floor: three samples in a row are needed, the longest stretch has {longest}")
-    mean = values.mean()
-    if not np.isfinite(mean):
+    if not np.isfinite(values.mean()):
         raise InputError("noise floor: values that are not finite; leave them out first")
-    # About the mean, so that the sums keep their digits.
-    phases = np.concatenate(([0.0], np.cumsum(_without_spikes(values - mean))))
-    averaged = max(averaging_s / sample_s, 1.0)
-    factors, squares, independent = _hadamard(phases, starts, stops, averaged)
-    seen = squares > 0
-    if not np.any(seen):
-        return 0.0
-    variance = _extrapolated(factors[seen], squares[seen], independent[seen], averaged)
-    whole = _difference_square(phases, starts, stops, round(averaged))
-    if whole is not None and whole[1] >= _FEWEST:
-        # Two standard errors of room, so that the bound does not bite by chance.
-        variance = min(variance, whole[0] * (1.0 + 2.0 * np.sqrt(2.0 / (_FREEDOM * whole[1]))))
-    return float(np.sqrt(variance))
+    windows = max(int(np.sum(stops - starts) * sample_s / averaging_s), 2)
+    model = floor_model(values, sample_s, averaging_s, starts, stops, columns, drifts=drifts)
+    return Floor(0.0, 0.0, 0.0) if model is None else model.floor(averaging_s, windows)
+
+
+def floor_model(
+    values: FloatArray,
+    sample_s: float,
+    averaging_s: float,
+    starts: IntArray,
+    stops: IntArray,
+    columns: Columns | None = None,
+    *,
+    drifts: bool = True,
+) -> FloorModel | None:
+    """The noise models behind a floor; None where there is no noise. Parameters as in `noise_floor`."""
+    parts = _quiet(values, starts, stops, max(int(averaging_s / sample_s / PER_WINDOW), 1))
+    stretches = [_without_spikes(values[a:b]) for a, b in parts]
+    if all(np.ptp(part) == 0.0 for part in stretches):
+        return None
+    tables = None if columns is None else [columns(np.arange(a, b)) for a, b in parts]
+    spectrum = spectrum_of(stretches, sample_s, tables)
+    if not np.any(spectrum.power > 0.0):
+        return None
+    # Faster noise does not matter to the averages; but short runs need all that they have.
+    slow = spectrum.frequency_hz[:, -1] < 0.5 * PER_WINDOW / averaging_s
+    if float(spectrum.count[slow].sum()) < _FEWEST:
+        slow = np.ones(len(spectrum.power), dtype=np.bool_)
+    kept = slow | (np.arange(len(slow)) < len(spectrum.values))
+    spectrum = replace(
+        spectrum,
+        frequency_hz=spectrum.frequency_hz[kept],
+        power=spectrum.power[kept],
+        count=spectrum.count[kept],
+    )
+    slow = slow[kept]
+    own = ("Q", "B") if drifts else ("Q", "B", "K")
+    beside = _DRIFT if drifts else ()
+    size = 0.5 * float(np.log(max(spectrum.count[slow].sum(), 2.0)))
+    fits: list[tuple[SpectrumModel, SpectrumFit]] = []
+    evidence: list[float] = []
+    for more in _subsets(own):
+        for drift in _subsets(beside):
+            model = SpectrumModel(spectrum, Terms(("N", *more, *drift)), used=slow)
+            fit = model.fit()
+            fits.append((model, fit))
+            evidence.append(-fit.loss - size * (1 + len(more) + len(drift)))
+    weights = np.exp(np.array(evidence) - max(evidence))
+    live = np.flatnonzero(weights > _LIGHT)
+    chosen = weights[live] / weights[live].sum()
+    return FloorModel(tuple(fits[i] for i in live), chosen, sample_s, ("N", *own))
+
+
+def _subsets(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
+    return chain.from_iterable(combinations(names, size) for size in range(len(names) + 1))
+
+
+def averages_variance(name: str, sample_s: float, averaging_s: float, windows: int) -> float:
+    """Expected variance about their mean of so many averages, of a term of coefficient 1.
+
+    Parameters
+    ----------
+    name
+        N, B, K or Q, as in `fogml.signals.spectrum_fit.Terms`.
+    sample_s
+        Interval of the samples that are averaged [s].
+    averaging_s
+        Averaging time [s].
+    windows
+        Consecutive averages.
+    """
+    m = max(averaging_s / sample_s, 1.0)
+    lowest = 1.0 / (50.0 * m * windows)
+    cycles = np.geomspace(lowest, 0.5, int(64 * np.log2(0.5 / lowest)) + 1)
+    density = term_shapes(cycles / sample_s, sample_s, Terms((name,)))[..., 0]
+    sine = np.sin(np.pi * cycles)
+    # Where the grid no longer follows a square, its mean does.
+    one = np.where(m * cycles < 8.0, np.sin(np.pi * m * cycles) ** 2, 0.5) / (m * sine) ** 2
+    all_m = m * windows
+    whole = np.where(all_m * cycles < 8.0, np.sin(np.pi * all_m * cycles) ** 2, 0.5) / (all_m * sine) ** 2
+    response = np.maximum(one - whole, 0.0)
+    return float(np.trapezoid(density * response * cycles / sample_s, np.log(cycles)))
 
 
 def realised_noise_floor(time: ArrayLike, noise: ArrayLike, averaging_s: float) -> float:
@@ -135,49 +259,48 @@ def realised_noise_floor(time: ArrayLike, noise: ArrayLike, averaging_s: float) 
     return float(averages.values[0].std())
 
 
-def _hadamard(
-    phases: FloatArray, starts: IntArray, stops: IntArray, averaged: float
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Sub-averages in samples, their Hadamard variances, and how many are independent."""
-    longest = int((stops - starts).max())
-    top = max(min(int(averaged / _LONGEST_SHARE), longest // 3), 1)
-    rows: list[tuple[float, float, float]] = []
-    for m in sorted({max(top >> octave, 1) for octave in range(_OCTAVES)}):
-        found = _difference_square(phases, starts, stops, m)
-        # The shortest always counts: it may be all that there is.
-        if found is None or (found[1] < _FEWEST and rows):
-            break
-        rows.append((m, *found))
-    columns = np.array(rows).reshape(-1, 3)
-    return columns[:, 0], columns[:, 1], columns[:, 2]
+def _covariance(model: SpectrumModel, fit: SpectrumFit) -> FloatArray:
+    """Covariance of the coefficients by Fisher's information; of drift terms that are zero, none."""
+    design = model.design(fit.log_corner)[0]
+    free = np.array([value > 0.0 or name == "N" for name, value in zip(fit.terms.names, fit.coefficients)])
+    weighed = design[:, free] * (np.sqrt(0.5 * model.freedom) / fit.density)[:, None]
+    size = np.linalg.norm(weighed, axis=0)
+    size[size == 0.0] = 1.0
+    covariance = np.zeros((design.shape[1], design.shape[1]))
+    covariance[np.ix_(free, free)] = np.linalg.pinv((weighed / size).T @ (weighed / size)) / np.outer(
+        size, size
+    )
+    return covariance
 
 
-def _difference_square(
-    phases: FloatArray, starts: IntArray, stops: IntArray, m: int
-) -> tuple[float, float] | None:
-    """Hadamard variance at m samples and how many m-sample averages it stands on, if any."""
-    independent = float(np.sum(np.maximum(stops - starts - 3 * m + 1, 0))) / m
-    stride = max(m // 4, 1)
-    first = [np.arange(a, b - 3 * m + 1, stride) for a, b in zip(starts, stops) if b - a >= 3 * m]
-    if not first:
-        return None
-    i = np.concatenate(first)
-    twice = phases[i + 3 * m] - 3 * phases[i + 2 * m] + 3 * phases[i + m] - phases[i]
-    return _mean_square(twice, independent) / (6.0 * m**2), independent
-
-
-def _mean_square(differences: FloatArray, independent: float) -> float:
-    """Mean square without loud blocks and single outliers."""
-    squares = differences**2
-    blocks = int(np.clip(independent / _PER_BLOCK, 1, min(_BLOCKS, len(squares))))
-    edges = np.linspace(0, len(squares), blocks + 1).astype(np.intp)
-    counts = np.diff(edges)
-    typical = float(np.median(np.add.reduceat(squares, edges[:-1]) / counts))
+def _quiet(values: FloatArray, starts: IntArray, stops: IntArray, width: int) -> list[tuple[int, int]]:
+    """Rows without loud blocks, cut at steps, as told by means of so many samples; gaps stay cuts."""
+    means = [
+        values[a : a + (b - a) // width * width].reshape(-1, width).mean(axis=1)
+        for a, b in zip(starts.tolist(), stops.tolist())
+    ]
+    whole = [(a, b) for a, b in zip(starts.tolist(), stops.tolist()) if b - a >= 3]
+    steps = [np.abs(np.diff(part)) for part in means]
+    count = sum(map(len, steps))
+    typical = float(np.median(np.concatenate(steps))) / 0.6745 if count >= _LEAST else 0.0
     if typical == 0.0:
-        return float(squares.mean())
-    held = np.add.reduceat(np.minimum(squares, _CLIP * typical), edges[:-1])
-    calm = held <= _LOUD * typical * counts
-    return float(held[calm].sum() / counts[calm].sum())
+        return whole
+    block = max(count // _BLOCKS, 4)
+    kept: list[tuple[int, int]] = []
+    for start, stop, step in zip(starts.tolist(), stops.tolist(), steps):
+        bad = np.zeros(len(step), dtype=np.bool_)
+        for first in range(0, len(step), block):
+            inside = np.sort(step[first : first + block])
+            # A block with one step in it is not loud but for that.
+            if float(np.sum(inside[:-1] ** 2)) > _LOUD * typical**2 * len(inside) and len(inside) >= 4:
+                bad[first : first + block] = True
+        bad |= step > _SPIKE * typical
+        edges = np.flatnonzero(np.diff(np.concatenate(([True], bad, [True])).astype(np.int8)))
+        for a, b in zip(edges[::2].tolist(), edges[1::2].tolist()):
+            # Means a to b are quiet; the last goes on to the stretch's end.
+            kept.append((start + a * width, stop if b == len(step) else start + (b + 1) * width))
+    kept = [(a, b) for a, b in kept if b - a >= 3]
+    return kept if sum(b - a for a, b in kept) >= 0.5 * sum(b - a for a, b in whole) else whole
 
 
 def _without_spikes(values: FloatArray) -> FloatArray:
@@ -187,34 +310,10 @@ def _without_spikes(values: FloatArray) -> FloatArray:
     beside = 0.5 * (values[:-2] + values[2:])
     away = values[1:-1] - beside
     # White noise of one unit is 3/2 away in variance.
-    limit = _SPIKE * np.sqrt(_mean_square(away, len(away)) / 1.5)
+    limit = _SPIKE * float(np.median(np.abs(away))) / 0.6745
     lone = (np.abs(away) > limit) & (np.abs(values[2:] - values[:-2]) <= limit)
+    if limit == 0.0 or not np.any(lone):
+        return values
     cleaned = values.copy()
     cleaned[1:-1][lone] = beside[lone]
     return cleaned
-
-
-def _extrapolated(
-    factors: FloatArray, squares: FloatArray, independent: FloatArray, averaged: float
-) -> float:
-    flicker = np.log(256 / 27) / (2 * np.pi)
-    longer = averaged / factors
-    # Scaled so that coefficients are variances of averages over the averaging time.
-    shapes = np.column_stack(
-        (longer, longer**2 * 5 / 3, np.full_like(longer, flicker * np.pi / (2 * np.log(2))), longer**-4)
-    )
-    edf = np.maximum(_FREEDOM * independent, 1.0)
-    # Rarely all at once: white noise always, the others where the data ask for them.
-    others = chain.from_iterable(combinations((1, 2, 3), size) for size in range(4))
-    best: tuple[float, float] | None = None
-    for extra in others:
-        columns = [0, *extra]
-        if len(columns) > len(factors):
-            continue
-        coefficients = greatest_likelihood(shapes[:, columns], squares, edf)
-        lost = deviance(squares, shapes[:, columns] @ coefficients, edf) + _PENALTY * len(extra)
-        variance = float(sum(v for column, v in zip(columns, coefficients) if column != 3))
-        if best is None or lost < best[0]:
-            best = (lost, variance)
-    assert best is not None
-    return best[1]

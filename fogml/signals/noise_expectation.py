@@ -80,6 +80,17 @@ def expected_mean_square(
     return float((np.sum(total) - np.sum(taken**2)) / len(whitener))
 
 
+def floor_square(
+    model: NoiseModel, time: ArrayLike, averaging_s: ArrayLike, *, ladder: Ladder | None = None
+) -> float:
+    """Square of the noise floor of a noise model in given averages, as `fogml.signals.floor` defines it.
+
+    The expected variance of the averages about their mean; parameters as in `expected_mean_square`.
+    """
+    ones = np.ones((len(np.asarray(time)), 1))
+    return expected_mean_square(model, time, averaging_s, fitted=Fitted(ones, ordinary=True), ladder=ladder)
+
+
 def mean_square_draws(
     model: NoiseModel,
     time: ArrayLike,

@@ -30,8 +30,8 @@ class Terms:
     Attributes
     ----------
     names
-        N, B, K, G (Gauss-Markov), filtered; Q, W (white rounding of the output), E (what the ends of a
-        smooth series add to its cosine transform, of no meaning) after the filter.
+        N, B, K, G (Gauss-Markov), D (of the fourth power, a drift's), filtered; after the filter Q, W (white
+        rounding) and E (what a smooth series' ends add to its cosine transform, of no meaning).
     correlation_s
         Correlation time of G [s].
     """
@@ -294,6 +294,8 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: Terms) -> Floa
             columns.append(sine * sample_s**2 / (2.0 * np.pi**2) * folded)
         elif name == "Q":
             columns.append(8.0 / sample_s * np.pi**2 * sine)
+        elif name == "D":
+            columns.append((2.0 * np.pi * frequency_hz) ** -4.0)
         elif name == "E":
             columns.append((np.pi**2 * sine) ** -2.0)
         else:

@@ -41,6 +41,7 @@ def compare(
     limits: Mapping[str, float] | None = None,
     turn_on_band: float | None = None,
     any_unit: bool = False,
+    noise: Run | None = None,
     step: Callable[[str], None] | None = None,
 ) -> Comparison:
     """Fit and judge each model on the same runs, and on the same rows of them.
@@ -56,7 +57,7 @@ def compare(
         What each is fitted on.
     test_runs
         What each is judged on; None: each training run in turn is left out and judged.
-    averaging_s, design_index, limits, turn_on_band, any_unit
+    averaging_s, design_index, limits, turn_on_band, any_unit, noise
         As in :func:`~fogml.validation.judge.judge`.
     step
         Called with a model's name before each of its fits.
@@ -74,7 +75,7 @@ def compare(
     limits = check_limits(limits or {})
     check_design_index(design_index)
     check_turn_on_band(turn_on_band)
-    contest = _Contest(dict(makers), averaging_s, turn_on_band, any_unit, step or (lambda name: None))
+    contest = _Contest(dict(makers), averaging_s, turn_on_band, any_unit, noise, step or (lambda name: None))
     if test_runs is not None:
         judgements = contest.judged(train_runs, test_runs, design_index, limits)
     else:
@@ -103,6 +104,7 @@ class _Contest:
         averaging_s: float,
         turn_on_band: float | None,
         any_unit: bool,
+        noise: Run | None,
         step: Callable[[str], None],
     ) -> None:
         self.makers = makers
@@ -110,6 +112,7 @@ class _Contest:
         self._averaging_s = averaging_s
         self._turn_on_band = turn_on_band
         self._any_unit = any_unit
+        self._noise = noise
         self._step = step
 
     def judged(
@@ -143,6 +146,7 @@ class _Contest:
                     design_index=design_index,
                     limits=limits,
                     turn_on_band=self._turn_on_band,
+                    noise=self._noise,
                 )
             except _REFUSALS as error:
                 self._drop(name, error)

@@ -5,26 +5,107 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+from scipy.signal import lfilter
 
+from fogml.errors import InputError
+from fogml.runs.noise_of_run import moving_temperatures
+from fogml.runs.noise_series import AT_REST_DEG_S
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.signals.floor import noise_floor
+from fogml.signals.floor import Columns, Floor, FloorModel, floor_model
+
+_LAGS_S = (60.0, 300.0, 1200.0, 3600.0)
+"""Time constants of the temperature's lags that a drift may follow [s]: those of coils and housings."""
+_COARSE = 4096
+"""Rows at which the slow temperatures are worked out, at least."""
+_KEPT = "_floor_models"
 
 
-def floor_of_run(run: Run, used: BoolArray, error_deg_h: FloatArray, averaging_s: float) -> float:
-    """Noise left in averages over `averaging_s` [deg/h], from the fast part of an error series.
+def floor_of_run(
+    run: Run, used: BoolArray, error_deg_h: FloatArray, averaging_s: float, noise: Run | None = None
+) -> Floor:
+    """Noise left in averages over `averaging_s` [deg/h], as `fogml.signals.floor` defines it.
 
-    Differences cross neither gaps nor rows that don't count.
+    From a static run where one is given; else from the run's own error, what follows the
+    temperature, its powers and its lags being kept out, and what rises like a random walk too where a
+    temperature moves. Stretches cross neither gaps nor rows that don't count.
 
     Parameters
     ----------
     used
         Rows that count, shape (n,).
     error_deg_h
-        Error of the whole run [deg/h], shape (n,).
+        Error of the whole run before a model [deg/h], shape (n,).
+    noise
+        A static run of the unit.
     """
-    rows = np.flatnonzero(used)
-    broken = np.flatnonzero(np.diff(rows) > 1) + 1
-    gaps = np.searchsorted(rows, run.gap_starts)
-    edges = np.union1d(np.concatenate(([0], broken, gaps)), [len(rows)])
-    segments = [(int(a), int(b)) for a, b in pairwise(edges.tolist())]
-    return float(noise_floor(error_deg_h[used], run.sample_s, averaging_s, segments=segments))
+    windows = max(int(np.count_nonzero(used) * run.sample_s / averaging_s), 2)
+    if noise is not None:
+        still = np.abs(noise.rate) < AT_REST_DEG_S
+        found = _model(noise, still, noise.error_deg_h, averaging_s, static=True)
+        source = f"static run {noise.name}"
+    else:
+        found = _model(run, used, error_deg_h, averaging_s)
+        source = "the run itself"
+    return Floor(0.0, 0.0, 0.0, source) if found is None else found.floor(averaging_s, windows, source)
+
+
+def check_noise_run(noise: Run) -> None:
+    """Refuse a run that can't tell a unit's noise.
+
+    Raises
+    ------
+    InputError
+        If the table turns in it.
+    """
+    if np.any(np.abs(noise.rate) >= AT_REST_DEG_S):
+        raise InputError(f"{noise.name}: the table turns in it; a noise run is a static one")
+
+
+def _model(
+    run: Run, used: BoolArray, error_deg_h: FloatArray, averaging_s: float, *, static: bool = False
+) -> FloorModel | None:
+    """Noise models of a run's error, found once for each averaging time and choice of rows."""
+    kept = run.__dict__.setdefault(_KEPT, {})
+    key = (averaging_s, static, used.tobytes().__hash__())
+    if key not in kept:
+        rows = np.flatnonzero(used)
+        broken = np.flatnonzero(np.diff(rows) > 1) + 1
+        gaps = np.searchsorted(rows, run.gap_starts)
+        edges = np.union1d(np.concatenate(([0], broken, gaps)), [len(rows)])
+        segments = np.array(list(pairwise(edges.tolist())), dtype=np.int64).reshape(-1, 2)
+        long = segments[:, 1] - segments[:, 0] >= 3
+        if not np.any(long):
+            raise InputError(f"{run.name}: no three samples in a row count; a noise floor needs more")
+        starts, stops = segments[long].T
+        moves = bool(moving_temperatures(run))
+        columns = _thermal(run, rows) if moves else None
+        # Without a temperature nobody knows whether a slow change is the gyro's own.
+        drifts = moves or (not static and not run.temperature_columns)
+        kept[key] = floor_model(
+            error_deg_h[used], run.sample_s, averaging_s, starts, stops, columns, drifts=drifts
+        )
+    found: FloorModel | None = kept[key]
+    return found
+
+
+def _thermal(run: Run, rows: np.ndarray) -> Columns:
+    """What a drift may follow: temperature, its powers, its lags, and products with its rate."""
+    temperature = run.temperature("T")
+    width = max(len(run) // _COARSE // 2, 1)
+    at = np.arange(0, len(run), width)
+    coarse = np.add.reduceat(temperature, at) / np.diff(np.append(at, len(run)))
+    time = np.add.reduceat(run.time, at) / np.diff(np.append(at, len(run)))
+    scale = float(np.std(coarse)) or 1.0
+    t = (coarse - coarse.mean()) / scale
+    step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    lags = []
+    for lag_s in _LAGS_S:
+        decay = float(np.exp(-step / lag_s))
+        lags.append(lfilter([1.0 - decay], [1.0, -decay], t, zi=[decay * t[0]])[0])
+    table = np.column_stack((t, t**2, t**3, *lags, t * (t - lags[0]), t * (t - lags[1])))
+
+    def columns(places: np.ndarray) -> FloatArray:
+        wanted = run.time[rows[places]]
+        return np.column_stack([np.interp(wanted, time, column) for column in table.T])
+
+    return columns

@@ -13,7 +13,7 @@ from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
-from fogml.validation.floors import floor_of_run
+from fogml.validation.floors import check_noise_run, floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
 from fogml.validation.reach import out_of_reach
@@ -40,6 +40,7 @@ def judge(
     any_unit: bool = False,
     beside: Sequence[DriftModel] = (),
     notes: Sequence[str] = (),
+    noise: Run | None = None,
 ) -> Judgement:
     """Judge a fitted model on its training runs and on test runs.
 
@@ -72,6 +73,8 @@ def judge(
         too count, so that all are judged on the same rows.
     notes
         What else the judgement should say.
+    noise
+        A static run whose noise makes the floor; by default each run's own, drift apart.
 
     Raises
     ------
@@ -96,6 +99,7 @@ def judge(
         limits=limits,
         turn_on_band=turn_on_band,
         notes=notes,
+        noise=noise,
     )
 
 
@@ -109,15 +113,20 @@ def judgement_of(
     limits: Mapping[str, float] | None = None,
     turn_on_band: float | None = None,
     notes: Sequence[str] = (),
+    noise: Run | None = None,
 ) -> Judgement:
     """The judgement of a model from its errors on training runs and on test runs, as in :func:`judge`."""
     limits = limits or {}
     train_runs, test_runs = [e.run for e in train], [e.run for e in test]
     earth_known = all(run.earth_known for run in (*train_runs, *test_runs))
     constant = (0.0, 0.0) if earth_known else training_means(train)
-    judged_train = tuple(_judge_run(e, averaging_s, constant, earth_known, turn_on_band) for e in train)
+    if noise is not None:
+        check_noise_run(noise)
+    judged_train = tuple(
+        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise) for e in train
+    )
     judged_test = tuple(
-        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, _seen(e.run, train_runs))
+        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs))
         for e in test
     )
     return Judgement(
@@ -166,6 +175,7 @@ def _judge_run(
     constant: tuple[float, float],
     earth_known: bool,
     turn_on_band: float | None = None,
+    noise: Run | None = None,
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
     run, used = errors.run, errors.used
@@ -180,6 +190,7 @@ def _judge_run(
             f"{share:.1%} of the samples lie outside the temperatures and rates that the model was trained on"
         )
         findings = (*findings, Finding("outside_training", message, count=outside))
+    floor = floor_of_run(run, used, errors.before, averaging_s, noise)
     return RunJudgement(
         run=run.name,
         unit=run.facts.unit,
@@ -187,7 +198,9 @@ def _judge_run(
         averaging_s=averaging_s,
         before=metrics.figures(before),
         after=metrics.figures(after),
-        floor=floor_of_run(run, used, errors.before, averaging_s),
+        floor=floor.value,
+        floor_ci90=(floor.lower, floor.upper),
+        floor_source=floor.source,
         outside_training=share,
         rows_used=int(used.sum()),
         rows_left_out=int((~used).sum()),

@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy import stats
 
+from fogml.validation.results import RunJudgement
+
 LEVEL = 0.9
 """Confidence of the interval about a floor."""
 
@@ -26,6 +28,16 @@ def floor_interval(floor: float, averages: int, level: float = LEVEL) -> tuple[f
     tails = stats.chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], max(averages, 1))
     low, high = floor * np.sqrt(tails / max(averages, 1))
     return float(low), float(high)
+
+
+def left_is_noise(judged: RunJudgement) -> bool:
+    """Whether what is left after a model is the gyro's own noise, as far as the averages can tell.
+
+    Their standard deviation is at most the upper end of its interval for noise alone, of the upper end of the
+    floor's.
+    """
+    upper = judged.floor if judged.floor_ci90 is None else judged.floor_ci90[1]
+    return judged.after.bias_stability <= floor_interval(upper, len(judged.series.time) - 1)[1]
 
 
 def out_of_reach(

@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
+from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
 
 if TYPE_CHECKING:
@@ -60,6 +61,9 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "before": _metrics(judged.before),
         "after": _metrics(judged.after),
         "floor": judged.floor,
+        "floor_ci90": None if judged.floor_ci90 is None else list(judged.floor_ci90),
+        "floor_source": judged.floor_source,
+        "left_is_noise": left_is_noise(judged),
         "outside_training": judged.outside_training,
         "rows_used": judged.rows_used,
         "rows_left_out": judged.rows_left_out,

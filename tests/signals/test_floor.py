@@ -5,7 +5,10 @@ import pytest
 from scipy.signal import lfilter
 
 from fogml.errors import InputError
-from fogml.signals.floor import noise_floor, realised_noise_floor
+from fogml.signals.flicker import Flicker
+from fogml.signals.floor import averages_variance, noise_floor, realised_noise_floor
+from fogml.signals.noise_expectation import floor_square
+from fogml.signals.noise_model import NoiseModel
 
 HOURS_10 = np.arange(36_000.0)
 
@@ -20,7 +23,7 @@ def chamber_drift() -> np.ndarray:
 def floors(seed: int, repeats: int, drift: np.ndarray | float = 0.0, spread: float = 0.3) -> np.ndarray:
     rng = np.random.default_rng(seed)
     return np.array(
-        [noise_floor(spread * rng.normal(size=36_000) + drift, 1.0, 100.0) for _ in range(repeats)]
+        [noise_floor(spread * rng.normal(size=36_000) + drift, 1.0, 100.0).value for _ in range(repeats)]
     )
 
 
@@ -38,7 +41,7 @@ def test_slow_drift_hardly_changes_it():
     assert got.mean() == pytest.approx(0.3 / 10, rel=0.04)
     assert np.all(got < 1.25 * 0.3 / 10)
     # A drift that is all there is leaves next to nothing.
-    assert noise_floor(drift, 1.0, 100.0) < 0.01 * np.std(drift)
+    assert noise_floor(drift, 1.0, 100.0).value < 0.01 * np.std(drift)
 
 
 def test_spikes_bursts_and_steps_do_not_count():
@@ -47,34 +50,66 @@ def test_spikes_bursts_and_steps_do_not_count():
     y[rng.integers(0, 36_000, 20)] += 50.0
     y[5000:5300] += 30.0 * rng.normal(size=300)
     y[20_000:] += 40.0
-    assert noise_floor(y, 1.0, 100.0) == pytest.approx(0.1, rel=0.15)
+    assert noise_floor(y, 1.0, 100.0).value == pytest.approx(0.1, rel=0.15)
 
 
 def test_quantised_data_count_with_their_step():
     rng = np.random.default_rng(4)
     y = np.round(0.5 * rng.normal(size=36_000) + chamber_drift())
-    assert noise_floor(y, 1.0, 100.0) == pytest.approx(np.sqrt(0.25 + 1 / 12) / 10, rel=0.06)
+    assert noise_floor(y, 1.0, 100.0).value == pytest.approx(np.sqrt(0.25 + 1 / 12) / 10, rel=0.06)
 
 
 def test_quantised_angles_fall_faster_than_white_noise():
     rng = np.random.default_rng(5)
     y = np.diff(rng.uniform(-0.5, 0.5, size=40_001)) + 0.002 * rng.normal(size=40_000)
     want = np.sqrt(2 / 12 / 100**2 + 0.002**2 / 100)
-    assert noise_floor(y, 1.0, 100.0) == pytest.approx(want, rel=0.1)
+    assert noise_floor(y, 1.0, 100.0).value == pytest.approx(want, rel=0.1)
 
 
-def test_flicker_is_extrapolated():
-    rng = np.random.default_rng(6)
-    n = 40_000
-    frequency = np.fft.rfftfreq(2 * n)
-    frequency[0] = np.inf
-    found = []
-    for _ in range(10):
-        lines = rng.normal(size=n + 1) + 1j * rng.normal(size=n + 1)
-        # One-sided density B^2/(pi f) with B = 1, a line every 1/(2n).
-        flicker = np.fft.irfft(lines / np.sqrt(np.pi * frequency * 4 * n), 2 * n)[:n] * n * np.sqrt(2)
-        found.append(noise_floor(flicker + 0.5 * rng.normal(size=n), 1.0, 100.0))
-    assert np.mean(found) == pytest.approx(np.sqrt(2 * np.log(2) / np.pi + 0.05**2), rel=0.1)
+def expected(windows: int, white: float, flicker: float) -> float:
+    """Floor of 100 s averages of white noise of a size per sample and flicker of B, from the covariance."""
+    model = NoiseModel(white / 60.0, flicker)
+    time = 100.0 * np.arange(1, windows + 1)
+    covariance = model.covariance(time, 100.0, model.ladder(100.0, 100.0 * windows))
+    return float(np.sqrt(np.trace(covariance) / windows - covariance.mean()))
+
+
+def flicker_noise(seed: int) -> np.ndarray:
+    rng = np.random.default_rng(seed)
+    return 0.3 * rng.normal(size=36_000) + Flicker(0.2, 1.0, np.random.default_rng(seed + 100)).block(36_000)
+
+
+def test_flicker_counts_and_drift_does_not():
+    want = expected(360, 0.3, 0.2)
+    found = [noise_floor(flicker_noise(seed), 1.0, 100.0) for seed in range(8)]
+    assert np.mean([f.value for f in found]) == pytest.approx(want, rel=0.03)
+    assert np.mean([f.lower <= want <= f.upper for f in found]) >= 0.6
+    drifting = [noise_floor(flicker_noise(seed) + chamber_drift(), 1.0, 100.0) for seed in range(4)]
+    assert np.mean([f.value for f in drifting]) == pytest.approx(want, rel=0.06)
+    # As a model of the noise says, by its own way: the same definition.
+    squares = (
+        averages_variance("N", 1.0, 100.0, 360) * 0.3**2 + averages_variance("B", 1.0, 100.0, 360) * 0.04
+    )
+    assert np.sqrt(squares) == pytest.approx(want, rel=0.01)
+    time = 100.0 * np.arange(1, 361)
+    assert floor_square(NoiseModel(0.3 / 60.0, 0.2), time, 100.0) == pytest.approx(want**2, rel=1e-6)
+
+
+def test_a_floor_is_continuous_in_its_data():
+    for seed in (3, 4):
+        series = flicker_noise(seed) + chamber_drift()
+        found = [noise_floor(series[rows:], 1.0, 100.0) for rows in (0, 50, 120, 127, 130, 150)]
+        error = (found[0].upper - found[0].lower) / (2 * 1.645)
+        assert np.ptp([f.value for f in found]) < error
+
+
+def test_random_walk_is_drift_but_in_a_static_run():
+    rng = np.random.default_rng(11)
+    walk = 0.3 * rng.normal(size=36_000) + np.cumsum(0.01 * rng.normal(size=36_000))
+    as_drift, static = (noise_floor(walk, 1.0, 100.0, drifts=drifts).value for drifts in (True, False))
+    assert as_drift < 0.1 < 0.3 < static
+    want = np.sqrt(0.01**2 * 36_000 / 6.0)
+    assert static == pytest.approx(want, rel=0.3)
 
 
 def test_a_dither_line_does_not_lift_it():
@@ -82,7 +117,7 @@ def test_a_dither_line_does_not_lift_it():
     time = np.arange(200_000) * 0.01
     y = 60.0 * np.sin(2 * np.pi * time / 0.3) + rng.normal(size=200_000)
     averages = y.reshape(-1, 1000).mean(axis=1)
-    assert noise_floor(y, 0.01, 10.0) < 2.0 * averages.std()
+    assert noise_floor(y, 0.01, 10.0).value < 2.0 * averages.std()
 
 
 def test_segments_are_not_joined():
@@ -90,15 +125,18 @@ def test_segments_are_not_joined():
     bursts = 0.3 * rng.normal(size=(300, 170)) + 100.0 * rng.normal(size=(300, 1))
     segments = [slice(170 * i, 170 * (i + 1)) for i in range(300)]
     got = noise_floor(bursts.ravel(), 0.017, 100.0, segments=segments)
-    assert got == pytest.approx(0.3 / np.sqrt(100.0 / 0.017), rel=0.03)
+    want = 0.3 / np.sqrt(100.0 / 0.017)
+    # Three seconds in a row say little of flicker at a hundred: the interval says so.
+    assert got.lower <= want <= got.upper and got.value < 2.0 * want
 
 
 def test_unit_and_short_series():
     rng = np.random.default_rng(9)
     y = rng.normal(size=5000)
-    assert noise_floor(1000 * y + 1e6, 0.1, 10.0) == pytest.approx(1000 * noise_floor(y, 0.1, 10.0), rel=1e-6)
-    assert 0.3 < noise_floor(y[:20], 1.0, 1.0) < 3.0
-    assert noise_floor(np.ones(50), 1.0, 10.0) == 0.0
+    large, small = noise_floor(1000 * y + 1e6, 0.1, 10.0), noise_floor(y, 0.1, 10.0)
+    assert large.value == pytest.approx(1000 * small.value, rel=1e-4)
+    assert 0.3 < noise_floor(y[:20], 1.0, 1.0).value < 3.0
+    assert noise_floor(np.ones(50), 1.0, 10.0).value == 0.0
 
 
 @pytest.mark.parametrize(

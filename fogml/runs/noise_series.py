@@ -1,0 +1,99 @@
+"""The samples of a run that tell its noise: at rest, new, by stretches without gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.holds import hold_of
+from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+
+AT_REST_DEG_S = 1e-3
+"""Table rate under which the table stands [deg/s]."""
+LOST = 1e-3
+"""Share of lost samples from which the mean sample interval stands for the median."""
+HOLD_ROWS = 100_000
+"""Samples that are enough to tell whether a log repeats values."""
+
+
+@dataclass(frozen=True)
+class NoiseSeries:
+    """A run's samples that count: those that are new, by stretches without gaps."""
+
+    run: Run
+    sample_s: float
+    segments: list[slice]
+    hold: float
+    stretches: list[FloatArray]
+    times: list[FloatArray]
+
+    @property
+    def new_s(self) -> float:
+        """Interval between new values [s]."""
+        return self.sample_s * self.hold
+
+
+def series_of(run: Run) -> NoiseSeries:
+    segments = stretches_at_rest(run)
+    if max((part.stop - part.start for part in segments), default=0) < 3:
+        raise InputError(
+            f"{run.name}: too short for an Allan deviation: at least 3 samples without a gap are "
+            "needed; give a longer run"
+        )
+    sample_s = sample_interval(run, segments)
+    error = run.error_deg_h
+    longest = max(segments, key=lambda part: part.stop - part.start)
+    hold = hold_of(error[longest][:HOLD_ROWS]).samples
+    if hold == 1.0:
+        return NoiseSeries(
+            run, sample_s, segments, 1.0, [error[s] for s in segments], [run.time[s] for s in segments]
+        )
+    rows = [s.start + hold_of(error[s]).rows for s in segments]
+    return NoiseSeries(run, sample_s, segments, hold, [error[r] for r in rows], [run.time[r] for r in rows])
+
+
+def joined(series: Sequence[NoiseSeries]) -> tuple[FloatArray, list[slice]]:
+    """Errors of all runs one after the other, and their stretches."""
+    if len(series) == 1:
+        return series[0].run.error_deg_h, series[0].segments
+    starts = np.cumsum([0, *(len(one.run) for one in series[:-1])]).tolist()
+    segments = [
+        slice(at + part.start, at + part.stop) for at, one in zip(starts, series) for part in one.segments
+    ]
+    return np.concatenate([one.run.error_deg_h for one in series]), segments
+
+
+def spectrum_of_runs(series: Sequence[NoiseSeries]) -> Spectrum:
+    """Spectrum of all stretches, each run with a ramp of its own."""
+    columns = []
+    for place, one in enumerate(series):
+        for time in one.times:
+            ramp = np.zeros((len(time), len(series)))
+            ramp[:, place] = time
+            columns.append(ramp)
+    stretches = [part for one in series for part in one.stretches]
+    return spectrum_of(stretches, series[0].new_s, columns)
+
+
+def stretches_at_rest(run: Run) -> list[slice]:
+    """Stretches, cut down to rows at rest where the table both turns and stands."""
+    at_rest = np.abs(run.rate) < AT_REST_DEG_S
+    if np.all(at_rest) or not np.any(at_rest):
+        return list(run.stretches)
+    edges = np.flatnonzero(np.diff(at_rest)) + 1
+    bounds = np.union1d(np.concatenate(([0], edges, run.gap_starts)), [len(run)])
+    return [slice(int(a), int(b)) for a, b in pairwise(bounds) if at_rest[a]]
+
+
+def sample_interval(run: Run, segments: list[slice]) -> float:
+    """Median sample interval [s], or the mean within stretches where lost samples make that longer."""
+    steps = sum(part.stop - 1 - part.start for part in segments)
+    spent = sum(float(run.time[part.stop - 1] - run.time[part.start]) for part in segments)
+    even = abs(spent / steps / run.sample_s - 1.0) < LOST
+    # Times are rounded numbers, and so is their difference.
+    return float(f"{run.sample_s if even else spent / steps:.9g}")

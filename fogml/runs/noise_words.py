@@ -1,0 +1,160 @@
+"""What a noise report says beside the terms: its model, and whether what they assume holds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fogml.runs.noise_series import NoiseSeries
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.noise_terms import NoiseTerms
+from fogml.signals.stationarity import Stationarity
+
+DOUBT = 1e-3
+"""Chance of a warning that a right model, or a steady run, gets."""
+MOST_LINES = 5
+"""Sinusoids that are listed."""
+_Z90 = 1.6448536269514722
+
+
+def gaps_of(runs: Sequence[Run]) -> dict[str, Any]:
+    """Number of gaps and what they lost [s]."""
+    lost = [
+        float(np.sum(run.time[run.gap_starts] - run.time[run.gap_starts - 1] - run.sample_s)) for run in runs
+    ]
+    return {"count": sum(len(run.gap_starts) for run in runs), "lost_s": sum(lost)}
+
+
+def model_told(terms: NoiseTerms, taus_s: FloatArray, series: NoiseSeries) -> dict[str, Any]:
+    """What the fit says beside the terms."""
+    told: dict[str, Any] = {
+        "misfit": terms.misfit,
+        "fit_p_value": terms.fit_p_value,
+        "holds_from_s": max(terms.holds_from_s, series.new_s),
+        "filter": None,
+        "hold": None if series.hold == 1.0 else {"samples": series.hold, "interval_s": series.new_s},
+        "correlated": None,
+        "sinusoids": [],
+        "model": {
+            "adev": terms.deviation(taus_s).tolist(),
+            "ahead_of_filter": terms.deviation(taus_s, filtered=False).tolist(),
+        },
+    }
+    if terms.search is None:
+        return told
+    best, sample_s = terms.search.best, terms.search.spectrum.sample_s
+    corner = best.filter.corner_cycles(best.log_corner)
+    if best.filter.kind != "none":
+        told["filter"] = {
+            "kind": best.filter.kind,
+            "order": best.filter.order,
+            "words": best.filter.words(),
+            "corner_hz": None if corner is None else corner / sample_s,
+            "probability": float(
+                sum(
+                    weight
+                    for candidate, weight in zip(terms.search.candidates, terms.search.weights)
+                    if candidate.fit.filter.kind == best.filter.kind
+                    and candidate.fit.filter.order == best.filter.order
+                )
+            ),
+        }
+    elif not np.all(best.used):
+        top = float(terms.search.spectrum.frequency_hz[best.used].max())
+        told["filter"] = {
+            "kind": "other",
+            "words": "of no form that is known here",
+            "corner_hz": None,
+            "above_hz": top,
+        }
+    if best["G"] > 0.0:
+        told["correlated"] = {
+            "deviation": float(np.sqrt(best["G"])),
+            "correlation_s": best.terms.correlation_s,
+        }
+    told["sinusoids"] = [asdict(line) for line in terms.search.spectrum.lines[:MOST_LINES]]
+    return told
+
+
+def words_of(terms: NoiseTerms, series: NoiseSeries, runs: Sequence[Run]) -> list[str]:
+    """What a reader should know of the data before the figures."""
+    words = []
+    if series.hold != 1.0:
+        words.append(
+            f"Each value stands for {series.hold:.3g} samples: the log reads faster than the gyro gives new "
+            f"values, every {series.new_s:.3g} s. Terms are of the new values."
+        )
+    told = model_told(terms, np.array([series.sample_s]), series)["filter"]
+    if told is not None and told["kind"] == "other":
+        words.append(
+            f"Above {told['above_hz']:.3g} Hz the spectrum has a form of its own (a filter, a dither, a "
+            f"resonance): it is left out, and the terms hold for averaging "
+            f"times from {terms.holds_from_s:.3g} s on."
+        )
+    elif told is not None:
+        corner = f" at {told['corner_hz']:.3g} Hz" if told["corner_hz"] else ""
+        words.append(
+            f"The output is filtered ({told['words']}{corner}): terms are of the noise ahead of the "
+            f"filter, and the Allan deviation "
+            f"shows them from {max(terms.holds_from_s, series.new_s):.3g} s on."
+        )
+    gaps = gaps_of(runs)
+    if gaps["count"]:
+        words.append(
+            f"{gaps['count']} gaps ({gaps['lost_s']:.4g} s lost): no average and no difference crosses one."
+        )
+    return words
+
+
+def doubts_of(
+    terms: NoiseTerms, steady: Stationarity | None, alone: Sequence[NoiseTerms]
+) -> list[dict[str, str]]:
+    """Warnings on what the terms assume."""
+    warnings = []
+    if terms.fit_p_value < DOUBT:
+        warnings.append(
+            {
+                "code": "model_misfit",
+                "message": (
+                    "The noise model does not describe this run: its spectrum is off by "
+                    f"{2.0 * terms.misfit:.1%} where chance explains less (p = {terms.fit_p_value:.1g}). "
+                    "Intervals are widened by that; look at the plot for where."
+                ),
+            }
+        )
+    if steady is not None and steady.p_value < DOUBT:
+        thirds = ", ".join(f"{share:.2f}" for share in steady.thirds)
+        warnings.append(
+            {
+                "code": "not_stationary",
+                "message": (
+                    f"The noise changes during the run: its size at {steady.tau_s:.3g} s in the three "
+                    f"thirds is {thirds} of the whole run's (p = {steady.p_value:.1g}). "
+                    "The terms are means over it."
+                ),
+            }
+        )
+    if alone:
+        from scipy.stats import chi2
+
+        told = [term for one in alone if (term := one.terms["N"]).lower > 0.0]
+        logarithms = np.array([np.log(term.fitted) for term in told])
+        errors = np.array([np.log(term.upper / term.lower) for term in told]) / (2.0 * _Z90)
+        if len(told) > 1:
+            mean = np.average(logarithms, weights=errors**-2)
+            p_value = float(chi2.sf(float(np.sum(((logarithms - mean) / errors) ** 2)), len(told) - 1))
+            if p_value < DOUBT:
+                span = f"{np.exp(logarithms.min()):.3g} to {np.exp(logarithms.max()):.3g}"
+                warnings.append(
+                    {
+                        "code": "replicates_differ",
+                        "message": (
+                            f"The runs do not share one N: alone they give {span} deg/sqrt(h) "
+                            f"(p = {p_value:.1g}). Look at each run's terms, not at the shared ones."
+                        ),
+                    }
+                )
+    return warnings
