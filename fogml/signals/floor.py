@@ -111,7 +111,8 @@ def noise_floor(
     """The noise floor of averages of a series, drift kept out.
 
     The density up to ten cycles in an averaging time is fitted by white noise, quantisation and flicker, and
-    beside them by what a drift makes; flicker is weighed by its evidence, so that nothing hangs on a hard choice and the floor moves with its data.
+    beside them by what a drift makes; flicker is weighed by its evidence, so that nothing hangs on a
+    hard choice and the floor moves with its data.
 
     Parameters
     ----------
