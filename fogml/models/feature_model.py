@@ -22,6 +22,7 @@ from fogml.features.stream import FeatureStream
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
+from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.folds import dealt_folds
 from fogml.models.intervals import Intervals
 from fogml.models.linear import LinearRegressor
@@ -118,6 +119,10 @@ class FeatureModel(DriftModel):
         learn_box(features, [part.atoms for part in rows])
         self.features_ = features
         count = self._fit_rows(rows, features)
+        if type(self.regressor_) is LinearRegressor:
+            covariance = noise_covariance(rows, features.compose, self.regressor_)
+            if covariance is not None:
+                self.regressor_.covariance_ = covariance
         notes = [*(note for part in rows for note in part.notes), *self._fit_notes()]
         self.card_ = training_card(group, hashes=hashes, rows=count, box=features.box, notes=notes)
         self.intervals_ = self._interval(rows)

@@ -67,8 +67,8 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
     residual_std_ : float
         Root of the residual sum of squares over the rows less the effective parameters.
     covariance_ : (k + 1, k + 1)
-        Covariance of (intercept, coefficients) for white residuals; where noise is coloured, or
-        the model wrong, the true one is larger.
+        Covariance of (intercept, coefficients): for white residuals as fitted here; a drift model puts
+        that of the residuals' own noise in its place, which is larger.
     cross_validation_ : dict
         With ``ridge="auto"``, mean squared error on left-out folds for each ridge.
     """
@@ -136,7 +136,7 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         return LinearRegressor(ridge=self.ridge_, fit_intercept=self.fit_intercept).fit(X, y)
 
     def standard_errors(self) -> FloatArray:
-        """Standard errors of (intercept, coefficients) for white residuals, shape (k + 1,)."""
+        """Standard errors of (intercept, coefficients), shape (k + 1,): the roots of `covariance_`."""
         check_is_fitted(self)
         return np.asarray(np.sqrt(np.diag(self.covariance_)))
 

@@ -31,7 +31,7 @@ class KnownDrift(DriftModel):
         drift = np.zeros(len(run)) if self.law is None else np.asarray(self.law(run), dtype=float)
         outside = run.temperature("T") > self.hottest
         full = run.time - run.time[0] >= self.full_from_s
-        return Evaluation(drift, full, outside, lambda: np.where(outside, 0.1, 0.0))
+        return Evaluation(drift, full, np.ones_like(full), outside, lambda: np.where(outside, 0.1, 0.0))
 
     def weights(self):
         return {}

@@ -1,0 +1,61 @@
+"""Standard errors of coefficients under coloured noise: against the scatter of repeated fits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.models.coefficient_errors import noise_covariance
+from fogml.models.linear import LinearRegressor
+from fogml.models.table import RunRows
+from fogml.signals.flicker import Flicker
+
+N, STEP_S, REPEATS = 3000, 5.0, 40
+TIME = STEP_S * np.arange(N)
+TEMPERATURE = 20.0 + 30.0 * np.sin(2 * np.pi * TIME / 7000.0)
+COLUMNS = np.column_stack((TEMPERATURE, TEMPERATURE**2, np.gradient(TEMPERATURE, TIME) * 60.0))
+TRUE = np.array([0.5, 0.01, 1e-4, -0.2])
+
+
+def fits(flicker: float, white: float, walk: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Errors of coefficients, and their standard errors for the noise's own spectrum and for white noise."""
+    errors, stated, plain = [], [], []
+    for seed in range(REPEATS):
+        rng = np.random.default_rng(seed)
+        noise = white * rng.normal(size=N) + walk * np.cumsum(
+            np.random.default_rng(900 + seed).normal(size=N)
+        )
+        noise += Flicker(flicker, STEP_S, np.random.default_rng(500 + seed)).block(N)
+        y = TRUE[0] + COLUMNS @ TRUE[1:] + noise
+        model = LinearRegressor().fit(COLUMNS, y)
+        rows = [RunRows(COLUMNS, y, TIME)]
+        errors.append(np.append(model.intercept_, model.coef_) - TRUE)
+        stated.append(np.sqrt(np.diag(noise_covariance(rows, lambda atoms: atoms, model))))
+        plain.append(model.standard_errors())
+    return np.array(errors), np.array(stated), np.array(plain)
+
+
+@pytest.mark.parametrize(("flicker", "white", "walk"), [(0.0, 0.3, 0.0), (0.2, 0.3, 0.0), (0.05, 0.3, 0.005)])
+def test_errors_scatter_as_stated(flicker: float, white: float, walk: float) -> None:
+    errors, stated, plain = fits(flicker, white, walk)
+    # The intercept also holds noise slower than the run.
+    size = np.sqrt(np.mean((errors / stated)[:, 1:] ** 2, axis=0))
+    assert np.all((size > 0.65) & (size < 1.4))
+    if flicker + walk > 0.0:
+        assert np.sqrt(np.mean((errors / plain)[:, 1] ** 2)) > 2.0
+    else:
+        np.testing.assert_allclose(np.median(stated / plain, axis=0), 1.0, atol=0.12)
+
+
+def test_runs_stretches_and_a_ridge() -> None:
+    rng = np.random.default_rng(1)
+    y = TRUE[0] + COLUMNS @ TRUE[1:] + 0.3 * rng.normal(size=N)
+    whole = LinearRegressor(ridge=1e-3).fit(COLUMNS, y)
+    halves = [RunRows(COLUMNS[s], y[s], TIME[s]) for s in (slice(0, N // 2), slice(N // 2, N))]
+    found = np.sqrt(np.diag(noise_covariance(halves, lambda atoms: atoms, whole)))
+    np.testing.assert_allclose(found, whole.standard_errors(), rtol=0.3)
+    through_zero = LinearRegressor(fit_intercept=False).fit(COLUMNS, y)
+    covariance = noise_covariance(halves, lambda atoms: atoms, through_zero)
+    assert covariance[0, 0] == 0.0 and np.all(np.diag(covariance)[1:] > 0.0)
+    short = [RunRows(COLUMNS[:10], y[:10], TIME[:10])]
+    assert noise_covariance(short, lambda atoms: atoms, whole) is None
