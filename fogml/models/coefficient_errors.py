@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ _OWN = Terms(("N", "B", "K"))
 def noise_covariance(
     rows: Sequence[RunRows], compose: Compose, regressor: LinearRegressor
 ) -> FloatArray | None:
-    """Covariance of (intercept, coefficients), shape (k + 1, k + 1), for noise of the residuals' own spectrum.
+    """Covariance of (intercept, coefficients), shape (k + 1, k + 1), for noise of the residuals' spectrum.
 
     The sandwich ``G X'CX G'`` of least squares, with C the covariance of white noise, flicker and random walk
     that are fitted to what the columns leave, their constants integrated out. In the cosine transform of each
@@ -57,7 +58,7 @@ def noise_covariance(
         return None
     step_s = float(np.median(steps[inside]))
     edges = np.concatenate(([0], np.flatnonzero(~inside | (steps > _GAP * step_s)) + 1, [len(table)]))
-    parts = [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:]) if b - a >= 3]
+    parts = [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= 3]
     if not parts:
         return None
     scale = np.std(table.X, axis=0)
