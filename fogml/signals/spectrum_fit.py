@@ -19,7 +19,6 @@ FloatArray = NDArray[np.float64]
 
 AFTER = ("Q", "W", "E")
 """Terms that a filter does not act on."""
-_ITERATIONS = 60
 _TOLERANCE = 1e-7
 
 
@@ -79,8 +78,9 @@ class SpectrumFit:
     @property
     def free(self) -> int:
         """Number of fitted constants: terms in use and the corner."""
-        extra = int(self.filter.free) + int(self.terms.correlation_s is not None)
-        return int(np.count_nonzero(self.coefficients)) + extra
+        return int(
+            np.count_nonzero(self.coefficients) + self.filter.free + (self.terms.correlation_s is not None)
+        )
 
 
 class SpectrumModel:
@@ -144,6 +144,7 @@ class SpectrumModel:
         log_corner: float = 0.0,
         held: tuple[int, float] | None = None,
         excess: float = 0.0,
+        rounds: int = 60,
     ) -> SpectrumFit:
         """The model of greatest likelihood, by Fisher scoring with coefficients that are not negative.
 
@@ -157,6 +158,8 @@ class SpectrumModel:
             A term that is held at a coefficient.
         excess
             Variance of the rows' relative errors beyond what chance explains.
+        rounds
+            At most.
         """
         from scipy.optimize import nnls
 
@@ -174,7 +177,7 @@ class SpectrumModel:
             density = self._smoothed()
         told = self._told(density, freedom)
         loss = told[0] if begun else np.inf
-        for _ in range(_ITERATIONS):
+        for _ in range(rounds):
             power = told[1]
             weight = np.sqrt(0.5 * freedom) / np.where(self.used, density, 1.0)
             columns = design[:, free]
@@ -217,9 +220,10 @@ class SpectrumModel:
         )
 
     def scanned(self, corners: FloatArray) -> SpectrumFit:
-        """The best of fits that begin with several corners, told by few rounds each."""
-        fits = [self.fit(log_corner=float(c)) for c in corners]
-        return min(fits, key=lambda fit: fit.loss)
+        """The fit that goes on from the corner which leads the furthest in a few rounds."""
+        fits = [self.fit(log_corner=float(c), rounds=8 if len(corners) > 1 else 60) for c in corners]
+        best = min(fits, key=lambda fit: fit.loss)
+        return self.fit(best) if len(corners) > 1 and np.isfinite(best.loss) else best
 
     def _smoothed(self) -> FloatArray:
         """Power of the rows about each, for first weights."""
@@ -240,8 +244,7 @@ class SpectrumModel:
         self, density: FloatArray, freedom: FloatArray
     ) -> tuple[float, FloatArray, FloatArray, FloatArray]:
         """Loss, power with what the columns take, constants and their covariance."""
-        s = self.spectrum
-        power = s.power
+        s, power = self.spectrum, self.spectrum.power
         constants, covariance = np.empty(0), np.empty((0, 0))
         loss = 0.0
         if s.columns.shape[1]:
@@ -305,10 +308,7 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: Terms) -> Floa
 
 
 def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Standard normal errors of the rows that many coefficients stand behind, and which rows.
-
-    Cube roots of chi-square values are nearly normal (E. B. Wilson and M. M. Hilferty, PNAS 17 (1931) 684).
-    """
+    """Errors of rows of many coefficients, and the rows: cube roots are nearly normal (Wilson, Hilferty 1931)."""
     rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
     scale = 2.0 / (9.0 * model.freedom[rows])
     ratio = model.spectrum.power[rows] / fit.density[rows]
