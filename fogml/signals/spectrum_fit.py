@@ -308,7 +308,7 @@ def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: Terms) -> Floa
 
 
 def relative_errors(model: SpectrumModel, fit: SpectrumFit) -> tuple[FloatArray, NDArray[np.intp]]:
-    """Errors of rows of many coefficients, and the rows: cube roots are nearly normal (Wilson, Hilferty 1931)."""
+    """Normal errors of the rows of many coefficients, and which: cube roots (Wilson and Hilferty, 1931)."""
     rows = np.flatnonzero((model.spectrum.count >= 8.0) & fit.used)
     scale = 2.0 / (9.0 * model.freedom[rows])
     ratio = model.spectrum.power[rows] / fit.density[rows]
