@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
@@ -195,7 +195,6 @@ def _holds_from(search: NoiseSearch, taus: FloatArray) -> float:
 
 def _interval(search: NoiseSearch, name: str, level: float) -> tuple[float, float]:
     """Profile likelihood interval of a coefficient; from 0 where models without it fit as well."""
-    from scipy.optimize import brentq
     from scipy.special import ndtri
 
     allowed = float(ndtri(0.5 + 0.5 * level))
@@ -214,26 +213,48 @@ def _interval(search: NoiseSearch, name: str, level: float) -> tuple[float, floa
         lost = search.profile_loss(name, coefficient, fits) - least
         return float(np.sqrt(2.0 * max(lost, 0.0))) - allowed
 
-    reach, near = 1.1 * scale, value
-    while (at_far := beyond(value + reach)) <= 0.0 and reach < 1e12 * max(scale, value):
-        near = value + reach
-        # As far again as the straight line says, and a little more.
-        reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
-    upper = value + reach
-    if at_far > 0.0:
-        upper = float(brentq(beyond, near, upper, xtol=2e-2 * scale, rtol=1e-4))
+    def end(limit: float, direction: float) -> float:
+        """Where the loss is the allowed one, from the best value on; at the limit if it is nowhere."""
+        near, at_near, reach = value, -allowed, 1.1 * scale
+        while True:
+            far = value + direction * reach
+            if (far - limit) * direction >= 0.0:
+                far = limit
+            at_far = beyond(far)
+            if at_far > 0.0:
+                return _crossing(beyond, (near, at_near), (far, at_far), 2e-2 * min(scale, max(value, scale)))
+            if far == limit:
+                return limit
+            near, at_near = far, at_far
+            # As far again as the straight line says, and a little more.
+            reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
+
+    upper = end(value + 1e12 * max(scale, value), 1.0)
     fits.clear()
     if value == 0.0 or beyond(0.0) <= 0.0:
         return 0.0, upper
     fits.clear()
-    far, reach, near = 0.0, 1.1 * scale, value
-    while value - reach > 0.0:
-        if (at_far := beyond(value - reach)) > 0.0:
-            far = value - reach
-            break
-        near = value - reach
-        reach *= float(np.clip(1.2 * allowed / max(at_far + allowed, 1e-3), 1.2, 4.0))
-    return float(brentq(beyond, far, near, xtol=2e-2 * min(scale, value), rtol=1e-4)), upper
+    return end(0.0, -1.0), upper
+
+
+def _crossing(
+    f: Callable[[float], float], low: tuple[float, float], high: tuple[float, float], tolerance: float
+) -> float:
+    """Root of a nearly straight function between two points of known values, by the Illinois rule.
+
+    Values at the ends are not asked again: a fit that begins elsewhere may give a slightly other one.
+    """
+    (a, at_a), (b, at_b) = low, high
+    for _ in range(30):
+        c = (a * at_b - b * at_a) / (at_b - at_a)
+        at_c = f(c)
+        if (at_c > 0.0) == (at_b > 0.0):
+            b, at_b, at_a = c, at_c, 0.5 * at_a
+        else:
+            a, at_a, b, at_b = b, at_b, c, at_c
+        if abs(b - a) <= tolerance or abs(at_c) <= 1e-3:
+            return c
+    return c
 
 
 def _ramp(fit: SpectrumFit, removed: FloatArray, level: float) -> NoiseTerm:
