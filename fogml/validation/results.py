@@ -87,9 +87,9 @@ class RunJudgement:
     """One model on one run.
 
     ``facts`` are the run's, ``table_rates`` the least and the greatest rate of the table [deg/s], None where
-    none is recorded. ``floor`` is the noise at ``averaging_s`` [deg/h] as `fogml.signals.floor` defines it, with
-    its 90 % interval and where it comes from; ``noise`` the run's own Allan terms with their intervals and the
-    raw minimum, as in ``noise.json``, None where the run is too short for them.
+    none is recorded. ``floor`` is the noise at ``averaging_s`` [deg/h] as `fogml.signals.floor` defines it,
+    with its 90 % interval and where it comes from; ``noise`` the run's own Allan terms with their intervals
+    and the raw minimum, as in ``noise.json``, None where the run is too short for them.
     """
 
     run: str
