@@ -161,7 +161,7 @@ def read_marks(path: Path) -> Marks:
         raise InputError(f"{path}: holds no marks ({error}); {_REMEDY}") from None
     if len(text) > MOST_BYTES:
         raise InputError(f"{path}: is larger than {MOST_BYTES >> 20} MB; {_REMEDY}")
-    values = parse_json(text, str(path), _REMEDY)
+    values = parse_json(text, f"{path}: holds no marks", _REMEDY)
     try:
         content = _Content.model_validate(values)
     except ValidationError as error:
