@@ -9,7 +9,7 @@ from typing import ClassVar
 from pydantic import field_validator
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings
+from fogml.cli.settings import LimitSettings, Repairing
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import check_settings, noise_run
 from fogml.errors import InputError
@@ -31,7 +31,7 @@ class CompareSettings(LimitSettings):
     leave_one_out: bool = False
     models: list[str] = ["all"]
     features: str | None = None
-    repair: bool = False
+    repair: Repairing = False
     strict: bool = False
     any_unit: bool = False
     out: str = "compare-results"

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.cli.runs import open_blocks
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.runs.run import Run
@@ -31,6 +31,7 @@ class CompensateSettings(Settings):
     run: str | None = None
     model: str | None = None
     any_unit: bool = False
+    repair: Repairing = False
     out: str | None = None
 
 
@@ -53,7 +54,8 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
         settings.written_beside(out, "compensate"),
         terminal.work(f"compensating {settings.run}", total=total) as work,
     ):
-        counts = _compensate(model, open_blocks(settings.run), out, settings.any_unit, work)
+        blocks = open_blocks(settings.run, repair=settings.repair)
+        counts = _compensate(model, blocks, out, settings.any_unit, work)
     _print(settings, model.kind, counts, terminal)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import ClassVar
 
 from fogml.cli.runs import open_run, open_runs
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import as_model, diagnose
@@ -28,7 +28,7 @@ class DiagnoseSettings(Settings):
     noise: str | None = None
     twin: str = "nominal"
     without: list[str] = []
-    repair: bool = False
+    repair: Repairing = False
     out: str = "diagnosis"
 
     def _ships(self, key: str, value: str) -> bool:

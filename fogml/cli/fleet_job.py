@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from pydantic import field_validator
 
 from fogml.cli.fleet_unit import UnitWork
-from fogml.cli.settings import LimitSettings, named_values
+from fogml.cli.settings import LimitSettings, Repairing, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.fleet.constants import FORM
@@ -42,7 +42,7 @@ class FleetSettings(LimitSettings):
     cluster: str | None = None
     device: str | None = None
     batch: int = 64
-    repair: bool = False
+    repair: Repairing = False
     strict: bool = False
     any_unit: bool = False
     out: str = "fleet-results"

@@ -16,6 +16,7 @@ app = typer.Typer(**options.APP_SETTINGS)
 def inspect(
     runs: Annotated[list[str] | None, typer.Argument(metavar="RUN...", help="Runs to look into.")] = None,
     repair: options.Repair = None,
+    repair_anyway: options.RepairAnyway = None,
     strict: options.Strict = None,
     out: options.Out = None,
     seed: options.Seed = None,
@@ -33,7 +34,7 @@ def inspect(
         config,
         {
             "runs": runs,
-            "repair": repair,
+            "repair": options.repairing(repair, repair_anyway),
             "strict": strict,
             "out": str(out) if out else None,
             "seed": seed,

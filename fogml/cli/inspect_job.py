@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -21,7 +21,7 @@ class InspectSettings(Settings):
 
     path_keys: ClassVar[tuple[str, ...]] = ("runs",)
     runs: list[str] = []
-    repair: bool = False
+    repair: Repairing = False
     strict: bool = False
     out: str | None = None
 

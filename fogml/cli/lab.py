@@ -121,6 +121,7 @@ def north(
         float | None, typer.Option("--coarse", metavar="S", help="Time in a coarse position (6).")
     ] = None,
     repair: options.Repair = None,
+    repair_anyway: options.RepairAnyway = None,
     out: options.Out = None,
     seed: options.Seed = None,
     config: options.Config = None,
@@ -152,7 +153,7 @@ def north(
             "method": method,
             "settle": settle,
             "coarse": coarse,
-            "repair": repair,
+            "repair": options.repairing(repair, repair_anyway),
             "out": str(out) if out else None,
             "seed": seed,
         },

@@ -8,7 +8,7 @@ from pydantic import Field, field_validator
 
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings, number_list
+from fogml.cli.settings import Repairing, Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json
@@ -38,7 +38,7 @@ class NorthSettings(Settings):
     method: str = "auto"
     settle: float = 0.0
     coarse: float = 6.0
-    repair: bool = False
+    repair: Repairing = False
     out: str | None = None
 
     @field_validator("order", mode="before")

@@ -24,6 +24,7 @@ def noise(
         bool | None, typer.Option("--overlapping/--not-overlapping", help="Kind of estimator (overlapping).")
     ] = None,
     repair: options.Repair = None,
+    repair_anyway: options.RepairAnyway = None,
     out: options.Out = None,
     seed: options.Seed = None,
     config: options.Config = None,
@@ -41,7 +42,7 @@ def noise(
         {
             "run": runs,
             "overlapping": overlapping,
-            "repair": repair,
+            "repair": options.repairing(repair, repair_anyway),
             "out": str(out) if out else None,
             "seed": seed,
         },

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -20,7 +20,7 @@ class NoiseSettings(Settings):
     path_keys: ClassVar[tuple[str, ...]] = ("run",)
     run: str | list[str] | None = None
     overlapping: bool = True
-    repair: bool = False
+    repair: Repairing = False
     out: str | None = None
 
 

@@ -17,7 +17,13 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but er
 Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
 Repair = Annotated[
     bool | None,
-    typer.Option("--repair/--no-repair", help="Sort or drop faulty rows, and count them in the report."),
+    typer.Option(
+        "--repair/--no-repair",
+        help="Mend clocks and drop up to 2 % of faulty rows; what was done is in every result.",
+    ),
+]
+RepairAnyway = Annotated[
+    bool | None, typer.Option("--repair-anyway", help="Repair, however many rows that drops.")
 ]
 Strict = Annotated[
     bool | None,
@@ -55,6 +61,12 @@ Tests = Annotated[
     list[str] | None,
     typer.Option("--test", metavar="RUN...", help="Runs to judge on; takes several, may be repeated."),
 ]
+
+
+def repairing(repair: bool | None, anyway: bool | None) -> bool | str | None:
+    """The setting ``repair`` of its two flags."""
+    return "anyway" if anyway else repair
+
 
 APP_SETTINGS: dict[str, Any] = {
     "add_completion": False,

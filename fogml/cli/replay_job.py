@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import check_finite
@@ -32,7 +32,7 @@ class ReplaySettings(Settings):
     truth: str | None = None
     after: list[str] = []
     storage_temperature: float = 25.0
-    repair: bool = False
+    repair: Repairing = False
     out: str | None = None
 
     def _ships(self, key: str, value: str) -> bool:

@@ -4,30 +4,47 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fogml.cli.settings import SHIPPED
+from fogml.cli.settings import SHIPPED, Repairing
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.runs.run import Run
 
 
-def open_run(path: str, *, repair: bool = False) -> Run:
+def open_run(path: str, *, repair: Repairing = False) -> Run:
     """The run in a file, or ``shipped:NAME``, checked: what is noticed is in its findings."""
     from fogml.runs.reading import read_run
     from fogml.runs.shipped import shipped_run
 
     if not path.startswith(SHIPPED):
-        return read_run(path, repair=repair)
+        return read_run(path, repair=bool(repair), most_dropped=_most_dropped(repair))
     return shipped_run(path.removeprefix(SHIPPED))
 
 
-def open_blocks(path: str) -> Iterable[Run]:
+def open_legs(path: str, *, repair: Repairing = False) -> list[Run]:
+    """The runs in a file, or ``shipped:NAME``: several where its clock restarts and it is repaired."""
+    from fogml.runs.reading import read_runs
+
+    if path.startswith(SHIPPED):
+        return [open_run(path)]
+    return read_runs(path, repair=bool(repair), most_dropped=_most_dropped(repair))
+
+
+def open_blocks(path: str, *, repair: Repairing = False) -> Iterable[Run]:
     """The run in a file in blocks of bounded size, or ``shipped:NAME`` whole."""
     from fogml.runs.reading import read_blocks
 
-    return [open_run(path)] if path.startswith(SHIPPED) else read_blocks(path)
+    if path.startswith(SHIPPED):
+        return [open_run(path)]
+    return read_blocks(path, repair=bool(repair), most_dropped=_most_dropped(repair))
 
 
-def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: bool = False) -> list[Run]:
+def _most_dropped(repair: Repairing) -> float:
+    from fogml.runs.assemble import MOST_DROPPED
+
+    return 1.0 if repair == "anyway" else MOST_DROPPED
+
+
+def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: Repairing = False) -> list[Run]:
     """The runs in several files; findings are noted on stderr.
 
     Raises
@@ -38,11 +55,11 @@ def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: bool = False)
     twice = sorted({path for path in paths if list(paths).count(path) > 1})
     if twice:
         raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
-    runs = []
+    runs: list[Run] = []
     with terminal.work("reading", total=len(paths)) as work:
         for path in paths:
             work.doing(f"reading {path}")
-            runs.append(open_run(path, repair=repair))
+            runs += open_legs(path, repair=repair)
             work.advance()
     for run in runs:
         for finding in run.findings:

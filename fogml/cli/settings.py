@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -17,6 +17,10 @@ from fogml.yaml_text import parse_yaml, read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
+
+
+Repairing = bool | Literal["anyway"]
+"""Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
 
 
 class Settings(BaseModel):

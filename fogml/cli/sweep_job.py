@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 from pydantic import Field, field_validator
 
-from fogml.cli.runs import open_run, open_runs
-from fogml.cli.settings import Settings
+from fogml.cli.runs import open_legs, open_runs
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -45,7 +45,7 @@ class SweepSettings(Settings):
     storage: str | None = None
     heartbeat_s: float = 10.0
     averaging: float = 100.0
-    repair: bool = False
+    repair: Repairing = False
     out: str = "sweep-results"
 
     @field_validator("objectives", mode="before")
@@ -95,12 +95,12 @@ class SweepSettings(Settings):
         )
 
 
-def _read(paths: tuple[str, ...], repair: bool, identities: list[Any]) -> list[Run]:
+def _read(paths: tuple[str, ...], repair: Repairing, identities: list[Any]) -> list[Run]:
     """The training runs, which have to be those that the sweep began with."""
-    runs = [open_run(path, repair=repair) for path in paths]
-    for path, run, wanted in zip(paths, runs, identities, strict=True):
+    runs = [run for path in paths for run in open_legs(path, repair=repair)]
+    for run, wanted in zip(runs, identities, strict=True):
         if run_identity(run) != wanted:
-            raise InputError(f"{path}: has changed since the sweep began; finished trials are kept")
+            raise InputError(f"{run.name}: has changed since the sweep began; finished trials are kept")
     return runs
 
 

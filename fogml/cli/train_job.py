@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from pydantic import field_validator
 
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings, named_values
+from fogml.cli.settings import LimitSettings, Repairing, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -38,7 +38,7 @@ class TrainSettings(LimitSettings):
     parameters: dict[str, Any] = {}
     train_again: bool = False
     navigation: float | None = None
-    repair: bool = False
+    repair: Repairing = False
     strict: bool = False
     any_unit: bool = False
     out: str = "train-results"

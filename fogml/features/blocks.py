@@ -52,8 +52,7 @@ class FeatureBlocks:
             # Two intervals more than the memory, so that no window's edge can fall off.
             oldest = joined.time[-1] - self._features.memory_s - 2.0 * self._sample_s
             kept = min(int(np.searchsorted(joined.time, oldest)), len(joined) - 1)
-            columns = {name: joined.columns[name][kept:].copy() for name in self._kept(joined)}
-            self._history = Run(name=block.name, columns=columns, facts=joined.facts)
+            self._history = joined.end(kept, self._kept(joined))
         return AtomValues(values[added:], full[added:], settled[added:])
 
     def _kept(self, run: Run) -> tuple[str, ...]:
@@ -66,7 +65,4 @@ def _joined(history: Run, block: Run) -> Run:
     missing = [name for name in history.columns if name not in block.columns]
     if missing:
         raise InputError(f"{block.name}: a block lacks {', '.join(missing)}, which the one before it held")
-    columns = {
-        name: np.concatenate([values, block.columns[name]]) for name, values in history.columns.items()
-    }
-    return Run(name=block.name, columns=columns, facts=block.facts)
+    return block.after(history)

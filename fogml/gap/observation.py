@@ -121,6 +121,7 @@ def observe(run: Run, model: GyroModel, *, largest_rows: int = LARGEST_ROWS) -> 
     Unusable
         If it is too short, holds no usable sample, or lacks what the model needs.
     """
+    run = run.without_dropouts
     usable = _usable(run)
     if not usable.any():
         empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]

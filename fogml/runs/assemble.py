@@ -12,38 +12,117 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.runs.arrival_times import burst_ends, sampling_times
+from fogml.runs.clock_order import Ordered, in_order
 from fogml.runs.columns import column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
+from fogml.runs.other_rate import on_gyro_rows
+from fogml.runs.possible import clock_fault, fault_of, faulty, float32_reason
 from fogml.runs.raw_table import RawTable
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 _REPAIR = "--repair"
+DROPPING = ("repaired_rows", "repaired_repeats")
+"""Codes of the findings that count rows which are gone."""
 _MOST_NAMES = 20
 _LONGEST_NAME = 40
 
 
-def run_from_table(table: RawTable, path: Path, *, repair: bool, name: str | None) -> Run:
-    """The run that a file's table holds.
+MOST_DROPPED = 0.02
+"""Repair drops no more than this share of the rows, or one row, unless it is told to."""
+
+
+def runs_of_table(
+    table: RawTable, path: Path, *, repair: bool, name: str | None, most_dropped: float = MOST_DROPPED
+) -> list[Run]:
+    """The runs that a file's table holds: one, or one for each leg where the clock restarts and repair is on.
 
     Raises
     ------
     InputError
-        For every fault that is not repaired.
+        For every fault that is not repaired, and where repair would drop more than the share
+        `most_dropped` of the rows.
     """
-    columns, gyro_unit, findings = _internal_columns(table)
-    rows = np.arange(len(table), dtype=np.intp)
-    for step in (_finite_rows, _ordered_rows, _new_times):
-        kept, finding = step(table, columns, rows, repair)
-        if finding is not None:
-            findings.append(finding)
-            rows = rows[kept]
-            columns = {key: values[kept] for key, values in columns.items()}
+    columns, gyro_unit, tick_s, notes = _internal_columns(table)
+    findings = [*table.findings, *notes]
+    total = len(table) + sum(f.count for f in findings if f.code == "repaired_rows")
+    # Rows of another rate may share their times with the gyro's, so these are told apart first.
+    columns, rows, found = _of_gyro_rate(columns)
+    findings += found
+    kept, finding = _finite_rows(table, {"time": columns["time"]}, rows, repair)
+    rows, columns = _taken(rows, columns, kept, finding, findings)
     if len(rows) < 2:
         raise too_short(table.file, len(rows))
-    return Run(name or path.name, columns, _facts(table, path), gyro_unit, (*table.findings, *findings))
+    ordered = in_order(
+        columns["time"], columns, tick_s=tick_s, row_name=lambda i: table.row_name(int(rows[i]))
+    )
+    if ordered.faults or ordered.hopeless:
+        if not repair or ordered.hopeless or float32_reason(columns["time"]):
+            raise _order_error(table, rows, columns["time"], ordered)
+        columns = {key: values[ordered.rows] for key, values in columns.items()} | {"time": ordered.time}
+        rows = rows[ordered.rows]
+        findings += [fault.done for fault in ordered.faults]
+    runs = []
+    for number, leg in enumerate(ordered.legs):
+        part, part_rows = {key: values[leg] for key, values in columns.items()}, rows[leg]
+        said = list(findings)
+        if ordered.faults:
+            part, kept, found = _of_gyro_rate(part)
+            part_rows, said = part_rows[kept], [*said, *found]
+        kept, finding = _finite_rows(table, part, part_rows, repair)
+        part_rows, part = _taken(part_rows, part, kept, finding, said)
+        _check_clock_steps(table.file, part["time"])
+        time, finding = sampling_times(part)
+        part["time"] = time
+        facts, called = _facts(table, path), name or path.name
+        if len(ordered.legs) > 1:
+            called = f"{called} leg {number + 1}"
+            facts = facts if number == 0 else facts.model_copy(update={"powered_on": None})
+        if len(part_rows) < 2:
+            raise too_short(table.file, len(part_rows))
+        said += [finding] if finding else []
+        runs.append(Run.derived(called, part, facts, gyro_unit, tuple(said)))
+    _check_dropped(table.file, runs, total, most_dropped)
+    return runs
+
+
+def _of_gyro_rate(
+    columns: dict[str, FloatArray],
+) -> tuple[dict[str, FloatArray], IndexArray, tuple[Finding, ...]]:
+    """Columns brought to the gyro's rows, if their times don't go back; as they are if they do."""
+    time = columns["time"]
+    if faulty("time", time) is None and np.all(time[1:] >= time[:-1]):
+        return on_gyro_rows(columns)
+    return columns, np.arange(len(time), dtype=np.intp), ()
+
+
+def _taken(
+    rows: IndexArray,
+    columns: dict[str, FloatArray],
+    kept: IndexArray,
+    finding: Finding | None,
+    findings: list[Finding],
+) -> tuple[IndexArray, dict[str, FloatArray]]:
+    """Rows and columns of the kept rows; what was dropped is noted."""
+    if finding is None:
+        return rows, columns
+    findings.append(finding)
+    return rows[kept], {key: values[kept] for key, values in columns.items()}
+
+
+def _check_dropped(file: str, runs: list[Run], total: int, most_dropped: float) -> None:
+    """Refuse to go on with what is left of a recording."""
+    dropped = {f: f.count for run in runs for f in run.findings if f.code in DROPPING}
+    count = sum(dropped.values())
+    if count > max(1.0, most_dropped * total):
+        what = "; ".join(f.message for f in dropped)
+        raise InputError(
+            f"{file}: {_REPAIR} would drop {count} of {total} rows ({what}), more than "
+            f"{most_dropped:.0%}: correct the file, or {_REPAIR} --repair-anyway drops them"
+        )
 
 
 @dataclass
@@ -63,20 +142,32 @@ class Assembler:
         InputError
             For every fault, also for time that goes back or repeats from one block to the next.
         """
-        columns, gyro_unit, findings = _internal_columns(table)
+        columns, gyro_unit, tick_s, findings = _internal_columns(table)
         rows = np.arange(len(table), dtype=np.intp)
         _finite_rows(table, columns, rows, repair=False)
         time = columns["time"]
+        ordered = in_order(time, columns, tick_s=tick_s, row_name=table.row_name) if len(time) else None
+        if ordered is not None and (ordered.faults or ordered.hopeless):
+            raise _order_error(table, rows, time, ordered)
         if len(time) and time[0] <= self.last_time:
-            raise _order_error(table, time[0] == self.last_time, 0)
-        _ordered_rows(table, columns, rows, repair=False)
-        _new_times(table, columns, rows, repair=False)
+            raise _step_error(table, 0, time[0] == self.last_time)
         if len(time):
+            _check_clock_steps(table.file, time)
             self.last_time = float(time[-1])
             self.samples += len(time)
         if self.facts is None:
             self.facts = _facts(table, self.path)
-        return Run(self.path.name, columns, self.facts, gyro_unit, (*table.findings, *findings))
+        return Run.derived(self.path.name, columns, self.facts, gyro_unit, (*table.findings, *findings))
+
+
+def needs_whole(table: RawTable) -> bool:
+    """Whether a file's first rows show what can't be told block by block: other rates, times of arrival."""
+    columns = _internal_columns(table)[0]
+    if _of_gyro_rate(columns)[2]:
+        return True
+    time = columns["time"]
+    is_clock = faulty("time", time) is None and bool(np.all(time[1:] > time[:-1]))
+    return is_clock and burst_ends(time) is not None
 
 
 def too_short(file: str, samples: int) -> InputError:
@@ -87,10 +178,11 @@ def too_short(file: str, samples: int) -> InputError:
 
 def _internal_columns(
     table: RawTable,
-) -> tuple[dict[str, FloatArray], Literal["deg/h", "count"], list[Finding]]:
-    """Columns by name in internal units, the gyro's unit, and notes on unknown columns."""
+) -> tuple[dict[str, FloatArray], Literal["deg/h", "count"], float, list[Finding]]:
+    """Columns by name in internal units, the gyro's unit, the clock's [s], and notes on unknown columns."""
     columns: dict[str, FloatArray] = {}
     gyro_unit: Literal["deg/h", "count"] = "deg/h"
+    tick_s = 1.0
     unknown = []
     seen: dict[str, None] = {}
     for cell in table.cells:
@@ -108,6 +200,8 @@ def _internal_columns(
         columns[name] = values
         if name == "gyro" and unit == "count":
             gyro_unit = "count"
+        if name == "time":
+            tick_s = factor
         if column_spec(name) is None:
             unknown.append(name)
     for name in ("time", "gyro"):
@@ -121,7 +215,7 @@ def _internal_columns(
     if unknown:
         message = f"kept and not used by models: {_listed(unknown)}"
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
-    return columns, gyro_unit, notes
+    return columns, gyro_unit, tick_s, notes
 
 
 def _listed(names: Collection[str]) -> str:
@@ -134,72 +228,52 @@ def _listed(names: Collection[str]) -> str:
 def _finite_rows(
     table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
 ) -> tuple[IndexArray, Finding | None]:
-    """Rows whose values of the run format are all finite."""
+    """Rows whose values of the run format are all numbers that a recording can hold."""
     bad: NDArray[np.bool_] | None = None
     for name, values in columns.items():
-        # The sum is finite unless a value is not, and takes one pass without a mask.
-        with np.errstate(over="ignore", invalid="ignore"):
-            is_sound = np.isfinite(values.sum())
-        if is_sound or column_spec(name) is None:
-            continue
-        found = ~np.isfinite(values)
-        if not found.any():
+        found = faulty(name, values)
+        if found is None:
             continue
         if not repair:
             row = int(np.argmax(found))
-            kind = "missing (NaN)" if np.isnan(values[row]) else "infinite"
             raise InputError(
-                f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is {kind}, "
-                f"{int(found.sum())} such in the column; correct them, or {_REPAIR} drops the rows"
+                f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is "
+                f"{fault_of(values[row])}, {int(found.sum())} such in the column; correct them, or {_REPAIR} "
+                "drops the rows"
             )
         bad = found if bad is None else bad | found
     if bad is None:
         return rows, None
-    first = int(np.argmax(bad))
+    first = int(rows[np.argmax(bad)])
     count = int(bad.sum())
     message = f"rows dropped for missing or infinite values: {count}, the first: {table.row_name(first)}"
     return np.flatnonzero(~bad), Finding("repaired_rows", message, row=first + 1, count=count)
 
 
-def _ordered_rows(
-    table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
-) -> tuple[IndexArray, Finding | None]:
-    """Rows in order of time."""
-    time = columns["time"]
-    back = time[1:] < time[:-1]
-    if not back.any():
-        return rows, None
-    first = int(np.argmax(back)) + 1
-    if not repair:
-        raise _order_error(table, False, int(rows[first]))
-    count = int(back.sum())
-    message = f"rows sorted, as time goes back: {count} times, first at {table.row_name(int(rows[first]))}"
-    order = np.argsort(time, kind="stable")
-    return order, Finding("repaired_order", message, column="time", row=int(rows[first]) + 1, count=count)
-
-
-def _new_times(
-    table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
-) -> tuple[IndexArray, Finding | None]:
-    """Rows whose time is not that of the row before."""
-    time = columns["time"]
-    repeats = np.flatnonzero(time[1:] == time[:-1]) + 1
-    if not len(repeats):
-        return rows, None
-    first = int(rows[repeats[0]])
-    if not repair:
-        raise _order_error(table, True, first)
-    message = f"rows dropped that repeat a time: {len(repeats)}, the first: {table.row_name(first)}"
-    kept = np.delete(np.arange(len(rows), dtype=np.intp), repeats)
-    return kept, Finding("repaired_repeats", message, column="time", row=first + 1, count=len(repeats))
-
-
-def _order_error(table: RawTable, repeats: bool, row: int) -> InputError:
-    what, cure = ("repeats", "drops the repeats") if repeats else ("goes back", "sorts the rows")
-    return InputError(
-        f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase; "
-        f"correct it, or {_REPAIR} {cure}"
+def _order_error(table: RawTable, rows: IndexArray, time: FloatArray, ordered: Ordered) -> InputError:
+    """What to say of a clock out of order: what it suffers from, and only what mends that."""
+    at = int(np.argmax(time[1:] <= time[:-1])) + 1 if np.any(time[1:] <= time[:-1]) else 0
+    why = float32_reason(time) or ordered.hopeless
+    if why:
+        cure = f"{why}; correct it, or give 'sample_s' in an import profile in place of the clock"
+        return _step_error(table, int(rows[at]), time[at] == time[at - 1], cure)
+    told = ", and ".join(fault.told for fault in ordered.faults)
+    cures = " and ".join(dict.fromkeys(fault.cure for fault in ordered.faults))
+    return _step_error(
+        table, int(rows[at]), time[at] == time[at - 1], f"{told}; correct it, or {_REPAIR} {cures}"
     )
+
+
+def _step_error(table: RawTable, row: int, repeats: bool, cure: str = "correct it") -> InputError:
+    what = "repeats" if repeats else "goes back"
+    return InputError(
+        f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase: {cure}"
+    )
+
+
+def _check_clock_steps(file: str, time: FloatArray) -> None:
+    if fault := clock_fault(time):
+        raise InputError(f"{file}, column 'time': {fault}")
 
 
 def _facts(table: RawTable, path: Path) -> Facts:

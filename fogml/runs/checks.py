@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
+from fogml.runs.plausible import implausible
 from fogml.runs.run import BoolArray, FloatArray, Run
 
 STUCK_S = 600.0
@@ -37,8 +38,10 @@ IndexArray = NDArray[np.intp]
 
 
 def check_run(run: Run) -> tuple[Finding, ...]:
-    """Everything noticed in a run, in O(n).
+    """Everything noticed in a run, in O(n): first what `implausible` finds.
 
+    ``temperature_dropouts``
+        Readings of a thermometer that are none (`read_thermometer`).
     ``gap``
         Intervals longer than 3 median sample intervals.
     ``irregular_sampling``
@@ -57,9 +60,23 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     """
     if len(run) < 2:
         return ()
-    parts = (_gaps, _irregular, _stuck, _saturated, _outliers, _span)
+    parts = (implausible, _dropouts, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
     with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
         return tuple(finding for part in parts for finding in part(run))
+
+
+def _dropouts(run: Run) -> Iterator[Finding]:
+    for name in run.temperature_columns:
+        bad = run.dropouts(name)
+        if bad is not None:
+            count, row = int(np.count_nonzero(bad)), int(np.argmax(bad))
+            readings = "1 reading" if count == 1 else f"{count} readings"
+            message = (
+                f"{readings} of '{name}' {'is' if count == 1 else 'are'} none, the first "
+                f"{run.columns[name][row]:.6g} at {run.time[row]:.6g} s: out of range, or a jump that no heat "
+                "makes; the last good one is held, and these rows are left out of fit and score and flagged"
+            )
+            yield Finding("temperature_dropouts", message, column=name, row=row + 1, count=count)
 
 
 def _gaps(run: Run) -> Iterator[Finding]:

@@ -74,7 +74,7 @@ class Facts(BaseModel):
     """The facts about the set-up that a side file may state. All optional.
 
     Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
-    turns about, counter-clockwise; up where it is not stated.
+    turns about, counter-clockwise; up where it is not stated. `compensated`: a model was applied to the output.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -86,6 +86,7 @@ class Facts(BaseModel):
     scale_factor: ScaleFactor | None = None
     powered_on: float | None = Field(default=None, allow_inf_nan=False)
     started: Annotated[datetime | None, BeforeValidator(_moment)] = None
+    compensated: bool | None = None
     notes: str | None = None
 
     @property

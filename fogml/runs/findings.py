@@ -2,8 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
+
+
+FIRST_OF_ALL = (
+    "already_compensated",
+    "implausible_temperature",
+    "thermometers_apart",
+    "implausible_earth_rate",
+    "implausible_scale_factor",
+    "temperature_dropouts",
+)
+"""Codes of the findings that make every figure wrong, and are said before any other."""
+
+
+def first_of_all(findings: Iterable[Finding]) -> list[Finding]:
+    """Findings, those first that make every figure wrong."""
+    return sorted(findings, key=lambda finding: finding.code not in FIRST_OF_ALL)
 
 
 @dataclass(frozen=True)

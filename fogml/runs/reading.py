@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Literal
 
 from fogml.errors import InputError, listed, quoted
-from fogml.runs.assemble import Assembler, run_from_table, too_short
+from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
 from fogml.runs.raw_table import RawTable
@@ -45,6 +45,7 @@ def read_run(
     *,
     repair: bool = False,
     name: str | None = None,
+    most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Run:
     """Read a run from CSV, Parquet, HDF5 or MATLAB, told by content and suffix.
@@ -56,10 +57,13 @@ def read_run(
     path
         The file.
     repair
-        Sort times that go back, drop repeated times and rows that can't be read or hold missing
-        or infinite values; what was done is counted in the run's findings.
+        Bring times that go back in order: rows out of place are sorted, a wrapped counter is
+        unwrapped, coarse stamps are spread, repeated rows are dropped, and so are rows that can't be
+        read or hold missing or infinite values; what was done is counted in the run's findings.
     name
         Name of the run; the file's base name by default.
+    most_dropped
+        Share of the rows that repair may drop.
     limits
         What reading may take before the file counts as damaged.
 
@@ -71,13 +75,41 @@ def read_run(
     Raises
     ------
     InputError
-        Naming file, column, first bad row, and what to do; if the file changes while it is read.
+        Naming file, column, first bad row, and what to do; also if the file changes while it is read,
+        and if the clock restarts, so that the file holds several runs (`read_runs`).
+    """
+    runs = read_runs(path, repair=repair, name=name, most_dropped=most_dropped, limits=limits)
+    if len(runs) > 1:
+        restart = next(f for f in runs[0].findings if f.code == "repaired_restart")
+        raise InputError(
+            f"{Path(path).name}, column 'time': {restart.message.partition(':')[0]}, and one run is needed "
+            "here; save the rows of one leg as a file of its own, or name them as 'legs' in an import profile"
+        )
+    return runs[0]
+
+
+def read_runs(
+    path: str | Path,
+    *,
+    repair: bool = False,
+    name: str | None = None,
+    most_dropped: float = MOST_DROPPED,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> list[Run]:
+    """Read the runs in a file, as `read_run`: one, or with `repair` one for each restart of its clock.
+
+    Legs are named ``FILE leg 1`` and so on; a stated time of power-on belongs to the first.
+
+    Raises
+    ------
+    InputError
+        As `read_run`.
     """
     path = Path(path)
     with unchanged(*run_sources(path)):
-        kind = file_format(path)
-        run = run_from_table(_read_table(path, kind, repair, limits), path, repair=repair, name=name)
-    return run.with_findings(check_run(run))
+        table = _read_table(path, file_format(path), repair, limits)
+        runs = runs_of_table(table, path, repair=repair, name=name, most_dropped=most_dropped)
+    return [run.with_findings(check_run(run)) for run in runs]
 
 
 def read_blocks(
@@ -85,12 +117,16 @@ def read_blocks(
     *,
     columns: Collection[str] | None = None,
     block_rows: int = BLOCK_ROWS,
+    repair: bool = False,
+    most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Iterator[Run]:
     """Read a run in blocks of at most `block_rows` rows, in bounded memory.
 
     Blocks share name and facts. Order of time is checked across their borders. MATLAB files of
-    version 5 are held whole while they are read.
+    version 5 are held whole while they are read; so is a file to repair, and one whose first block
+    shows columns of another rate or times of arrival, which only the whole tells.
+
 
     Parameters
     ----------
@@ -101,6 +137,8 @@ def read_blocks(
         not met.
     block_rows
         Most rows of a block.
+    repair, most_dropped
+        As `read_run`.
     limits
         What reading may take before the file counts as damaged.
 
@@ -118,6 +156,11 @@ def read_blocks(
     path = Path(path)
     if block_rows < 1:
         raise InputError(f"{block_rows} rows a block: at least 1 is needed")
+    if repair:
+        yield from _cut(
+            read_run(path, repair=True, most_dropped=most_dropped, limits=limits), columns, block_rows
+        )
+        return
     with unchanged(*run_sources(path)):
         kind = file_format(path)
         assembler = Assembler(path)
@@ -128,9 +171,25 @@ def read_blocks(
                 raise InputError(
                     f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
                 )
+            if assembler.samples == 0 and needs_whole(table):
+                yield from _cut(read_run(path, limits=limits), columns, block_rows)
+                return
             yield assembler.block(table)
         if assembler.samples < 2:
             raise too_short(path.name, assembler.samples)
+
+
+def _cut(run: Run, columns: Collection[str] | None, block_rows: int) -> Iterator[Run]:
+    """A run in blocks."""
+    kept = None if columns is None else {"time", "gyro", *columns}
+    held = {name: values for name, values in run.columns.items() if kept is None or name in kept}
+    if missing := [column for column in columns or () if column not in held]:
+        raise InputError(
+            f"{run.name}: no column {quoted(missing[0])} of numbers; it holds {listed(run.columns)}"
+        )
+    whole = Run.derived(run.name, held, run.facts, run.gyro_unit, run.findings)
+    for start in range(0, len(whole), block_rows):
+        yield whole[start : start + block_rows]
 
 
 def read_table(path: Path) -> RawTable:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
@@ -14,9 +14,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.runs.arrival_times import sampling_times
 from fogml.runs.columns import coil_sensor_number, is_temperature
+from fogml.runs.dropouts import Reading, last_reading, read_thermometer
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
+from fogml.runs.possible import as_vector, check_columns
 from fogml.signals.clock import Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
@@ -51,8 +54,29 @@ class Run:
     findings: tuple[Finding, ...] = ()
 
     def __post_init__(self) -> None:
+        """Check the columns as a file's reader does.
+
+        Times given as dates are converted to seconds since the first. Times of arrival in bursts are
+        replaced by those of sampling, which is noted in the findings.
+
+        Raises
+        ------
+        InputError
+            Naming the run, the column and the first sample at fault: no vector of numbers, of another
+            length, missing or infinite, time that goes back or repeats, or is in too coarse a precision.
+        """
+        columns = {name: as_vector(self.name, name, values) for name, values in self.columns.items()}
+        self._freeze(columns)
+        check_columns(self.name, columns)
+        time, finding = sampling_times(columns)
+        if finding is not None:
+            self._freeze({**columns, "time": time})
+            object.__setattr__(self, "findings", (*self.findings, finding))
+
+    def _freeze(self, columns: Mapping[str, FloatArray]) -> None:
+        """Take columns as read-only views of one length."""
         frozen: dict[str, FloatArray] = {}
-        for name, values in self.columns.items():
+        for name, values in columns.items():
             view = np.asarray(values, dtype=np.float64).view()
             view.flags.writeable = False
             frozen[name] = view
@@ -65,9 +89,26 @@ class Run:
         object.__setattr__(self, "columns", MappingProxyType(frozen))
 
     @classmethod
+    def derived(
+        cls,
+        name: str,
+        columns: Mapping[str, FloatArray],
+        facts: Facts | None = None,
+        gyro_unit: Literal["deg/h", "count"] = "deg/h",
+        findings: tuple[Finding, ...] = (),
+    ) -> Run:
+        """A run of columns that were checked before, such as a part of a run."""
+        run = object.__new__(cls)
+        values = {"name": name, "facts": facts or Facts(), "gyro_unit": gyro_unit, "findings": findings}
+        for key, value in values.items():
+            object.__setattr__(run, key, value)
+        run._freeze(columns)
+        return run
+
+    @classmethod
     def from_columns(cls, name: str = "run", facts: Facts | None = None, **columns: ArrayLike) -> Run:
         """A run from arrays in internal units: ``Run.from_columns(time=t, gyro=g, T=temperature)``."""
-        arrays = {key: np.array(values, dtype=np.float64) for key, values in columns.items()}
+        arrays = {key: as_vector(name, key, values).copy() for key, values in columns.items()}
         return cls(name=name, columns=arrays, facts=facts or Facts())
 
     def __len__(self) -> int:
@@ -133,6 +174,7 @@ class Run:
     def temperature(self, name: str = "T") -> FloatArray:
         """A temperature [degC] by its name in formulas, shape (n,).
 
+        Readings that are none are replaced by the last good one (`read_thermometer`).
         ``T`` is the column T, else T_in, else the mean of the odd coil sensors; ``T_in`` and
         ``T_out`` stand for the means of the odd and even sensors where only T1 ... are recorded.
 
@@ -143,7 +185,7 @@ class Run:
         """
         sensors = self.sensors(name)
         if len(sensors) == 1:
-            return self.columns[sensors[0]]
+            return self._readings[sensors[0]].values
         if sensors:
             return self._sensor_mean(sensors)
         held = ", ".join(self.temperature_columns) or "none"
@@ -165,8 +207,57 @@ class Run:
     def _sensor_mean(self, sensors: tuple[str, ...]) -> FloatArray:
         means: dict[tuple[str, ...], FloatArray] = self.__dict__.setdefault("_sensor_means", {})
         if sensors not in means:
-            means[sensors] = np.mean([self.columns[c] for c in sensors], axis=0)
+            means[sensors] = np.mean([self._readings[c].values for c in sensors], axis=0)
         return means[sensors]
+
+    @cached_property
+    def _readings(self) -> dict[str, Reading]:
+        return {name: read_thermometer(self.time, self.columns[name]) for name in self.temperature_columns}
+
+    def after(self, before: Run) -> Run:
+        """The run behind the one before it as one, with the columns of that.
+
+        What the thermometers showed before tells which readings of this one are none.
+        """
+        columns = {name: np.concatenate([x, self.columns[name]]) for name, x in before.columns.items()}
+        joined = Run.derived(self.name, columns, self.facts, self.gyro_unit)
+        readings = {}
+        for name in before.temperature_columns:
+            first = before._readings[name]
+            state = last_reading(before.time, before.columns[name], first)
+            second = read_thermometer(self.time, self.columns[name], before=state)
+            bad = None
+            if first.bad is not None or second.bad is not None:
+                parts = ((first, len(before)), (second, len(self)))
+                bad = np.concatenate([np.zeros(n, bool) if r.bad is None else r.bad for r, n in parts])
+            readings[name] = Reading(np.concatenate([first.values, second.values]), bad)
+        joined.__dict__["_readings"] = readings
+        return joined
+
+    def end(self, start: int, names: Iterable[str]) -> Run:
+        """A copy of some columns from a sample on, which keeps nothing else in memory."""
+        columns = {name: self.columns[name][start:].copy() for name in names}
+        part = Run.derived(self.name, columns, self.facts, self.gyro_unit)
+        part.__dict__["_readings"] = {
+            name: Reading(r.values[start:].copy(), None if r.bad is None else r.bad[start:].copy())
+            for name, r in self._readings.items()
+        }
+        return part
+
+    def dropouts(self, name: str) -> BoolArray | None:
+        """Samples at which a temperature was not measured, shape (n,); None where it always was.
+
+        `name` is one in formulas, as in `temperature`.
+        """
+        found = [self._readings[sensor].bad for sensor in self.sensors(name)]
+        masks = [bad for bad in found if bad is not None]
+        return np.logical_or.reduce(masks) if masks else None
+
+    @property
+    def without_dropouts(self) -> Run:
+        """The run with each temperature that was not measured replaced by the last good reading."""
+        changed = {name: r.values for name, r in self._readings.items() if r.bad is not None}
+        return self._with({**self.columns, **changed}) if changed else self
 
     @cached_property
     def clock(self) -> Clock:
@@ -205,13 +296,17 @@ class Run:
 
     def __getitem__(self, part: slice) -> Run:
         """A part of the run as views, e.g. ``run[100:200]``."""
-        return replace(self, columns={name: values[part] for name, values in self.columns.items()})
+        return self._with({name: values[part] for name, values in self.columns.items()})
 
     def with_columns(self, **columns: ArrayLike) -> Run:
         """The run with columns added or replaced (internal units)."""
-        added = {name: np.asarray(values, dtype=np.float64) for name, values in columns.items()}
-        return replace(self, columns={**self.columns, **added})
+        added = {name: as_vector(self.name, name, values) for name, values in columns.items()}
+        check_columns(self.name, added)
+        return self._with({**self.columns, **added})
+
+    def _with(self, columns: Mapping[str, FloatArray]) -> Run:
+        return Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
 
     def with_findings(self, findings: Iterable[Finding]) -> Run:
         """The run with more findings."""
-        return replace(self, findings=(*self.findings, *findings))
+        return Run.derived(self.name, self.columns, self.facts, self.gyro_unit, (*self.findings, *findings))

@@ -69,6 +69,7 @@ def replay(twin: Twin, run: Run, *, only: str | None = None, truth: Truth | None
 
 def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
     """What a run recorded, as inputs, and when the unit was on."""
+    run = run.without_dropouts
     windows = _power_windows(run)
     temperatures = {
         name: run.columns[name] for name in run.temperature_columns if coil_sensor_number(name) is None

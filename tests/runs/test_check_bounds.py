@@ -41,7 +41,7 @@ def test_a_stuck_sensor_anywhere(interval_s, jitter, gap_s, begin, held_s, seed)
     steps = interval_s * rng.uniform(1.0 - jitter, 1.0 + jitter, 1200)
     steps[begin // 2 :: 150] += gap_s
     time = np.cumsum(steps)
-    moving = np.arange(1200.0)
+    moving = time / interval_s
     # Steps of 0.1 are its resolution, so that what the other has to move by is MOVED_DEGC.
     held = 0.1 * rng.integers(0, 3, 1200)
     held[(time >= time[begin % 1200]) & (time <= time[begin % 1200] + held_s)] = 1.0

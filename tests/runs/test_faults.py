@@ -101,7 +101,9 @@ def test_repairs_of_every_kind_at_once(tmp_path):
     rows[20] = rows[19]
     path = tmp_path / "bad.csv"
     path.write_text(text_of(*rows))
-    run = read_run(path, repair=True)
+    with pytest.raises(InputError, match=r"would drop 3 of 40 rows.*--repair-anyway"):
+        read_run(path, repair=True)
+    run = read_run(path, repair=True, most_dropped=0.1)
     counts = {f.code: f.count for f in run.findings if f.code.startswith("repaired")}
     assert counts == {"repaired_rows": 2, "repaired_order": 1, "repaired_repeats": 1}
     kept = [i for i in range(40) if i not in (3, 5, 20)]

@@ -326,7 +326,7 @@ def test_numbers_come_back_to_the_last_digit_among_garbage(tmp_path_factory, val
         return
     (run,) = import_recording(path, profile)
     assert run.gyro.tolist() == [gyro for gyro, _ in values]
-    assert run.temperature("T").tolist() == [temperature for _, temperature in values]
+    assert run.columns["T"].tolist() == [temperature for _, temperature in values]
     assert sum(counts(run).values()) == len(counted)
 
 

@@ -85,12 +85,12 @@ def test_no_run_is_made_of_a_file_that_changes(tmp_path, suffix, change):
 
 def test_a_run_read_whole_from_a_file_that_is_replaced_meanwhile(tmp_path, monkeypatch):
     path = write_table(tmp_path / "a.csv", samples())
-    read = reading.run_from_table
+    read = reading.runs_of_table
 
     def replaced_meanwhile(*arguments, **more):
         replaced(path)
         return read(*arguments, **more)
 
-    monkeypatch.setattr("fogml.runs.reading.run_from_table", replaced_meanwhile)
+    monkeypatch.setattr("fogml.runs.reading.runs_of_table", replaced_meanwhile)
     with pytest.raises(InputError, match=r"a\.csv: changed while it was read"):
         read_run(path)

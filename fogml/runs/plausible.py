@@ -1,0 +1,185 @@
+"""What the numbers of a run give away: a wrong sign or unit, thermometers apart, a gyro compensated before.
+
+Each is said before anything else, as every figure after it would be wrong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.findings import Finding
+from fogml.runs.run import FloatArray, Run
+from fogml.runs.turning import turning
+
+HOUR_S = 3600.0
+FACTORS = {
+    "deg/s taken for deg/h": 1.0 / HOUR_S,
+    "deg/h taken for deg/s": HOUR_S,
+    "rad/s taken for deg/s": np.pi / 180.0,
+    "deg/s taken for rad/s": 180.0 / np.pi,
+    "rad/s taken for deg/h": np.pi / 180.0 / 3600.0,
+    "deg/h taken for rad/s": 180.0 / np.pi * 3600.0,
+}
+"""Factors by which a reading is off when its unit is taken for another."""
+NEAR_EARTH_RATE = 0.3
+"""A mean is Earth rate of the other sign or 3600 times off if it is as near to that as this share of it."""
+NEAR_BY_CHANCE = 0.05
+"""... and off by another unit if as near as this, as a plain bias may lie there too."""
+STEADY = 3.0
+"""... and, for one that is too small, if the samples scatter less than this many times the mean."""
+LEAST_EARTH_RATE_DEG_H = 1.0
+"""Less than this along the input axis [deg/h] tells nothing beside a bias."""
+FAR_SCALE_FACTOR = 0.5
+"""A scale factor off by more than this share is no error of a gyro."""
+NEAR_FACTOR = 0.1
+"""A ratio is that of two units if it is as near to it as this share."""
+LEAST_TURN_SIGMA = 20.0
+"""The table must turn this many times as fast as the output scatters at rest before it is judged."""
+APART_DEGC = 80.0
+"""Thermometers of one set-up don't differ by more on average [degC]: chamber to electronics, in a shock."""
+KELVIN = (203.15, 400.0)
+"""Readings in kelvin lie between these: -70 to 127 degC."""
+COUNTS = 400.0
+"""Readings all beyond this are no temperature in any unit."""
+_RELATED_DEGC = 5.0
+
+
+def implausible(run: Run) -> Iterator[Finding]:
+    """What can't be as the run states it.
+
+    ``already_compensated``
+        The facts say so, or columns that ``fogml compensate`` writes are there.
+    ``implausible_temperature``
+        A temperature in degC whose numbers are those of kelvin, Fahrenheit or raw counts.
+    ``thermometers_apart``
+        The means of two thermometers differ by more than 80 degC.
+    ``implausible_earth_rate``
+        Earth rate is known, and the mean at rest is that with the other sign, or in another unit.
+    ``implausible_scale_factor``
+        The output follows the table rate with the other sign, or in another unit.
+    """
+    yield from _compensated(run)
+    yield from _temperature_units(run)
+    yield from _thermometers(run)
+    try:
+        gyro = run.gyro_deg_h
+    except InputError:
+        return  # counts whose scale factor is not stated
+    yield from _scale_factor(run, gyro)
+    yield from _earth_rate(run, gyro)
+
+
+def compensated_by(run: Run) -> str | None:
+    """What says that the output is compensated already, or that a compensation lies beside it; else None."""
+    if run.facts.compensated:
+        return "its facts say 'compensated'"
+    if "gyro_compensated" in run.columns:
+        return "it holds a column 'gyro_compensated'"
+    return None
+
+
+def _compensated(run: Run) -> Iterator[Finding]:
+    if run.facts.compensated:
+        message = (
+            "the output is compensated already: a model of it is one of what is left, and no drift model"
+        )
+        yield Finding("already_compensated", message, column="gyro")
+
+
+def _temperature_units(run: Run) -> Iterator[Finding]:
+    for name in run.temperature_columns:
+        values = run.columns[name]
+        low, middle = (float(q) for q in np.quantile(values, [0.02, 0.5]))
+        high = float(np.quantile(values, 0.98))
+        if KELVIN[0] <= low and high <= KELVIN[1] and middle > 200.0:
+            told = f"'{name}' is stated in degC and reads {low:.4g} to {high:.4g}: kelvin? Write '{name} [K]'"
+        elif low > COUNTS or high < -COUNTS:
+            told = (
+                f"'{name}' is stated in degC and reads {low:.4g} to {high:.4g}: raw counts? State scale and "
+                "offset in an import profile"
+            )
+        else:
+            continue
+        yield Finding("implausible_temperature", told, column=name, count=len(values))
+
+
+def _thermometers(run: Run) -> Iterator[Finding]:
+    names = run.temperature_columns
+    means = {name: float(np.median(run.columns[name])) for name in names}
+    for i, a in enumerate(names):
+        for b in names[i + 1 :]:
+            for cold, warm in ((a, b), (b, a)):
+                fahrenheit = 1.8 * run.columns[cold] + 32.0
+                if means[warm] - means[cold] > 2.0 * _RELATED_DEGC and _same(run.columns[warm], fahrenheit):
+                    told = (
+                        f"'{warm}' is 1.8 times '{cold}' and 32 more: is it in Fahrenheit? Convert it to degC"
+                    )
+                    yield Finding("implausible_temperature", told, column=warm, count=len(run))
+                    break
+            else:
+                if abs(means[a] - means[b]) > APART_DEGC:
+                    told = (
+                        f"'{a}' and '{b}' differ by {abs(means[a] - means[b]):.4g} degC on average "
+                        f"({means[a]:.4g} and {means[b]:.4g}): is one of them in another unit, or dead?"
+                    )
+                    yield Finding("thermometers_apart", told, column=a, count=len(run))
+
+
+def _same(a: FloatArray, b: FloatArray) -> bool:
+    """Whether two thermometers read the same, most of the time."""
+    return float(np.quantile(np.abs(a - b), 0.9)) < _RELATED_DEGC and float(np.ptp(b)) > _RELATED_DEGC
+
+
+def _scale_factor(run: Run, gyro: FloatArray) -> Iterator[Finding]:
+    turns = turning(run) if "rate" in run.columns else np.zeros(len(run), dtype=bool)
+    if np.count_nonzero(turns) < 2:
+        return
+    rate = 3600.0 * run.rate[turns]
+    output = gyro[turns]
+    ratios = output / rate
+    middle = float(np.median(ratios))
+    spread = float(np.median(np.abs(ratios - middle)))
+    if abs(middle - 1.0) <= FAR_SCALE_FACTOR or spread > abs(middle) / LEAST_TURN_SIGMA:
+        return
+    told = f"the output follows the table rate {middle:.4g} times, {1e6 * (middle - 1.0):.3g} ppm off: "
+    yield Finding("implausible_scale_factor", told + _why(middle), column="gyro", count=len(output))
+
+
+def _why(ratio: float) -> str:
+    """What a ratio to the truth comes from."""
+    sign = "with the other sign" if ratio < 0.0 else ""
+    for unit, factor in FACTORS.items():
+        if abs(abs(ratio) / factor - 1.0) < NEAR_FACTOR:
+            return " and ".join(part for part in (sign, unit) if part) + "? Correct the column's unit"
+    if abs(abs(ratio) - 1.0) <= FAR_SCALE_FACTOR:
+        return f"{sign}: is the axis or the table's sense turned round? Correct the sign"
+    return "is the unit or the scale factor stated wrongly?"
+
+
+def _earth_rate(run: Run, gyro: FloatArray) -> Iterator[Finding]:
+    earth = run.facts.earth_rate_deg_h
+    if earth is None or abs(earth) < LEAST_EARTH_RATE_DEG_H or "position" in run.columns:
+        return  # where the unit is turned between positions, the facts tell one of them
+    rest = ~turning(run) if "rate" in run.columns else np.ones(len(run), dtype=bool)
+    if np.count_nonzero(rest) < 2:
+        return
+    at_rest = gyro[rest]
+    mean = float(np.median(at_rest))
+    scatter = 1.4826 * float(np.median(np.abs(at_rest - mean)))
+    why = None
+    if abs(mean + earth) < NEAR_EARTH_RATE * abs(earth):
+        why = _why(-1.0)
+    for unit, factor in FACTORS.items():
+        near = NEAR_EARTH_RATE if max(factor, 1.0 / factor) == HOUR_S else NEAR_BY_CHANCE
+        for sign in (1.0, -1.0):
+            off = abs(mean / (sign * factor * earth) - 1.0)
+            if off < near and (factor > 1.0 or scatter < STEADY * abs(mean)):
+                turned = " and with the other sign" if sign < 0.0 else ""
+                why = f"{unit}{turned}? Correct the column's unit"
+    if why is None:
+        return
+    told = f"the output at rest is {mean:.4g} deg/h, and Earth rate along the input axis {earth:.4g} deg/h: {why}"
+    yield Finding("implausible_earth_rate", told, column="gyro", count=len(at_rest))

@@ -1,0 +1,155 @@
+"""Numbers that no recording holds: missing, infinite, beyond any sensor; clocks that no logger has."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from fogml.errors import InputError
+from fogml.runs.columns import column_spec
+
+FloatArray = NDArray[np.float64]
+
+GREATEST = 1e20
+"""Values beyond this, in any unit of the run format, are faults; a count of 64 bits is below it."""
+SHORTEST_STEP_S = 1e-9
+"""No gyro is sampled faster than this [s]."""
+GREATEST_TIME_S = 1e13
+"""No clock shows more [s]: an epoch in seconds is 2e9, 300,000 years are 1e13."""
+ROUGH_STEP = 0.1
+"""Single precision is too rough for a clock where its numbers lie more of a mean interval apart."""
+
+
+def faulty(name: str, values: FloatArray) -> NDArray[np.bool_] | None:
+    """Which values of a column of the run format no recording holds, shape (n,); None where all are sound."""
+    if column_spec(name) is None or len(values) == 0:
+        return None
+    low, high = values.min(), values.max()  # NaN where any value is
+    if low >= -GREATEST and high <= GREATEST:
+        return None
+    with np.errstate(invalid="ignore"):
+        return np.asarray(~(np.abs(values) <= GREATEST))
+
+
+def fault_of(value: float) -> str:
+    """What is wrong with a value."""
+    if np.isnan(value):
+        return "missing (NaN)"
+    return "infinite" if np.isinf(value) else f"{value:.3g}, which no sensor gives"
+
+
+def clock_fault(time: FloatArray) -> str | None:
+    """What is wrong with a clock that strictly increases, or None."""
+    if len(time) < 2:
+        return None
+    if max(abs(time[0]), abs(time[-1])) > GREATEST_TIME_S:
+        most = max(time[0], time[-1], key=abs)
+        return f"times up to {most:.3g} s are no clock's; state its unit, e.g. 'time [us]'"
+    step = float(time[-1] - time[0]) / (len(time) - 1)
+    if step < SHORTEST_STEP_S:
+        return f"samples {step:.3g} s apart are no gyro's; state the clock's unit, e.g. 'time [s]'"
+    return None
+
+
+def float32_reason(time: FloatArray) -> str | None:
+    """Why a clock in single precision can't tell its samples apart, or None if it is not that."""
+    if len(time) < 2 or not np.isfinite(time).all():
+        return None
+    greatest = float(np.abs(time).max())
+    if greatest > float(np.finfo(np.float32).max):
+        return None
+    apart = float(np.spacing(np.float32(greatest)))
+    if apart <= ROUGH_STEP * float(np.ptp(time)) / (len(time) - 1) or apart < 1e-6:
+        return None
+    if np.any(time.astype(np.float32).astype(np.float64) != time):
+        return None
+    return (
+        f"the times are in single precision (float32), whose numbers near {greatest:.4g} are {apart:.3g} s "
+        "apart; take the start off in double precision before they are stored"
+    )
+
+
+def as_vector(run: str, name: str, values: ArrayLike) -> FloatArray:
+    """A column as float64, shape (n,); dates and durations as seconds, dates since the first.
+
+    Raises
+    ------
+    InputError
+        Naming run and column, if it is no vector of numbers.
+    """
+    array = np.asarray(values)
+    if name == "time" and (array.dtype.kind in "mM" or _holds_dates(array)):
+        return _seconds(run, values)
+    if array.dtype.kind not in "fiub" and array.dtype != object:
+        raise InputError(f"{run}, column '{name}': holds {array.dtype}, numbers were expected")
+    try:
+        vector = np.asarray(array, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"{run}, column '{name}': holds what is no number; numbers were expected") from None
+    if vector.ndim != 1:
+        raise InputError(
+            f"{run}, column '{name}': of shape {vector.shape}, one number a sample was expected, shape (n,)"
+        )
+    return vector
+
+
+def _holds_dates(array: NDArray[np.generic]) -> bool:
+    """Whether an array of objects holds dates, as that of a pandas column with a time zone does."""
+    return array.dtype == object and array.ndim == 1 and len(array) > 0 and hasattr(array[0], "timestamp")
+
+
+def _seconds(run: str, values: ArrayLike) -> FloatArray:
+    """Dates or durations of any resolution as seconds, dates since the first one."""
+    array = np.asarray(values)
+    if array.dtype == object:
+        try:
+            seconds = [(date - array[0]).total_seconds() for date in array.tolist()]
+        except (AttributeError, TypeError):
+            raise InputError(f"{run}, column 'time': holds dates that can't be read") from None
+        return np.array(seconds, dtype=np.float64)
+    if np.isnat(array).any():
+        row = int(np.argmax(np.isnat(array)))
+        raise InputError(f"{run}, column 'time', sample {row + 1}: the value is missing (NaT); leave it out")
+    if array.ndim != 1:
+        raise InputError(f"{run}, column 'time': of shape {array.shape}, shape (n,) was expected")
+    unit = np.datetime_data(array.dtype)[0]
+    if unit in ("Y", "M", "generic"):
+        raise InputError(f"{run}, column 'time': dates of unit '{unit}' tell no samples apart")
+    since = array if array.dtype.kind == "m" else array - array[:1]
+    return np.asarray(since / np.timedelta64(1, "s"), dtype=np.float64)
+
+
+def check_columns(run: str, columns: Mapping[str, FloatArray]) -> None:
+    """Refuse columns that are no recording: faulty values, a clock that does not go on.
+
+    Raises
+    ------
+    InputError
+        Naming run, column, the first sample at fault, and what to do.
+    """
+    for name, values in columns.items():
+        bad = faulty(name, values)
+        if bad is not None:
+            row = int(np.argmax(bad))
+            raise InputError(
+                f"{run}, column '{name}', sample {row + 1}: the value is {fault_of(values[row])}, "
+                f"{int(bad.sum())} such in the column; correct them or leave these samples out"
+            )
+    time = columns.get("time")
+    if time is None:
+        return
+    stays = time[1:] <= time[:-1]
+    if stays.any():
+        row = int(np.argmax(stays)) + 1
+        what = "repeats" if time[row] == time[row - 1] else "goes back"
+        why = float32_reason(time) or (
+            "rows out of order, a restart or a wrapped counter are told apart by "
+            "fogml.runs.clock_order.in_order(time, columns)"
+        )
+        raise InputError(
+            f"{run}, column 'time', sample {row + 1}: time {what}; it must strictly increase: {why}"
+        )
+    if fault := clock_fault(time):
+        raise InputError(f"{run}, column 'time': {fault}")

@@ -1,0 +1,96 @@
+"""Readings that are none are held at the last good one, flagged, and no part of fit, score or trained box."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.models.compensation import compensate_blocks
+from fogml.models.names import make_model
+from fogml.runs.dropouts import RULE, read_thermometer
+from fogml.runs.run import Run
+
+ROWS = 7200
+BAD = np.r_[50, 900:905, 3000, 5000:5200, 7199]
+
+
+def cycle(seed=0, interval=1.0):
+    time = interval * np.arange(float(ROWS))
+    temperature = 20.0 + 40.0 * np.sin(np.pi * np.arange(ROWS) / ROWS) ** 2
+    noise = np.random.default_rng(seed).normal(0.0, 0.3, ROWS)
+    return {
+        "time": time,
+        "gyro": 5.0 + 0.05 * temperature + noise,
+        "T": np.round(temperature / 0.0625) * 0.0625,
+    }
+
+
+def by_the_rule(time, values):
+    """The rule as its docstring states it, sample by sample, from a good first reading on."""
+    good, since, rejected, held, bad = values[0], time[0], None, [values[0]], [False]
+    for t, x in zip(time[1:], values[1:], strict=True):
+        is_bad = not RULE.low_degC <= x <= RULE.high_degC or x == rejected
+        is_bad |= abs(x - good) > RULE.jump_degC + RULE.rate_degC_s * (t - since)
+        if is_bad:
+            rejected = x
+        else:
+            good, since, rejected = x, t, None
+        held.append(good)
+        bad.append(is_bad)
+    return np.array(held), np.array(bad)
+
+
+@pytest.mark.parametrize("interval", [0.05, 1.0, 10.0])
+@pytest.mark.parametrize("sentinel", [-127.0, 85.0, 0.0, -9999.0, 999.0])
+def test_sentinels(sentinel, interval):
+    columns = cycle(interval=interval)
+    values = columns["T"].copy()
+    values[BAD] = sentinel
+    found = read_thermometer(columns["time"], values)
+    held, bad = by_the_rule(columns["time"], values)
+    np.testing.assert_array_equal(found.values, held)
+    np.testing.assert_array_equal(found.bad, bad)
+    told = np.abs(values - columns["T"]) > RULE.jump_degC + RULE.rate_degC_s * interval
+    assert set(np.flatnonzero(found.bad)) <= set(BAD)
+    assert np.all(found.bad[told] | (np.abs(values[told] - columns["T"][told]) < 25.0))
+    assert np.abs(found.values - columns["T"])[told & found.bad].max() < 4.0
+
+
+def test_a_dropout_at_the_first_sample():
+    columns = cycle()
+    columns["T"][:3] = 85.0
+    found = read_thermometer(columns["time"], columns["T"])
+    assert np.flatnonzero(found.bad).tolist() == [0, 1, 2]
+    assert found.values[:3].tolist() == [columns["T"][3]] * 3
+
+
+def test_nothing_is_found_in_sound_thermometers():
+    rng = np.random.default_rng(4)
+    columns = cycle()
+    ramps = np.interp(columns["time"], [0, 600, 3600, 4100, 7200], [25.0, 25.0, -40.0, 85.0, 0.0])
+    for values in (columns["T"], ramps, np.rint(ramps), ramps + rng.normal(0.0, 2.0, ROWS), np.zeros(ROWS)):
+        assert read_thermometer(columns["time"], values).bad is None
+    kelvin = columns["T"] + 273.15
+    assert read_thermometer(columns["time"], kelvin).bad is None
+
+
+@pytest.mark.parametrize("features", ["T, dT, T*dT", "T"])
+def test_model_box_and_flags_are_those_of_the_clean_rows(features):
+    sound, dropped = cycle(), cycle()
+    dropped["T"][BAD] = -127.0
+    clean, run = Run("clean", sound), Run("run", dropped)
+    np.testing.assert_array_equal(run.columns["T"], dropped["T"])
+    model = make_model("polynomial", features=features).fit(run)
+    reference = make_model("polynomial", features=features).fit(clean)
+    for name, (low, high) in model.card_.box.items():
+        np.testing.assert_allclose((low, high), reference.card_.box[name], atol=0.25)
+    np.testing.assert_allclose(model.predict(clean), reference.predict(clean), atol=0.02)
+    flags = model.compensate(run).flag
+    assert np.all(flags[BAD] == 2)
+    # After a spell of 200 s no window is full, as after a gap.
+    assert np.count_nonzero(flags != model.compensate(clean).flag) <= len(BAD) + model.window_s
+    blocks = [run[start : start + 700] for start in range(0, ROWS, 700)]
+    parts = [compensation for _, compensation in compensate_blocks(model, blocks)]
+    np.testing.assert_array_equal(np.concatenate([part.flag for part in parts]), flags)
+    drift = np.concatenate([part.drift for part in parts])
+    np.testing.assert_allclose(drift, model.compensate(run).drift, atol=1e-9)
