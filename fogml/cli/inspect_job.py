@@ -11,6 +11,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
 from fogml.validation.strict import hold_strict
@@ -58,6 +59,9 @@ def _inspect(settings: InspectSettings, terminal: Terminal) -> tuple[list[Run], 
 
 
 def _print(run: dict[str, Any], terminal: Terminal) -> None:
+    first = [finding for finding in run["findings"] if finding["code"] in FIRST_OF_ALL]
+    for finding in first:
+        terminal.say(f"{run['run']}: {finding['code'].replace('_', ' ')}: {finding['message']}")
     rows = [
         [column["name"], column["unit"] or "–", *(number(column[key]) for key in _STATISTICS)]
         for column in run["columns"]
@@ -84,7 +88,7 @@ def _print(run: dict[str, Any], terminal: Terminal) -> None:
         if time
     ]
     terminal.say("regimes: " + ", ".join(spent))
-    for finding in run["findings"]:
+    for finding in run["findings"][len(first) :]:
         terminal.say(f"{finding['code'].replace('_', ' ')}: {finding['message']}")
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from fogml.cli.settings import SHIPPED, Repairing
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
+from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
 
 
@@ -61,7 +62,7 @@ def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: Repairing = F
             work.doing(f"reading {path}")
             runs += open_legs(path, repair=repair)
             work.advance()
-    for run in runs:
-        for finding in run.findings:
-            terminal.note(f"{run.name}: {finding.message}")
+    noticed = [(run.name, finding) for run in runs for finding in run.findings]
+    for name, finding in sorted(noticed, key=lambda one: one[1].code not in FIRST_OF_ALL):
+        terminal.note(f"{name}: {finding.message}")
     return runs

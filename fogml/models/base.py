@@ -18,6 +18,7 @@ from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
 from fogml.models.intervals import Intervals
+from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import BoolArray, FloatArray, Run
 
 GOOD, OUTSIDE, NOT_FULL = 0, 1, 2
@@ -87,8 +88,9 @@ def compensation_of(run: Run, evaluation: Evaluation) -> Compensation:
     Raises
     ------
     InputError
-        If the compensated output is not finite at some sample.
+        If the output is compensated already, or what comes out is not finite at some sample.
     """
+    refuse_twice(run)
     with np.errstate(over="ignore"):
         compensated = run.gyro_deg_h - evaluation.drift
     _check_finite(run, compensated, "compensated output")

@@ -73,8 +73,8 @@ def _dropouts(run: Run) -> Iterator[Finding]:
             readings = "1 reading" if count == 1 else f"{count} readings"
             message = (
                 f"{readings} of '{name}' {'is' if count == 1 else 'are'} none, the first "
-                f"{run.columns[name][row]:.6g} at {run.time[row]:.6g} s: out of range, or a jump that no heat "
-                "makes; the last good one is held, and these rows are left out of fit and score and flagged"
+                f"{run.columns[name][row]:.6g} at {run.time[row]:.6g} s: out of range, or a jump that no "
+                "heat makes; the last good one is held, the rows are flagged and left out of fit and score"
             )
             yield Finding("temperature_dropouts", message, column=name, row=row + 1, count=count)
 

@@ -74,7 +74,7 @@ class Facts(BaseModel):
     """The facts about the set-up that a side file may state. All optional.
 
     Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
-    turns about, counter-clockwise; up where it is not stated. `compensated`: a model was applied to the output.
+    turns about, counter-clockwise; up where it is not stated. `compensated` says that the output is.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)

@@ -6,7 +6,6 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-
 FIRST_OF_ALL = (
     "already_compensated",
     "implausible_temperature",

@@ -42,9 +42,12 @@ APART_DEGC = 80.0
 """Thermometers of one set-up don't differ by more on average [degC]: chamber to electronics, in a shock."""
 KELVIN = (203.15, 400.0)
 """Readings in kelvin lie between these: -70 to 127 degC."""
+HOTTEST_DEGC = 200.0
+"""No coil is hotter on average [degC]."""
 COUNTS = 400.0
 """Readings all beyond this are no temperature in any unit."""
 _RELATED_DEGC = 5.0
+_APART_IN_FAHRENHEIT = 10.0
 
 
 def implausible(run: Run) -> Iterator[Finding]:
@@ -81,6 +84,19 @@ def compensated_by(run: Run) -> str | None:
     return None
 
 
+def refuse_twice(run: Run) -> None:
+    """Refuse to compensate what is compensated.
+
+    Raises
+    ------
+    InputError
+        If the run says that it is.
+    """
+    said = compensated_by(run)
+    if said is not None:
+        raise InputError(f"{run.name}: compensated already ({said}); compensate what it was made of")
+
+
 def _compensated(run: Run) -> Iterator[Finding]:
     if run.facts.compensated:
         message = (
@@ -91,41 +107,44 @@ def _compensated(run: Run) -> Iterator[Finding]:
 
 def _temperature_units(run: Run) -> Iterator[Finding]:
     for name in run.temperature_columns:
-        values = run.columns[name]
-        low, middle = (float(q) for q in np.quantile(values, [0.02, 0.5]))
-        high = float(np.quantile(values, 0.98))
-        if KELVIN[0] <= low and high <= KELVIN[1] and middle > 200.0:
-            told = f"'{name}' is stated in degC and reads {low:.4g} to {high:.4g}: kelvin? Write '{name} [K]'"
-        elif low > COUNTS or high < -COUNTS:
-            told = (
-                f"'{name}' is stated in degC and reads {low:.4g} to {high:.4g}: raw counts? State scale and "
-                "offset in an import profile"
+        told = _unit_told(run.columns[name])
+        if told is not None:
+            yield Finding(
+                "implausible_temperature",
+                f"'{name}' is stated in degC and {told}",
+                column=name,
+                count=len(run),
             )
-        else:
-            continue
-        yield Finding("implausible_temperature", told, column=name, count=len(values))
+
+
+def _unit_told(values: FloatArray) -> str | None:
+    """What a temperature seems to be in, if not in degC."""
+    low, middle, high = (float(q) for q in np.quantile(values, [0.02, 0.5, 0.98]))
+    if KELVIN[0] <= low and high <= KELVIN[1] and middle > HOTTEST_DEGC:
+        return f"reads {low:.4g} to {high:.4g}: kelvin? Write the header with [K]"
+    if low > COUNTS or high < -COUNTS:
+        return f"reads {low:.4g} to {high:.4g}: raw counts? State scale and offset in an import profile"
+    return None
 
 
 def _thermometers(run: Run) -> Iterator[Finding]:
-    names = run.temperature_columns
+    names = [name for name in run.temperature_columns if _unit_told(run.columns[name]) is None]
     means = {name: float(np.median(run.columns[name])) for name in names}
-    for i, a in enumerate(names):
-        for b in names[i + 1 :]:
-            for cold, warm in ((a, b), (b, a)):
-                fahrenheit = 1.8 * run.columns[cold] + 32.0
-                if means[warm] - means[cold] > 2.0 * _RELATED_DEGC and _same(run.columns[warm], fahrenheit):
-                    told = (
-                        f"'{warm}' is 1.8 times '{cold}' and 32 more: is it in Fahrenheit? Convert it to degC"
-                    )
-                    yield Finding("implausible_temperature", told, column=warm, count=len(run))
-                    break
-            else:
-                if abs(means[a] - means[b]) > APART_DEGC:
-                    told = (
-                        f"'{a}' and '{b}' differ by {abs(means[a] - means[b]):.4g} degC on average "
-                        f"({means[a]:.4g} and {means[b]:.4g}): is one of them in another unit, or dead?"
-                    )
-                    yield Finding("thermometers_apart", told, column=a, count=len(run))
+    pairs = [(a, b) for a in names for b in names if means[b] > means[a]]
+    odd = {}
+    for cold, warm in pairs:
+        is_far = means[warm] - means[cold] > _APART_IN_FAHRENHEIT and warm not in odd
+        if is_far and _same(run.columns[warm], 1.8 * run.columns[cold] + 32.0):
+            odd[warm] = f"'{warm}' is 1.8 times '{cold}' and 32 more: Fahrenheit? Convert it to degC"
+    for name, told in odd.items():
+        yield Finding("implausible_temperature", told, column=name, count=len(run))
+    a, b = max(pairs, key=lambda pair: means[pair[1]] - means[pair[0]], default=(None, None))
+    if a is not None and b is not None and a not in odd and b not in odd and means[b] - means[a] > APART_DEGC:
+        told = (
+            f"'{a}' and '{b}' differ by {means[b] - means[a]:.4g} degC ({means[a]:.4g} and {means[b]:.4g}): "
+            "is one of them in another unit, or dead?"
+        )
+        yield Finding("thermometers_apart", told, column=a, count=len(run))
 
 
 def _same(a: FloatArray, b: FloatArray) -> bool:
@@ -181,5 +200,5 @@ def _earth_rate(run: Run, gyro: FloatArray) -> Iterator[Finding]:
                 why = f"{unit}{turned}? Correct the column's unit"
     if why is None:
         return
-    told = f"the output at rest is {mean:.4g} deg/h, and Earth rate along the input axis {earth:.4g} deg/h: {why}"
+    told = f"the output at rest is {mean:.4g} deg/h where Earth rate is {earth:.4g} deg/h: {why}"
     yield Finding("implausible_earth_rate", told, column="gyro", count=len(at_rest))

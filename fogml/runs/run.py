@@ -18,7 +18,7 @@ from fogml.runs.arrival_times import sampling_times
 from fogml.runs.columns import coil_sensor_number, is_temperature
 from fogml.runs.dropouts import Reading, last_reading, read_thermometer
 from fogml.runs.facts import Facts
-from fogml.runs.findings import Finding
+from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns
 from fogml.signals.clock import Clock, gap_starts
 
@@ -308,5 +308,6 @@ class Run:
         return Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
 
     def with_findings(self, findings: Iterable[Finding]) -> Run:
-        """The run with more findings."""
-        return Run.derived(self.name, self.columns, self.facts, self.gyro_unit, (*self.findings, *findings))
+        """The run with more findings; those come first that make every figure wrong."""
+        found = tuple(first_of_all((*self.findings, *findings)))
+        return Run.derived(self.name, self.columns, self.facts, self.gyro_unit, found)
