@@ -147,7 +147,7 @@ def given_away() -> list[dict[str, object]]:
         "deg/h as deg/s": lambda: changed(gyro=sound.gyro * 3600.0),
         "T_in in kelvin": lambda: changed(T_in=sound.columns["T_in"] + 273.15),
         "T_in in Fahrenheit": lambda: changed(T_in=1.8 * sound.columns["T_in"] + 32.0),
-        "T_out 200 degC off": lambda: changed(T_out=sound.columns["T_out"] + 150.0),
+        "T_out 150 degC off": lambda: changed(T_out=sound.columns["T_out"] + 150.0),
         "table rate of the other sign": lambda: changed(rate=turned, gyro=sound.gyro - 3600.0 * turned),
         "compensated, by its facts": lambda: Run(
             "run", sound.columns, sound.facts.model_copy(update={"compensated": True})
@@ -240,7 +240,7 @@ A simulated run (`multi-point-cycle`, tactical, one sample in 10 s) with a sign 
 {told}
 
 What is warned of sound data: {len(quiet)} of {len(warned)} recordings and simulated runs have no
-warning. The others, all of which hold single samples that stand out:
+warning. The others hold single samples that stand out, or a column that stays at one value:
 
 {alarm}
 """
