@@ -16,8 +16,8 @@ from fogml.features.grammar import parse_terms
 from fogml.features.reach import reaching_box
 from fogml.features.signal import check_holds
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
+from fogml.features.unmeasured import evaluate_measured
 from fogml.runs.run import Run
-from fogml.signals.clock import longest_gap_s
 
 if TYPE_CHECKING:
     from fogml.features.blocks import FeatureBlocks
@@ -227,12 +227,6 @@ class Features:
         skip
             The first rows of the run that `memories` have seen already.
 
-        Returns
-        -------
-        AtomValues
-            No window is full where a temperature was not measured (`Run.dropouts`), nor after so long
-            a time without a measurement that it would be a gap.
-
         Raises
         ------
         InputError
@@ -240,26 +234,7 @@ class Features:
         """
         check_holds(run, self.sensors, self._text)
         values = np.empty((len(run), len(self._atoms)), order="F")
-        full, settled = evaluate(self._atoms, run, sample_s, list(values.T), memories, skip)
-        unmeasured = [bad for name in self.sensors if (bad := run.dropouts(name)) is not None]
-        if unmeasured:
-            full = full & ~self._spoiled(run, np.logical_or.reduce(unmeasured), sample_s)
-            for atom, column in zip(self._atoms, values.T, strict=True):
-                if atom.window is not None:
-                    column[~full] = 0.0
-        return AtomValues(values, full, settled)
-
-    def _spoiled(self, run: Run, unmeasured: BoolArray, sample_s: float | None) -> BoolArray:
-        """Rows without a measurement, and those after so many that a window would take them for a gap."""
-        if not self.window_s or not unmeasured.any():
-            return unmeasured
-        longest = longest_gap_s(self.window_s, run.sample_s if sample_s is None else sample_s)
-        edges = np.flatnonzero(np.diff(unmeasured, prepend=False, append=False))
-        spoiled = unmeasured.copy()
-        for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-            if stop < len(run) and run.time[stop] - run.time[max(start - 1, 0)] > longest:
-                spoiled[stop : int(np.searchsorted(run.time, run.time[stop] + self.window_s))] = True
-        return spoiled
+        return AtomValues(values, *evaluate_measured(self._atoms, run, sample_s, values, memories, skip))
 
     def compose(self, atom_values: ArrayLike) -> FloatArray:
         """The k feature columns, shape (n, k), from atom values of shape (n, a)."""
