@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from fogml.features.atoms import Atom, Memories, evaluate
@@ -12,7 +10,7 @@ from fogml.signals.clock import longest_gap_s
 
 
 def evaluate_measured(
-    atoms: Sequence[Atom],
+    atoms: tuple[Atom, ...],
     run: Run,
     sample_s: float | None,
     values: FloatArray,
