@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.tuning.postgres import postgres, program
+from experiments.faults.postgres import postgres, program
 
 
 @pytest.fixture(scope="session")

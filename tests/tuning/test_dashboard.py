@@ -19,7 +19,7 @@ import pytest
 from fogml.tuning.storage import JOURNAL
 from fogml.tuning.study import is_finished
 from fogml.tuning.sweep import run_sweep
-from tests.tuning.postgres import free_port
+from experiments.faults.postgres import free_port
 from tests.tuning.world import plan
 
 _ANSWER_S = 60

@@ -14,7 +14,7 @@ from fogml.tuning.journal import WholeLines
 from fogml.tuning.storage import JOURNAL, open_storage, shown, without_password
 from fogml.tuning.study import is_finished
 from fogml.tuning.sweep import run_sweep
-from tests.tuning.postgres import free_port
+from experiments.faults.postgres import free_port
 from tests.tuning.world import plan
 
 

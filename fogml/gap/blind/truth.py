@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import math
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Literal, get_args
+from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,9 +254,18 @@ def read_truth(path: Path) -> Truth:
 
 
 def read_contributions(path: Path) -> dict[tuple[str, int], FloatArray]:
-    """What `write_truth` was given as `contributions`, from the ``.npz`` file."""
-    with np.load(path, allow_pickle=False) as arrays:
-        return {_parsed(key): arrays[key] for key in arrays.files}
+    """What `write_truth` was given as `contributions`, from the ``.npz`` file.
+
+    Raises
+    ------
+    InputError
+        If it is damaged, or holds other arrays.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            return {_parsed(key): arrays[key] for key in arrays.files}
+    except (OSError, ValueError, EOFError, BadZipFile, zlib.error, NotImplementedError) as error:
+        raise InputError(f"{path}: damaged, or no file of contributions; make the cases anew") from error
 
 
 def write_sums(folder: Path) -> None:
@@ -276,8 +287,8 @@ def check_sums(folder: Path) -> int:
     path = folder / SUMS
     if not path.is_file():
         raise InputError(f"{path}: no such file; the truth must be hashed when it is made")
-    lines = [line.split("  ", 1) for line in path.read_text(encoding="ascii").splitlines()]
-    stated = {name: digest for digest, name in lines}
+    lines = [line.partition("  ") for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
+    stated = {name: digest for digest, _, name in lines}
     held = {file.name for file in folder.iterdir() if file.suffix in (".json", ".npz")}
     for name in sorted(held ^ set(stated)):
         what = "is not listed" if name in held else "is listed, but missing"
