@@ -41,6 +41,7 @@ class Job:
     needs: tuple[str, ...] = ("a.", "b.", "c.")
 
 
+_FLEET = ("fleet", "units.csv", "--any-unit", "--model", "M2", "--averaging", "30", "-o", "out")
 JOBS = {
     "train": Job(
         (
@@ -75,24 +76,9 @@ JOBS = {
         resumes=True,
         needs=("a.", "b.", "c.", "sweep.yaml"),
     ),
-    "fleet": Job(
-        (
-            "fleet",
-            "units.csv",
-            "--any-unit",
-            "--model",
-            "M2",
-            "--averaging",
-            "30",
-            "--workers",
-            "2",
-            "-o",
-            "out",
-        ),
-        ("out",),
-        units="out/*",
-        resumes=True,
-        needs=("a.", "b.", "c.", "units.csv"),
+    "fleet": Job(_FLEET, ("out",), "out/*", True, ("a.", "b.", "c.", "units.csv")),
+    "fleet, 2 processes": Job(
+        (*_FLEET, "--workers", "2"), ("out",), "out/*", True, ("a.", "b.", "c.", "units.csv")
     ),
     "diagnose": Job(("diagnose", "d.csv", "-o", "out"), ("out",), needs=("d.",)),
     "blind run": Job(
@@ -108,7 +94,7 @@ JOBS = {
 
 def sound_files(home: Path, names: Sequence[str]) -> dict[str, bytes]:
     """What the jobs read; each is run once here, so that its libraries are loaded and compiled."""
-    quick = not {"sweep", "fleet", "blind run"} & set(names)
+    quick = not {"sweep", "fleet", "fleet, 2 processes", "blind run"} & set(names)
     files = dict(sound.make_world(home / "sound", quick=quick))
     made = home / "made"
     made.mkdir()
@@ -122,7 +108,7 @@ def sound_files(home: Path, names: Sequence[str]) -> dict[str, bytes]:
     try:
         with sandbox.catching():
             for name in names:
-                if name not in ("blind run", "fleet"):
+                if name not in ("blind run", "fleet, 2 processes"):
                     folder = home / "warm" / name.replace(" ", "-")
                     prepare(folder, JOBS[name], files)
                     os.chdir(folder)

@@ -193,10 +193,11 @@ class Killer:
         """What stands where the outputs go: an older result, told by its content."""
         for name in self.job.outputs:
             path = self.folder / name
-            inside = path / "report.json" if not path.suffix else path
-            inside.parent.mkdir(parents=True, exist_ok=True)
-            inside.write_text("unit: FOG-OLD\n" if path.suffix == ".yaml" else "old\n", encoding="utf-8")
-        # A side file that states other facts is another run's: replaced with its run, or not at all.
+            # A side file that states other facts would be another run's, and the job refused.
+            if path.suffix != ".yaml":
+                inside = path / "report.json" if not path.suffix else path
+                inside.parent.mkdir(parents=True, exist_ok=True)
+                inside.write_text("old\n", encoding="utf-8")
         return results(self.folder, self.job)
 
     def _state(self, old: dict[str, str], faults: dict[str, str], how: signal.Signals) -> None:

@@ -19,7 +19,7 @@ from experiments.faults.started import Started, processes
 
 
 def worker_killed(home: Path, files: Mapping[str, bytes], times: int, rng: Random) -> str:
-    killer = Killer(home, "fleet", files, 0, None, False)
+    killer = Killer(home, "fleet, 2 processes", files, 0, None, False)
     same, killed, faults = 0, 0, Counter[str]()
     for _ in range(times):
         prepare(killer.folder, killer.job, files)

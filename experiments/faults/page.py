@@ -16,6 +16,11 @@ def write_part(folder: Path, part: str, found: Any) -> None:
     """Put one part's findings beside the others', and write the page of all."""
     path = folder / "results.json"
     known = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    if part == "kill" and part in known:
+        # Kinds of job may be killed one after another.
+        found = {**found, "jobs": {**known[part]["jobs"], **found["jobs"]}}
+        found["notes"] = found["notes"] or known[part]["notes"]
+        found["seconds"] += known[part]["seconds"]
     known |= {part: {**found, "version": __version__}}
     folder.mkdir(parents=True, exist_ok=True)
     write_results(folder, known, page(known))
