@@ -129,7 +129,7 @@ def _journal(folder: Path) -> BaseStorage:
     assert issubclass(WholeLines, JournalFileBackend)
     try:
         return JournalStorage(WholeLines(str(path)))
-    except (ValueError, KeyError, TypeError, AttributeError):
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, AssertionError):
         raise InputError(f"{path}: is no study's journal; move it away, or choose another --out") from None
 
 

@@ -17,6 +17,7 @@ from fogml.runs.run import Run
 from fogml.tuning.plan import Plan
 from fogml.tuning.sampling import PLACE, place_of
 from fogml.tuning.storage import import_optuna, open_storage, shown
+from fogml.tuning.trial_check import check_trials
 
 if TYPE_CHECKING:
     import optuna
@@ -54,6 +55,7 @@ def open_study(plan: Plan, runs: Sequence[Run] | None = None) -> optuna.Study:
         directions=["minimize"] * len(plan.objectives),
         load_if_exists=True,
     )
+    check_trials(study, plan)
     if runs is not None:
         _check_identity(study, plan, runs)
     return study

@@ -127,7 +127,6 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
     """
     check_out_of_reach(plan)
     left = plan.left()
-    plan.answers.mkdir(parents=True, exist_ok=True)
     waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
     for name in left:
         waiting.put(name)
@@ -249,6 +248,7 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         return False
     method, samples = plan.name or plan.method, count_samples(case)
     values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
+    plan.answers.mkdir(parents=True, exist_ok=True)
     with whole_folder(plan.answers, shared=True) as staging:
         shutil.copytree(out, staging / name)
         write_json(staging / name / OUTCOME, values, indent=1)
