@@ -220,6 +220,12 @@ class _Staging:
             self._move_entries(target)
             raise
 
+    def end(self) -> None:
+        """Remove the folder, unless what is left in it belongs in its place; again after an interrupt."""
+        if not (self.is_committed and self.content.is_dir() and os.listdir(self.content)):
+            shutil.rmtree(self.path, ignore_errors=True)
+        self.lock.release()
+
     @property
     def is_committed(self) -> bool:
         """Whether what is left of the content belongs in its place."""
@@ -279,9 +285,11 @@ def _staging(home: Path, shown: Path) -> Iterator[_Staging]:
             staging = _Staging(home / f"{PARTIAL}{_HOST}-{secrets.token_hex(8)}")
         yield staging
     finally:
-        if not (staging.is_committed and os.listdir(staging.content)):
-            shutil.rmtree(staging.path, ignore_errors=True)
-        staging.lock.release()
+        try:
+            staging.end()
+        except KeyboardInterrupt:
+            staging.end()
+            raise
 
 
 def _unwritable(path: str | Path, error: OSError) -> Exception:

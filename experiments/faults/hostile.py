@@ -62,7 +62,7 @@ def hostile(limits: Limits | None = None, *, quick: bool = False) -> dict[str, A
     limits = limits or Limits()
     with tempfile.TemporaryDirectory(prefix="fogml-hostile-") as name:
         world = make_world(Path(name) / "sound", quick=quick)
-        named = list(inputs(world))
+        named = list(inputs(world, 8 if quick else 40))
         steps = [(place, step) for place, one in enumerate(named) for step in (one.cases or (one.check,))]
 
         def do(index: int, home: Path) -> Outcome:
@@ -89,11 +89,11 @@ def _row(one: Hostile, found: list[Outcome]) -> dict[str, Any]:
     return {"name": one.name, "told": many + told, "held": not wrong}
 
 
-def inputs(world: World) -> Iterator[Hostile]:
-    """Every hostile input."""
+def inputs(world: World, places: int) -> Iterator[Hostile]:
+    """Every hostile input; HDF5 files are damaged at so many places."""
     yield from _models(world)
     yield from _yaml(world)
-    yield from _binary(world)
+    yield from _binary(world, places)
     yield from _arguments(world)
     yield from _numbers(world)
     yield from _folders(world)
@@ -207,7 +207,7 @@ def _yaml(world: World) -> Iterator[Hostile]:
     yield Hostile("facts with a key twice", (facts("latitude: 1\nlatitude: 2\n"),))
 
 
-def _binary(world: World) -> Iterator[Hostile]:
+def _binary(world: World, count: int) -> Iterator[Hostile]:
     import h5py
     from scipy.io import savemat
 
@@ -227,7 +227,7 @@ def _binary(world: World) -> Iterator[Hostile]:
     )
     yield Hostile("MATLAB files with a text of a type that there is none of", texts, (0, 2))
     rng = Random("headers")
-    places = sorted(rng.sample(range(len(world["run.h5"])), 40))
+    places = sorted(rng.sample(range(len(world["run.h5"])), count))
     damaged = tuple(
         Case(
             ("inspect", "x.h5", QUIET),
@@ -236,7 +236,7 @@ def _binary(world: World) -> Iterator[Hostile]:
         )
         for place in places
     )
-    yield Hostile("HDF5 files with eight bytes damaged, at 40 places", damaged, (0, 2))
+    yield Hostile(f"HDF5 files with eight bytes damaged, at {count} places", damaged, (0, 2))
 
     def linked(make: Callable[[Any], None]) -> Case:
         target = io.BytesIO()

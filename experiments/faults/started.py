@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import os
 import signal
 import sys
+import threading
 import time
 import traceback
 from pathlib import Path
 
+_NO_STATUS = 99
 ORPHANS_S = 2.0
 """Time after which no process of a killed job may be alive [s]."""
 
@@ -52,34 +55,38 @@ class Started:
 
 def _become(folder: Path, command: tuple[str, ...], log: Path) -> None:
     """The job itself, in the forked process; never returns."""
-    status = 3
+    status = _NO_STATUS
     try:
         os.setsid()
-        for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
         os.chdir(folder)
         stream = os.open(log, os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
         for number in (1, 2):
             os.dup2(stream, number)
-        from fogml.cli.main import main
-
-        sys.argv = ["fogml", *command, "--quiet"]
-        main()
-        status = 0
-    except SystemExit as end:
-        status = end.code if isinstance(end.code, int) else 0
-    except BaseException:
-        traceback.print_exc()
-    finally:
-        sys.stderr.flush()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        status = _status(command)
         # As an interpreter does at its end: processes and threads of libraries are told.
-        with contextlib.suppress(BaseException):
-            import atexit
-            import threading
-
-            threading._shutdown()
-            atexit._run_exitfuncs()
+        threading._shutdown()
+        atexit._run_exitfuncs()
+    except KeyboardInterrupt as interrupt:
+        # Before the program began, or after its end.
+        status = getattr(interrupt, "status", 128 + signal.SIGINT)
+    finally:
         os._exit(status)
+
+
+def _status(command: tuple[str, ...]) -> int:
+    from fogml.cli.main import main
+
+    sys.argv = ["fogml", *command, "--quiet"]
+    try:
+        main()
+    except SystemExit as end:
+        return end.code if isinstance(end.code, int) else 0
+    except Exception:
+        traceback.print_exc()
+        return _NO_STATUS
+    return 0
 
 
 def processes(session: int) -> list[int]:

@@ -112,16 +112,21 @@ class LazyGroup(TyperGroup):
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")
         except KeyboardInterrupt as interrupt:
-            # Jobs of many units keep those that were finished, and go on from there.
-            told = "what is finished is kept, nothing is half written; run the same command again"
-            typer.echo(f"fogml: interrupted: {told}", err=True)
-            raise typer.Exit(getattr(interrupt, "status", INTERRUPTED)) from None
+            raise typer.Exit(_interrupted(interrupt)) from None
 
 
 def fail(message: str) -> None:
     """Print one message on stderr and end with exit status 2."""
     typer.echo(f"fogml: {terminal_text(message)}", err=True)
     raise typer.Exit(BAD_INPUT) from None
+
+
+def _interrupted(interrupt: KeyboardInterrupt) -> int:
+    """Say what an interrupt leaves behind; the exit status."""
+    # Jobs of many units keep those that were finished, and go on from there.
+    told = "what is finished is kept, nothing is half written; run the same command again"
+    typer.echo(f"fogml: interrupted: {told}", err=True)
+    return getattr(interrupt, "status", INTERRUPTED)
 
 
 def _system_message(error: OSError) -> str:
@@ -164,4 +169,8 @@ def main() -> None:
         # A terminal that can't show a character must not end a long job; a file's name need not be text.
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
-    app(prog_name="fogml")
+    try:
+        app(prog_name="fogml")
+    except KeyboardInterrupt as interrupt:
+        # Before the command began, or after it.
+        sys.exit(_interrupted(interrupt))
