@@ -170,7 +170,8 @@ def settle(home: str | Path) -> None:
             continue  # another settles it
         try:
             if staging.lock.sure:
-                if staging.is_committed:
+                # Without content it was killed at the end, when all was in its place.
+                if staging.is_committed and staging.content.is_dir():
                     staging.move_in(home)
                 shutil.rmtree(staging.path, ignore_errors=True)
         finally:

@@ -172,7 +172,7 @@ class Killer:
             os.killpg(started.process, signal.SIGKILL)
             started.ends(_ENDS_S)
             faults["did not end"] = f"{how.name}: still there after {_ENDS_S:g} s"
-        elif status not in (0, 1, -how, 128 + how):
+        elif status not in (0, 1, -how, 128 + how, 128 + signal.SIGINT):
             faults["other exit"] = f"{how.name}: status {status}"
         orphans = started.orphans()
         if orphans:
@@ -228,11 +228,25 @@ class Killer:
         if self.job.resumes and all(found[name] == wanted.get(name) for name in found):
             self.count.absent += 1
             return
+        if all(
+            self._apart(stem, found, old) for stem in {name.partition(".")[0] for name in (*found, *wanted)}
+        ):
+            # Of two outputs, one is whole and the other not there yet.
+            self.count.absent += 1
+            return
         mixed = sorted(
             name for name in found if found[name] != wanted.get(name) and found[name] != old.get(name)
         )
         gone = sorted(name for name in wanted if name not in found)
         faults["half written"] = f"{how.name}: other {mixed[:3]}, missing {gone[:3]}"
+
+    def _apart(self, stem: str, found: Mapping[str, str], old: Mapping[str, str]) -> bool:
+        """Whether an output, with its side file, is absent, as before or whole."""
+        is_whole, is_old = (
+            all(found.get(name) == held.get(name) for name in (*found, *held) if name.startswith(stem + "."))
+            for held in (self.reference.outputs, old)
+        )
+        return is_whole or is_old
 
     def _again(self, faults: dict[str, str]) -> None:
         """Whether the same command makes it good."""

@@ -7,7 +7,6 @@ import json
 import os
 import sys
 import time
-import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -55,7 +54,7 @@ def planted(home: Path, what: str, limits: Limits) -> Outcome:
         if what == "memory":
             _ = bytearray(300 << 20)
         if what == "noise":
-            warnings.warn("planted", RuntimeWarning, stacklevel=1)
+            os.write(2, b"planted\n")
         if what == "message":
             print("planted", file=sys.stdout)
             return whole(Path("nowhere.csv"))
