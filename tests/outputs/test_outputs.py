@@ -136,6 +136,33 @@ def test_a_kill_between_two_renames_is_made_good_by_the_next_writer(tmp_path, mo
     assert not [path for path in out.iterdir() if path.name.startswith(".")]
 
 
+def test_a_kill_while_the_staging_folder_is_removed_is_made_good(tmp_path, monkeypatch):
+    remove = shutil.rmtree
+
+    monkeypatch.setattr(shutil, "rmtree", lambda path, **more: remove(path / "content"))
+    with whole_files(tmp_path / "run.csv", tmp_path / "run.yaml") as (run, side):
+        run.write_text("rows")
+        side.write_text("facts")
+    monkeypatch.undo()
+    assert len(list(tmp_path.glob(".commit-*"))) == 1
+    settle(tmp_path)
+    assert sorted(os.listdir(tmp_path)) == ["run.csv", "run.yaml"]
+
+
+def test_an_interrupt_while_the_staging_folder_is_removed_leaves_none(tmp_path, monkeypatch):
+    remove = shutil.rmtree
+
+    def interrupted(path, **more):
+        monkeypatch.undo()
+        remove(path / "content")
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(shutil, "rmtree", interrupted)
+    with pytest.raises(KeyboardInterrupt), whole_file(tmp_path / "run.csv") as partial:
+        partial.write_text("rows")
+    assert os.listdir(tmp_path) == ["run.csv"]
+
+
 def test_files_appear_together_and_a_folder_in_their_place_is_refused_first(tmp_path):
     with whole_files(tmp_path / "run.csv", tmp_path / "run.yaml") as (run, side):
         run.write_text("rows")
