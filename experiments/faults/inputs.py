@@ -123,17 +123,17 @@ def _reads(rng: Random, world: World, name: str, content: bytes) -> Case:
     files = {name: content, "x.yaml": world["a.yaml"]}
     repair = rng.choice(((), (), ("--repair",)))
     pick = rng.random()
-    if pick < 0.7:
+    if pick < 0.88:
         return Case(("only", "read", name, *repair), files, name)
-    if pick < 0.86:
+    if pick < 0.95:
         return Case(("inspect", name, *repair, QUIET), files, name)
-    if pick < 0.92:
+    if pick < 0.955:
         return Case(("noise", name, "-o", "o", *repair, QUIET), files, name)
     model = some(world, "trained/polynomial/model/")
-    if pick < 0.97:
+    if pick < 0.99:
         command = ("compensate", name, "--model", "trained/polynomial/model", "-o", "y.csv", QUIET)
         return Case(command, {**files, **model}, name)
-    judged = ("train", name, "--test", "b.csv") if pick < 0.985 else ("train", "b.csv", "--test", name)
+    judged = ("train", name, "--test", "b.csv") if pick < 0.995 else ("train", "b.csv", "--test", name)
     command = (*judged, "--model", "mean", "--averaging", "30", "-o", "o", *repair, QUIET)
     return Case(command, {**files, **some(world, "b.")}, name)
 
@@ -700,28 +700,28 @@ def model(rng: Random, world: World) -> Case:
 
 
 KINDS = (
-    Kind("CSV run", 30, csv_run),
-    Kind("Parquet run", 6, parquet_run),
-    Kind("HDF5 run", 1, hdf5_run),
-    Kind("MATLAB run", 1, mat_run),
-    Kind("side file", 9, side_file),
-    Kind("saved model", 12, model),
-    Kind("settings of a command", 6, config),
-    Kind("options of a command", 6, option),
-    Kind("model parameters", 3, parameter),
-    Kind("feature text", 7, features),
-    Kind("import profile", 4, profile),
-    Kind("logger's file", 4, logger),
-    Kind("simulation", 1, simulation),
-    Kind("programme", 1, programme),
-    Kind("programme in sentences", 1, sentence),
-    Kind("twin", 2, twin),
-    Kind("fleet manifest", 1, manifest),
-    Kind("fleet results", 1, fleet_json, "fleet/"),
-    Kind("sweep configuration", 1, sweep_config),
-    Kind("study journal", 1, journal, "swept/"),
-    Kind("misalignment table", 1, misalignment),
-    Kind("positions for north", 2, positions),
-    Kind("blind suite", 1, blind_json, "suite/"),
+    Kind("CSV run", 460, csv_run),
+    Kind("Parquet run", 80, parquet_run),
+    Kind("HDF5 run", 2, hdf5_run),
+    Kind("MATLAB run", 2, mat_run),
+    Kind("side file", 130, side_file),
+    Kind("saved model", 120, model),
+    Kind("settings of a command", 20, config),
+    Kind("options of a command", 30, option),
+    Kind("model parameters", 10, parameter),
+    Kind("feature text", 100, features),
+    Kind("import profile", 20, profile),
+    Kind("logger's file", 15, logger),
+    Kind("simulation", 5, simulation),
+    Kind("programme", 6, programme),
+    Kind("programme in sentences", 6, sentence),
+    Kind("twin", 10, twin),
+    Kind("fleet manifest", 4, manifest),
+    Kind("fleet results", 2, fleet_json, "fleet/"),
+    Kind("sweep configuration", 2, sweep_config),
+    Kind("study journal", 3, journal, "swept/"),
+    Kind("misalignment table", 4, misalignment),
+    Kind("positions for north", 10, positions),
+    Kind("blind suite", 3, blind_json, "suite/"),
 )
-"""Every kind, and its share of a hundred."""
+"""Every kind, and its share of about a thousand: what costs a whole job or a process is rarer."""

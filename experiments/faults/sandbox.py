@@ -15,6 +15,7 @@ import os
 import resource
 import shutil
 import sys
+import tempfile
 import time
 import traceback
 import warnings
@@ -106,6 +107,7 @@ class Sandbox:
     ) -> None:
         self.home, self.limits, self.compare = home, limits, compare
         home.mkdir(parents=True, exist_ok=True)
+        self.reports = home / "reports"
         self.runs: dict[Path, Any] = {}
         self.stack = contextlib.ExitStack()
         self._streams: dict[int, int] = {}
@@ -120,11 +122,14 @@ class Sandbox:
 
         own = sys.stdout, sys.stderr
         saved = {number: os.dup(number) for number in (1, 2)}
-        read_run, get_command = reading.read_run, typer.main.get_command
+        read_run, get_command, place = reading.read_run, typer.main.get_command, tempfile.tempdir
 
         main.COMMANDS |= COMMAND
         # Commands are declared anew for each process: here they are once for all.
         typer.main.get_command = functools.cache(typer.main.get_command)
+        # Where reports of what nobody expected go.
+        self.reports.mkdir(exist_ok=True)
+        tempfile.tempdir = str(self.reports)
         for own_stream in own:
             own_stream.flush()
         for number in saved:
@@ -139,6 +144,7 @@ class Sandbox:
             yield
         finally:
             reading.read_run, typer.main.get_command = read_run, get_command
+            tempfile.tempdir = place
             del main.COMMANDS[NAME]
             sys.stdout, sys.stderr = own
             for number, was in saved.items():
@@ -203,7 +209,7 @@ class Sandbox:
         os.chdir(self.home)
         faults = outcome.faults
         if status is None or status not in (0, 1, 2) or "Traceback (most recent call last)" in stderr:
-            faults["traceback"] = _tail(stderr)
+            faults["traceback"] = _tail(self._report() or stderr)
         elif status == 2:
             told = [line for line in stderr.splitlines() if line.startswith(("fogml: ", "Error: "))]
             if len(told) != 1 or stdout.strip():
@@ -224,6 +230,14 @@ class Sandbox:
             _check_finite(folder, sorted(set(after) - set(before)), stdout, faults)
             self._compare(outcome)
         return outcome
+
+    def _report(self) -> str:
+        """What the report of an error says that nobody expected; it is removed."""
+        told = ""
+        for path in self.reports.glob("*.txt"):
+            told = path.read_text(encoding="utf-8", errors="replace")
+            path.unlink()
+        return told
 
     def _compare(self, outcome: Outcome) -> None:
         if self.compare is None or not self.runs:
