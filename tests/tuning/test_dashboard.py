@@ -16,10 +16,10 @@ from typing import Any
 
 import pytest
 
+from experiments.faults.postgres import free_port
 from fogml.tuning.storage import JOURNAL
 from fogml.tuning.study import is_finished
 from fogml.tuning.sweep import run_sweep
-from experiments.faults.postgres import free_port
 from tests.tuning.world import plan
 
 _ANSWER_S = 60

@@ -9,12 +9,12 @@ import resource
 import pytest
 from optuna.storages import JournalStorage
 
+from experiments.faults.postgres import free_port
 from fogml.errors import InputError
 from fogml.tuning.journal import WholeLines
 from fogml.tuning.storage import JOURNAL, open_storage, shown, without_password
 from fogml.tuning.study import is_finished
 from fogml.tuning.sweep import run_sweep
-from experiments.faults.postgres import free_port
 from tests.tuning.world import plan
 
 
