@@ -9,6 +9,7 @@ Each writes its part of ``results.json`` beside itself, and ``results.md`` of al
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 
 from experiments.faults.page import write_part
@@ -24,6 +25,7 @@ def main() -> None:
     fuzzing.add_argument("--inputs", type=int, default=100_000)
     fuzzing.add_argument("--seed", type=int, default=1)
     fuzzing.add_argument("--workers", type=int, default=1)
+    fuzzing.add_argument("--minutes", type=float, default=math.inf, help="no more after so long")
     fuzzing.add_argument("--only", nargs="*", default=[], metavar="KIND", help="only these kinds")
     fuzzing.add_argument("--quick", action="store_true", help="without the kinds that take long to make")
     killing = parts.add_parser("kill", help="kill jobs at random moments")
@@ -45,6 +47,7 @@ def main() -> None:
             kept=asked.kept,
             quick=asked.quick,
             only=asked.only,
+            most_s=60.0 * asked.minutes,
             progress=True,
         )
     elif asked.part == "kill":

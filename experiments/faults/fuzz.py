@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import math
 import sys
 import tempfile
 import time
@@ -41,6 +42,7 @@ def fuzz(
     kept: Path | None = None,
     quick: bool = False,
     only: Sequence[str] = (),
+    most_s: float = math.inf,
     progress: bool = False,
 ) -> dict[str, Any]:
     """Spoil inputs, run them, and count.
@@ -61,6 +63,8 @@ def fuzz(
         Without the kinds whose sound inputs take long to make.
     only
         Names of kinds; all by default.
+    most_s
+        Time after which no more is done [s].
     progress
         Say how far it is, on stderr.
     """
@@ -76,6 +80,8 @@ def fuzz(
         do = functools.partial(_one, seed, world, kinds, limits)
         shown = began
         for index, outcome in outcomes(inputs, do, Path(name), limits, workers=workers):
+            if time.monotonic() - began > most_s:
+                break
             kind, case = drawn(seed, max(index, 0), world, kinds)
             tally.note(kind.name, outcome)
             if kept is not None and outcome.faults:
