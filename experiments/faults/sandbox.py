@@ -12,6 +12,7 @@ import io
 import json
 import math
 import os
+import re
 import resource
 import shutil
 import sys
@@ -209,7 +210,7 @@ class Sandbox:
         os.chdir(self.home)
         faults = outcome.faults
         if status is None or status not in (0, 1, 2) or "Traceback (most recent call last)" in stderr:
-            faults["traceback"] = _tail(self._report() or stderr)
+            faults["traceback"] = _tail(self._report(stderr) or stderr)
         elif status == 2:
             told = [line for line in stderr.splitlines() if line.startswith(("fogml: ", "Error: "))]
             if len(told) != 1 or stdout.strip():
@@ -231,12 +232,14 @@ class Sandbox:
             self._compare(outcome)
         return outcome
 
-    def _report(self) -> str:
+    @staticmethod
+    def _report(stderr: str) -> str:
         """What the report of an error says that nobody expected; it is removed."""
-        told = ""
-        for path in self.reports.glob("*.txt"):
-            told = path.read_text(encoding="utf-8", errors="replace")
-            path.unlink()
+        named = re.search(r"report written to (.+?\.txt)", stderr)
+        if named is None or not Path(named[1]).is_file():
+            return ""
+        told = Path(named[1]).read_text(encoding="utf-8", errors="replace")
+        Path(named[1]).unlink()
         return told
 
     def _compare(self, outcome: Outcome) -> None:
