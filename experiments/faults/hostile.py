@@ -142,7 +142,8 @@ def _models(world: World) -> Iterator[Hostile]:
     header_size = struct.unpack("<Q", weights[:8])[0]
     header = json.loads(weights[8 : 8 + header_size])
     for name, value in (("not a number", float("nan")), ("infinite", float("inf")), ("1e308", 1e308)):
-        spoiled = weights[:-8] + struct.pack("<d", value)
+        at = 8 + header_size
+        spoiled = weights[:at] + struct.pack("<d", value) + weights[at + 8 :]
         yield Hostile(
             f"a model with a weight that is {name}", (case("compensate", sealed(document, spoiled)),)
         )
@@ -366,6 +367,7 @@ def _numbers(world: World) -> Iterator[Hostile]:
         yield Hostile(
             "a text for a number in an outcome of the blind check",
             (Case(score, {**some(world, "suite/"), which: told}),),
+            (0, 2),
         )
 
 

@@ -13,6 +13,7 @@ import traceback
 from pathlib import Path
 
 _NO_STATUS = 99
+_SIGNALS = (signal.SIGINT, signal.SIGTERM)
 ORPHANS_S = 2.0
 """Time after which no process of a killed job may be alive [s]."""
 
@@ -24,9 +25,12 @@ class Started:
         self.log = folder.with_suffix(".log")
         sys.stdout.flush()
         sys.stderr.flush()
+        # Signals wait until the child is the job: before, it would be this process once more.
+        signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
         self.process = os.fork()
         if self.process == 0:
             _become(folder, command, self.log)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
         self.began = time.monotonic()
 
     def ends(self, within_s: float) -> int | None:
@@ -64,6 +68,7 @@ def _become(folder: Path, command: tuple[str, ...], log: Path) -> None:
         for number in (1, 2):
             os.dup2(stream, number)
         signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, _SIGNALS)
         status = _status(command)
         # As an interpreter does at its end: processes and threads of libraries are told.
         threading._shutdown()

@@ -85,12 +85,13 @@ def _column(table: RawTable, cells: dict[str, str], name: str) -> FloatArray:
     if cells[name] not in table.columns:
         raise InputError(f"{table.file}, column '{name}': holds text, numbers were expected; export it again")
     values = table.columns[cells[name]]
-    bad = ~np.isfinite(values)
+    with np.errstate(over="ignore"):
+        bad = ~np.isfinite(values * values)
     if bad.any():
         row = int(np.argmax(bad))
         raise InputError(
-            f"{table.file}, column '{name}', {table.row_name(row)}: the value is missing or not finite, "
-            f"{int(bad.sum())} such in the column; correct or remove the rows"
+            f"{table.file}, column '{name}', {table.row_name(row)}: it is missing, or it or its square "
+            f"is not finite, {int(bad.sum())} such in the column; correct or remove the rows"
         )
     return values
 
