@@ -90,8 +90,8 @@ def _column(table: RawTable, cells: dict[str, str], name: str) -> FloatArray:
     if bad.any():
         row = int(np.argmax(bad))
         raise InputError(
-            f"{table.file}, column '{name}', {table.row_name(row)}: it is missing, or it or its square "
-            f"is not finite, {int(bad.sum())} such in the column; correct or remove the rows"
+            f"{table.file}, column '{name}', {table.row_name(row)}: the value is missing or not finite, "
+            f"or its square is, {int(bad.sum())} such in the column; correct or remove the rows"
         )
     return values
 
