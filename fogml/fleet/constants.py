@@ -106,15 +106,31 @@ class UnitConstants:
 
     @classmethod
     def from_dict(cls, values: Mapping[str, Any]) -> UnitConstants:
-        """The constants that `as_dict` wrote."""
-        arrays = {name: np.asarray(values[name], dtype=np.float64) for name in ("triangle", "shift", "scale")}
-        return cls(
-            features=str(values["features"]),
-            precision=float(values["precision"]),
-            rows=int(values["rows"]),
-            box=dict(values["box"]),
-            **arrays,
-        )
+        """The constants that `as_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            If they are others.
+        """
+        try:
+            names = ("triangle", "shift", "scale")
+            arrays = {name: np.asarray(values[name], dtype=np.float64) for name in names}
+            found = cls(
+                features=str(values["features"]),
+                precision=float(values["precision"]),
+                rows=int(values["rows"]),
+                box=dict(values["box"]),
+                **arrays,
+            )
+            shape = (found.triangle.ndim, found.triangle.shape[-1:], found.scale.shape)
+            if shape != (2, (len(found.shift) + 2,), found.shift.shape):
+                raise ValueError("sizes don't belong together")
+        except (KeyError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f"a unit's constants are damaged ({error}); remove its outcome.json, or choose another --out"
+            ) from None
+        return found
 
 
 @dataclass(frozen=True)
