@@ -90,7 +90,7 @@ def _kill(found: dict[str, Any]) -> list[str]:
     return [
         "## Kills",
         "",
-        f"`python -m experiments.faults kill --each {found['each']} --seed {found['seed']}`, "
+        f"`python -m experiments.faults kill --seed {found['seed']} --each KILLS --only JOB`, "
         f"{found['seconds'] / 60:.0f} min: SIGKILL, SIGTERM and SIGINT in turn, at moments "
         "uniform over the job's duration.",
         "",

@@ -71,6 +71,8 @@ def _fault(trial: FrozenTrial, objectives: int) -> str:
         return f"{'.'.join(str(part) for part in first['loc'][:2])}: {first['msg']}".lstrip(": ")
     if trial.state.name != "COMPLETE":
         return ""
+    if not {"model", "features"} <= told.model_fields_set:
+        return "it names no model and features"
     if len(trial.values or ()) != objectives:
         return f"{objectives} values were expected"
     if not (told.fold_errors and all(told.fold_errors)) or told.bytes is None or told.operations is None:
