@@ -55,6 +55,8 @@ def _fuzz(found: dict[str, Any]) -> list[str]:
         f"{total['exit 0']:,} ended with exit 0, {total['exit 1']:,} with 1, {total['exit 2']:,} with 2. For "
         f"{total['compared']:,} of them the values read were compared with an independent reader's.",
         "",
+        *found.get("notes", ()),
+        "",
         "| kind | inputs | exit 0 | exit 1 | exit 2 | compared | failed |",
         "|---|---:|---:|---:|---:|---:|---|",
         *[
@@ -120,6 +122,8 @@ def _hostile(found: dict[str, Any]) -> list[str]:
         "## Hostile inputs by name",
         "",
         f"`python -m experiments.faults hostile`: {len(rows)} inputs, {len(wrong)} that did not hold.",
+        "",
+        *found.get("notes", ()),
         "",
         "| input | what happens | held |",
         "|---|---|---|",
