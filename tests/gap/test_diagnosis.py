@@ -212,8 +212,8 @@ def of_unit(run, name):
         (lambda a, b, c: ([a], [c], {"without": ["no_such"]}), "--without no_such: there is no such effect"),
         (lambda a, b, c: ([a], [c], {"noise": b}), "the table turns in it"),
         (
-            lambda a, b, c: ([a.with_columns(T_in=np.full(len(a), np.nan))], [c], {}),
-            "column 'T_in' holds no number",
+            lambda a, b, c: ([a.with_columns(flow=np.full(len(a), np.nan))], [c], {}),
+            "column 'flow' holds no number",
         ),
     ],
 )

@@ -69,9 +69,9 @@ def test_what_memory_hides_after_a_start_and_a_gap_is_left_out():
 
 def test_samples_without_a_number_are_left_out():
     time = np.arange(0.0, 2000.0, 5.0)
-    gyro, temperature = np.ones(len(time)), np.linspace(0.0, 10.0, len(time))
-    gyro[10], temperature[20:22] = np.nan, np.inf
-    o = observe(run_at(time, gyro=gyro, T=temperature), MODEL)
+    flow, load = np.ones(len(time)), np.linspace(0.0, 10.0, len(time))
+    flow[10], load[20:22] = np.nan, np.inf
+    o = observe(run_at(time, flow=flow, load=load), MODEL)
     assert len(o.run) == len(time) - 3
     assert np.isfinite(o.recorded).all() and np.isfinite(o.temperature).all()
 
@@ -80,7 +80,7 @@ def test_samples_without_a_number_are_left_out():
     ("time", "more", "message"),
     [
         (np.arange(0.0, 599.0), {}, "lasts 598 s; a diagnosis needs at least 600 s"),
-        (np.arange(0.0, 900.0), {"T": np.full(900, np.nan)}, "column 'T' holds no number"),
+        (np.arange(0.0, 900.0), {"flow": np.full(900, np.nan)}, "column 'flow' holds no number"),
         (np.arange(0.0, 3000.0, 100.0), {}, "too short for a replay"),
     ],
 )
@@ -92,9 +92,9 @@ def test_what_can_not_be_used_says_why(time, more, message):
 def test_numbers_that_never_meet_are_refused():
     time = np.arange(0.0, 900.0)
     even = np.arange(900) % 2 == 0
-    gyro, temperature = np.where(even, 1.0, np.nan), np.where(even, np.nan, 20.0)
+    flow, load = np.where(even, 1.0, np.nan), np.where(even, np.nan, 20.0)
     with pytest.raises(Unusable, match="no row has a number in every column"):
-        observe(run_at(time, gyro=gyro, T=temperature), MODEL)
+        observe(run_at(time, flow=flow, load=load), MODEL)
 
 
 def test_a_models_refusal_is_passed_on():
