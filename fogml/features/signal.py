@@ -207,7 +207,8 @@ def check_holds(run: Run, names: Iterable[str], text: str) -> None:
         written = lacking if lacking in text else "since_on"
         place = re.search(rf"(?<!\w)d?(?={re.escape(written)}\b)", text)
         at = place.end() if place else 0
-        raise InputError(f"{error}\n  {text}\n  {' ' * at}^") from error
+        told, _, hint = str(error).partition("; ")
+        raise InputError(f"{told}\n  {text}\n  {' ' * at}^\n{hint}") from error
 
 
 def known_temperatures() -> str:

@@ -63,8 +63,8 @@ def test_a_sweep_writes_its_winner_as_a_configuration_of_train(invoke_json, swee
         ({"objectives": "rms, speed"}, "objectives rms, speed"),
         ({"space": {**SPACE, "models": {"polynomial": {"rigde": [1]}}}}, "no parameter 'rigde'"),
         ({"space": {**SPACE, "models": ["auto"]}}, "leaves nothing to choose"),
-        ({"space": {**SPACE, "features": ["T, q"]}}, "known: temperatures"),
-        ({"space": {**SPACE, "features": ["T_in"]}}, "T_in"),
+        ({"space": {**SPACE, "features": ["T, q"]}}, "the run holds T"),
+        ({"space": {**SPACE, "features": ["T_in"]}}, "the run holds T"),
         ({"space": {**SPACE, "window": {"low": 5, "high": 1}}}, "low 5 must be below high 1"),
         ({"space": {"models": ["rbf"]}}, "features"),
         ({"trials": 0}, "at least 1"),
@@ -141,7 +141,7 @@ def test_networks_in_batches_are_those_of_train(invoke_json, tmp_path):
         (("--prior", "nothing.json"), "no such file"),
         (("--workers", 0), "workers 0"),
         (("--model", "nothing"), "model 'nothing' is not known"),
-        (("--form", "T, q"), "known: temperatures"),
+        (("--form", "T, time"), "known: temperatures"),
     ],
 )
 def test_bad_fleets(invoke, tmp_path, monkeypatch, arguments, message):

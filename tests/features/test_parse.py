@@ -171,15 +171,20 @@ def test_what_can_be_no_feature_lists_what_is_known() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "at", "message"),
+    ("text", "at", "message", "hint"),
     [
-        ("T, tempo", 3, "no column 'tempo'; the run holds T, power"),
-        ("T, d(pwer)", 5, "no column 'pwer'; did you mean 'power'"),
-        ("T*dT_out", 3, "no temperature 'T_out'"),
-        ("T, since_on(400 s)", 3, "state 'powered_on'"),
+        ("T, tempo", 3, "no column 'tempo'", "the run holds T, power"),
+        ("T, d(pwer)", 5, "no column 'pwer'", "did you mean 'power'?"),
+        ("T*dT_out", 3, "no temperature 'T_out'", "the run holds T"),
+        (
+            "T, since_on(400 s)",
+            3,
+            "time since power-on is not known",
+            "state 'powered_on' [s] in the side file",
+        ),
     ],
 )
-def test_a_column_that_a_run_lacks_is_pointed_at(text: str, at: int, message: str) -> None:
+def test_a_column_that_a_run_lacks_is_pointed_at(text: str, at: int, message: str, hint: str) -> None:
     columns = {"time": np.arange(300.0), "gyro": np.zeros(300), "T": np.zeros(300), "power": np.ones(300)}
     features, run = parse_features(text), Run("a.csv", columns)
     for use in (features.atom_values, features.transform):
@@ -187,7 +192,7 @@ def test_a_column_that_a_run_lacks_is_pointed_at(text: str, at: int, message: st
             use(run)
         lines = str(caught.value).split("\n")
         assert lines[0].startswith("a.csv: ") and message in lines[0]
-        assert lines[1:] == [f"  {features.text}", "  " + " " * at + "^"]
+        assert lines[1:] == [f"  {features.text}", "  " + " " * at + "^", hint]
 
 
 def test_hysteresis_stands_for_plays() -> None:
