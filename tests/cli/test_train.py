@@ -163,7 +163,7 @@ def test_an_unknown_key_in_the_configuration(invoke, run_files, tmp_path):
     result = invoke("train", "--config", config, "-o", tmp_path / "out", status=2)
     assert result.stderr == (
         "fogml: mine.yaml: unknown key 'modle'; did you mean 'model'? known keys are seed, averaging, "
-        "design_index, limits, turn_on_band, runs, test, model, features, parameters, train_again, "
+        "design_index, limits, turn_on_band, noise, runs, test, model, features, parameters, train_again, "
         "navigation, repair, strict, any_unit, out\n"
     )
     assert not (tmp_path / "out").exists()
