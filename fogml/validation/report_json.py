@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
@@ -14,6 +15,8 @@ if TYPE_CHECKING:
 
 TRAIN_SCHEMA = "fogml.train/1"
 COMPARE_SCHEMA = "fogml.compare/1"
+
+TURN_ON = "turn_on_time"
 
 
 def judgement_json(judgement: Judgement) -> dict[str, Any]:
@@ -86,9 +89,16 @@ def _repeatability(found: Repeatability) -> dict[str, Any]:
     }
 
 
-def _metrics(metrics: Metrics) -> dict[str, float]:
-    return {name: value for name, value in asdict(metrics).items() if value is not None}
+def _metrics(metrics: Metrics) -> dict[str, float | None]:
+    held = {name: value for name, value in asdict(metrics).items() if value is not None}
+    return held | {TURN_ON: _settled(held[TURN_ON])} if TURN_ON in held else held
 
 
 def _limit(outcome: LimitOutcome) -> dict[str, Any]:
-    return asdict(outcome)
+    values = asdict(outcome)
+    return values | {"value": _settled(outcome.value)} if outcome.quantity == TURN_ON else values
+
+
+def _settled(time_s: float | None) -> float | None:
+    """A turn-on time [s]; null where the run does not settle, and the time is infinite."""
+    return None if time_s is None or math.isinf(time_s) else time_s
