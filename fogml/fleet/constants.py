@@ -15,8 +15,8 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.models.box import learn_box
+from fogml.models.coloured_noise import whitened_rows
 from fogml.models.prior import Prior
-from fogml.models.rbf.search import independent_share
 from fogml.models.table import run_rows, table_of_rows
 from fogml.runs.run import FloatArray, Run
 
@@ -42,9 +42,9 @@ class UnitConstants:
     features
         The form.
     triangle
-        Factor R of the rows ``[1, features, y]``, shape (k + 2, k + 2).
+        Factor R of the rows ``[1, features, y]``, their noise whitened, shape (k + 2, k + 2).
     precision
-        Share of independent rows over the variance of what the form leaves [1/(deg/h)**2].
+        One over the variance of a row of the triangle's; 1 as it is whitened.
     rows
         Number of averaged rows.
     shift, scale
@@ -78,13 +78,10 @@ class UnitConstants:
             raise InputError(f"{runs[0].name}: {len(table)} rows are too few for the constants of {features}")
         columns = np.column_stack([np.ones(len(table)), table.X])
         scale = np.where(table.X.std(axis=0) > 0.0, table.X.std(axis=0), 1.0)
-        solution, *_ = np.linalg.lstsq(columns / np.append(1.0, scale), table.y, rcond=None)
-        left = table.y - columns / np.append(1.0, scale) @ solution
-        variance = max(float(left @ left) / (len(table) - columns.shape[1]), 1e-24)
-        triangle = np.linalg.qr(np.column_stack([columns, table.y]), mode="r")
-        precision = independent_share(left) / variance
+        rows_white, _ = whitened_rows(columns / np.append(1.0, scale), table.y, table.run_index, table.time_s)
+        triangle = np.linalg.qr(rows_white, mode="r") * np.concatenate([[1.0], scale, [1.0]])
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
-        return cls(form.text, np.asarray(triangle), precision, len(table), table.X.mean(axis=0), scale, box)
+        return cls(form.text, np.asarray(triangle), 1.0, len(table), table.X.mean(axis=0), scale, box)
 
     def in_columns(self, shift: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Information and image of the rows in the columns ``[1, (x - shift) / scale]``."""
@@ -202,7 +199,7 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
             break
     means, spreads, distances = _each(seen, mean, covariance)
     errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
-    prior = Prior(mean, covariance, shift, scale)
+    prior = Prior(mean, covariance, shift, scale, float(len(units)))
     box = {
         name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
         for name in units[0].box

@@ -9,12 +9,11 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from scipy.special import chdtrc
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
+from fogml.models.coloured_noise import whitened_rows
 from fogml.models.linear import LinearRegressor, SavedLinear
-from fogml.models.rbf.search import independent_share
 from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
@@ -22,7 +21,8 @@ _SPREADS = np.logspace(0.0, 8.0, 33)
 # Factors by which a unit's prior covariance may be wider than its fleet's.
 _FREEDOM = 4.0
 # Degrees of freedom of the t distribution that the factors make of the prior.
-_ROUNDS = 5
+_DRAWS = 10_000
+# Of the predictive distribution: a probability of 5 % is known to 0.2 %.
 _TOLD = 0.1
 # Least that rows tell of a direction, against what the fleet tells, for the direction to be checked.
 
@@ -37,12 +37,15 @@ class Prior:
         Of the constant and the k coefficients [deg/h], shapes (k + 1,) and (k + 1, k + 1).
     shift, scale
         Of the k columns, in their units, shape (k,).
+    units
+        Units that mean and covariance are estimated from; infinite where they are known.
     """
 
     mean: FloatArray
     covariance: FloatArray
     shift: FloatArray
     scale: FloatArray
+    units: float = float("inf")
 
     def columns(self, X: FloatArray) -> FloatArray:
         """The columns of rows of features, shape (n, k + 1)."""
@@ -50,7 +53,9 @@ class Prior:
 
     def as_dict(self) -> dict[str, Any]:
         """The prior as JSON-ready values."""
-        return {key: np.asarray(value).tolist() for key, value in vars(self).items()}
+        values = {key: np.asarray(value).tolist() for key, value in vars(self).items()}
+        # JSON knows no infinity.
+        return {**values, "units": self.units if np.isfinite(self.units) else None}
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Prior:
@@ -63,7 +68,9 @@ class Prior:
         """
         try:
             saved = strictly(_SavedPrior, values, "prior")
-            arrays = {name: np.array(value, dtype=np.float64) for name, value in saved}
+            units = float("inf") if saved.units is None else saved.units
+            names = ("mean", "covariance", "shift", "scale")
+            arrays = {name: np.array(getattr(saved, name), dtype=np.float64) for name in names}
             width = len(saved.mean)
             shapes = [arrays[name].shape for name in ("covariance", "shift", "scale")]
             if shapes != [(width, width), (width - 1,), (width - 1,)]:
@@ -73,7 +80,7 @@ class Prior:
             np.linalg.cholesky(arrays["covariance"])
         except (ValueError, InputError, np.linalg.LinAlgError) as error:
             raise InputError(f"the fleet's prior is not understood ({error})") from None
-        return cls(**arrays)
+        return cls(**arrays, units=units)
 
 
 class _SavedPrior(Strict):
@@ -83,6 +90,7 @@ class _SavedPrior(Strict):
     covariance: list[list[float]]
     shift: list[float]
     scale: list[float]
+    units: float | None = Field(default=None, ge=1.0)
 
 
 class PriorRegressor(LinearRegressor):
@@ -94,8 +102,8 @@ class PriorRegressor(LinearRegressor):
     and is drawn less. How well the unit agrees with the fleet is told beside, as where rows tell
     little even an odd unit is drawn far.
 
-    Rows that are alike count as fewer: residuals' precision is multiplied by one over their
-    integrated autocorrelation.
+    The rows' noise is coloured, in a way that is averaged over
+    (:func:`fogml.models.coloured_noise.whitened_rows`).
 
     Parameters
     ----------
@@ -117,8 +125,15 @@ class PriorRegressor(LinearRegressor):
         self.ridge = 0.0
         self.fit_intercept = True
 
-    def fit(self, X: ArrayLike, y: ArrayLike, folds: ArrayLike | None = None) -> Self:
-        """Fit to rows in time order; `folds` are not needed.
+    def fit(
+        self,
+        X: ArrayLike,
+        y: ArrayLike,
+        folds: ArrayLike | None = None,
+        groups: ArrayLike | None = None,
+        time: ArrayLike | None = None,
+    ) -> Self:
+        """Fit to rows in time order, of the runs `groups` at times `time` [s]; `folds` are not needed.
 
         Raises
         ------
@@ -134,15 +149,12 @@ class PriorRegressor(LinearRegressor):
                 f"the fleet's prior is for {len(prior.shift)} columns, {inputs.shape[1]} are given"
             )
         columns = prior.columns(inputs)
-        solution, *_ = np.linalg.lstsq(columns, target, rcond=None)
-        freedom = max(1.0, len(target) - columns.shape[1])
-        for _ in range(_ROUNDS):
-            left = target - columns @ solution
-            variance = max(float(left @ left) / freedom, 1e-24)
-            weighed = independent_share(left) / variance * columns.T
-            seen = weighed @ columns, weighed @ target
-            solution, covariance, self.spread_ = posterior(*seen, prior)
-        self.agreement_ = agreement(*seen, prior)
+        rows, freedom = whitened_rows(columns, target, groups, time)
+        seen = rows[:, :-1].T @ rows[:, :-1], rows[:, :-1].T @ rows[:, -1]
+        solution, covariance, self.spread_ = posterior(*seen, prior)
+        self.agreement_ = agreement(*seen, prior, freedom)
+        left = target - columns @ solution
+        variance = float(left @ left) / max(1.0, len(target) - columns.shape[1])
         to_raw = _to_raw(prior)
         raw, raw_covariance = to_raw @ solution, to_raw @ covariance @ to_raw.T
         self.intercept_, self.coef_ = float(raw[0]), raw[1:]
@@ -221,14 +233,18 @@ def posterior(
     return mean, half @ half.T, spread
 
 
-def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float:
+def agreement(
+    information: FloatArray, image: FloatArray, prior: Prior, freedom: float = float("inf")
+) -> float:
     """Probability that a unit of the fleet would lie as far from its mean as these rows do, or farther.
 
     The unit's own estimate is compared with the fleet's mean under the covariance of both together
     (a prior-predictive check: G. Box, J. R. Stat. Soc. A 143 (1980) 383), in the directions of
     which the rows tell something: all jointly, by the sum of squares, and each for itself, by the
-    largest one times their number. The lesser of the two is returned; 0 if the rows tell nothing,
-    as then an odd unit would look the same.
+    largest one. What counts is the lesser of the two probabilities, against how small it comes out for
+    units of the fleet, drawn: their constants from the t distribution that a mean and variances estimated
+    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.2), their noise likewise.
+    0 if the rows tell nothing, as then an odd unit would look the same.
 
     Parameters
     ----------
@@ -236,14 +252,29 @@ def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float
         As for `posterior`.
     prior
         What the fleet tells.
+    freedom
+        Degrees of freedom behind the variance of the rows' noise.
     """
     _, values, seen = _directions(information, image, prior)
     told = values > _TOLD
     if not told.any():
         return 0.0
-    squares = seen[told] ** 2 / (values[told] * (1.0 + values[told]))
-    count = len(squares)
-    return float(min(chdtrc(count, squares.sum()), count * chdtrc(1, squares.max())))
+    precise = values[told]
+    squares = seen[told] ** 2 / (precise * (1.0 + precise))
+    random = np.random.default_rng(0)
+    unit, noise = random.standard_normal((2, _DRAWS, len(precise)))
+    if np.isfinite(prior.units):
+        known = max(prior.units - 1.0, 1.0)
+        unit *= np.sqrt((1.0 + 1.0 / prior.units) * known / random.chisquare(known, _DRAWS))[:, None]
+    if np.isfinite(freedom):
+        noise *= np.sqrt(freedom / random.chisquare(freedom, _DRAWS))[:, None]
+    drawn = (unit * np.sqrt(precise) + noise) ** 2 / (1.0 + precise)
+    figures = np.vstack(
+        [np.append(drawn.sum(axis=1), squares.sum()), np.append(drawn.max(axis=1), squares.max())]
+    )
+    # Of each figure the share of draws that are larger; then how rarely the lesser share is so small.
+    ranks = np.argsort(np.argsort(-figures, axis=1), axis=1).min(axis=0)
+    return float(np.mean(ranks[:-1] <= ranks[-1]))
 
 
 def _directions(
