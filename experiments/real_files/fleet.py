@@ -89,11 +89,11 @@ def section(quick: bool) -> Section:
         "## The fleet's test of agreement",
         "",
         f"**Synthetic**: a fleet of {UNITS} units with a full cycle each; then {tested} ordinary units, and "
-        f"units whose constants lie {ODD_WIDTH:g} times as far out, with the first {SHORT_HOURS:g} h of a cycle "
-        f"or all of it. White noise of {WHITE:g} deg/h a sample of {SAMPLE_S:g} s, coloured with flicker noise "
-        "beside. The errors are rms from the true drift over another cycle at 0.8 degC/min, over that of the "
-        f"unit's own fit alone (median). A unit is called odd below {ODD:.0%}; intervals of 95 % (Clopper & "
-        "Pearson).",
+        f"units whose constants lie {ODD_WIDTH:g} times as far out, with the first {SHORT_HOURS:g} h of a "
+        f"cycle or all of it. White noise of {WHITE:g} deg/h a sample of {SAMPLE_S:g} s, coloured with "
+        "flicker noise beside. The errors are rms from the true drift over another cycle at 0.8 degC/min, "
+        f"over that of the unit's own fit alone (median). A unit is called odd below {ODD:.0%}; intervals of "
+        "95 % (Clopper & Pearson).",
         "",
         "| noise | run | units | number | called odd | 95 % | error, as shipped | error, none rejected |",
         "|---|---|---|---:|---:|---|---:|---:|",

@@ -177,6 +177,10 @@ def _judge(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.report.sweep_page import worse_than
+
+    for text in worse_than(values["winner"]):
+        terminal.say(text)
     counts = values["counts"]
     terminal.say(
         f"{counts['complete'] + counts['pruned']} trials finished, {counts['pruned']} of them pruned or "
@@ -186,7 +190,12 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     for place in values["pareto"][:20]:
         trial = values["trials"][place]
         mark = "winner" if trial["number"] == values["winner"]["number"] else ""
-        figures = [number(trial["rms"]), str(trial["bytes"]), str(trial["operations"])]
+        figures = [
+            number(trial["rms"]),
+            number(trial["bias_stability"]),
+            str(trial["bytes"]),
+            str(trial["operations"]),
+        ]
         rows.append([f"{trial['model']}: {trial['features'] or 'no features'}", *figures, mark])
     units = [f"{name} [{unit}]" for name, unit in OBJECTIVES.items()]
     terminal.table("Trials that none beats in every objective", ["model", *units, ""], rows)

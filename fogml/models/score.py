@@ -87,14 +87,14 @@ class Score:
         scatter = np.sum(self.rows * (self.squared_errors / self.mean_square - 1.0) ** 2) / 2.0
         return bool(scatter < chi2.ppf(0.999, len(self.rows) - 1))
 
-    def beats(self, other: Score) -> bool:
-        """Whether it is better by more than two standard errors of the difference, block by block."""
+    def beats(self, other: Score, standard_errors: float = STANDARD_ERRORS) -> bool:
+        """Whether it is better by more than so many standard errors of the difference, block by block."""
         weights = self.rows / self.rows.sum()
         gain = other.squared_errors - self.squared_errors
         mean = float(weights @ gain)
         count = len(weights)
         error = float(np.sqrt(np.sum((weights * (gain - mean)) ** 2) * count / max(count - 1, 1)))
-        return mean > STANDARD_ERRORS * error
+        return mean > standard_errors * error
 
     def as_dict(self) -> dict[str, float | int | str]:
         """Name, parameters and rms error on the held-out rows [deg/h]."""

@@ -47,6 +47,17 @@ def sweep_page(study: Mapping[str, Any], judgement: Judgement | None = None) -> 
     )
 
 
+def worse_than(winner: Mapping[str, Any]) -> list[str]:
+    """Sentences that say what the winner is worse than on the parts held out; none where it is not."""
+    return [
+        f"The winner is worse than {against['reference']} on the parts held out: "
+        f"{number(winner['bias_stability'])} against {number(against['bias_stability'])} deg/h about each "
+        f"run's mean, {'beyond noise' if against['beyond_noise'] else 'within noise, and smaller'}."
+        for against in winner.get("against", [])
+        if against["winner_worse"]
+    ]
+
+
 def _name(trial: Mapping[str, Any]) -> str:
     parameters = ", ".join(f"{key} {_plain(value)}" for key, value in trial["parameters"].items())
     text = f"{trial['model']} of {trial['features']}" if trial["features"] else "the training mean"
@@ -61,8 +72,9 @@ def _verdict(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]
     counts, best = study["counts"], study["winner"]
     finished = counts["complete"] + counts["pruned"]
     sentences = [
+        *worse_than(best),
         f"Of {plural(finished, 'trial')}, {_name(best)} wins: {number(best['rms'])} deg/h rms on held-out "
-        f"{study['folds']}, with {plural(best['bytes'], 'byte')} of weights."
+        f"{study['folds']}, with {plural(best['bytes'], 'byte')} of weights.",
     ]
     if judgement is None:
         sentences.append("No test run was stated, so it is not judged yet.")
@@ -118,11 +130,19 @@ def _pareto_table(study: Mapping[str, Any]) -> Table:
     rows = []
     for place in study["pareto"][:_MOST_ROWS]:
         trial = study["trials"][place]
-        cells = (_name(trial), number(trial["rms"], 4), str(trial["bytes"]), str(trial["operations"]))
+        name = f"{_name(trial)} – {trial['reference']}" if trial.get("reference") else _name(trial)
+        cells = (
+            name,
+            number(trial["rms"], 4),
+            number(trial.get("bias_stability"), 4),
+            str(trial["bytes"]),
+            str(trial["operations"]),
+        )
         rows.append(Row(cells, "chosen" if trial["number"] == study["winner"]["number"] else ""))
     columns = (
         ("Model", "", "text"),
         ("Held-out rms", "deg/h", "figure"),
+        ("About each run's mean", "deg/h", "figure"),
         ("Weights", "byte", "figure"),
         ("Operations", "per sample", "figure"),
     )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
@@ -35,6 +35,8 @@ class FoldResult:
     ----------
     squared_errors
         Mean squared error on each block of time held out [(deg/h)**2].
+    mean_errors
+        Mean error on each block [deg/h], where a whole run is held out; else empty.
     rows
         Rows of each block.
     size_bytes
@@ -47,6 +49,7 @@ class FoldResult:
     rows: list[int]
     size_bytes: int
     operations: int
+    mean_errors: list[float] = field(default_factory=list)
 
 
 class HeldOut:
@@ -61,6 +64,8 @@ class HeldOut:
         Training runs.
     space
         What there is to choose from.
+    references
+        Choices from outside the space that are judged beside.
     folds
         ``runs`` leaves out a run at a time, ``time`` blocks of time; ``auto`` takes runs where there
         are several.
@@ -79,6 +84,7 @@ class HeldOut:
         self,
         runs: Sequence[Run],
         space: Space,
+        references: Iterable[Choice] = (),
         *,
         folds: Literal["auto", "time", "runs"] = "auto",
         count: int = 5,
@@ -88,7 +94,8 @@ class HeldOut:
             raise InputError(f"{count} folds: one of {', '.join(map(str, FOLD_COUNTS))} was expected")
         self.runs = checked_runs(runs)
         self.seed = seed
-        self._used = [_rows_of_all(run, space) for run in self.runs]
+        texts = [*space.extreme_texts(), *(choice.features for choice in references if choice.features)]
+        self._used = [_rows_of_all(run, texts) for run in self.runs]
         by_run = folds == "runs" or (folds == "auto" and len(self.runs) > 1)
         self.folds: list[Fold] = (
             run_folds(self._table)
@@ -123,11 +130,12 @@ class HeldOut:
         for (_, held), (predicted, bytes_, operations) in zip(
             self.folds, self._predictions(choice), strict=True
         ):
-            squares = (self._table.y[held] - predicted) ** 2
+            errors = self._table.y[held] - predicted
             starts = np.flatnonzero(np.diff(self._table.block[held], prepend=-1))
             counts = np.diff(starts, append=len(held))
-            means = np.add.reduceat(squares, starts) / counts
-            yield FoldResult(means.tolist(), counts.tolist(), bytes_, operations)
+            squares, means = (np.add.reduceat(x, starts) / counts for x in (errors**2, errors))
+            apart = means.tolist() if self.by_run else []
+            yield FoldResult(squares.tolist(), counts.tolist(), bytes_, operations, apart)
 
     def _predictions(self, choice: Choice) -> Iterator[tuple[FloatArray, int, int]]:
         if not choice.features:
@@ -161,9 +169,9 @@ def weight_bytes(regressor: Any) -> int:
     return int(sum(array.nbytes for array in regressor_to_saved(regressor)[1].values()))
 
 
-def _rows_of_all(run: Run, space: Space) -> BoolArray:
-    """Rows of a run at which every window of the space is full."""
+def _rows_of_all(run: Run, texts: Sequence[str]) -> BoolArray:
+    """Rows of a run at which every window of feature texts is full."""
     full = np.ones(len(run), dtype=np.bool_)
-    for text in space.extreme_texts():
+    for text in texts:
         full &= parse_features(text).atom_values(run).full
     return usable_rows(run, full)[0]

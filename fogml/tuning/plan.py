@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.tuning.space import Space
+from fogml.tuning.space import Choice, Space
 
-OBJECTIVES = {"rms": "deg/h", "bytes": "byte", "operations": "per sample"}
-"""What can be minimised, and its unit: error on held-out parts, size of the weights, arithmetic."""
+OBJECTIVES = {"rms": "deg/h", "bias_stability": "deg/h", "bytes": "byte", "operations": "per sample"}
+"""What can be minimised, and its unit: error on held-out parts, the same about each held-out run's mean, size
+of the weights, arithmetic."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,7 @@ class Plan:
     space
         What to choose from.
     objectives
-        Names out of `OBJECTIVES`, the first of them ``rms``.
+        Names out of `OBJECTIVES`, ``rms`` or ``bias_stability`` among them.
     folds, fold_count
         As in `fogml.tuning.held_out.HeldOut`.
     trials
@@ -42,6 +43,8 @@ class Plan:
         URL of a database; None for a journal in `folder`.
     folder
         Where results go.
+    references
+        Choices tried first, by name; None for those of `fogml.tuning.references.reference_choices`.
     heartbeat_s
         A trial whose worker has not been heard of for three times this long is tried again [s].
     """
@@ -58,6 +61,7 @@ class Plan:
     seed: int = 0
     storage: str | None = None
     folder: str = "sweep-results"
+    references: Mapping[str, Choice] | None = None
     heartbeat_s: float = 10.0
 
     def check(self) -> None:
@@ -84,8 +88,10 @@ class Plan:
             raise InputError(
                 f"objectives {', '.join(self.objectives)}: each once of {', '.join(OBJECTIVES)} was expected"
             )
-        if "rms" not in self.objectives:
-            raise InputError("objectives: rms is missing; a model's error is always among them")
+        if not {"rms", "bias_stability"} & set(self.objectives):
+            raise InputError(
+                "objectives: rms or bias_stability is missing; a model's error is always among them"
+            )
         self.space.check()
 
     def identity(self, runs: Sequence[Run]) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from fogml.tuning.plan import OBJECTIVES
 from fogml.tuning.sampling import place_of
 from fogml.tuning.storage import shown
 from fogml.tuning.study import is_finished
-from fogml.tuning.winner import command_line, figure, importance, pareto, winner
+from fogml.tuning.winner import against_references, command_line, figure, importance, pareto, winner
 from fogml.validation.report_json import judgement_json
 
 if TYPE_CHECKING:
@@ -56,6 +56,7 @@ def study_json(
     place = {trial.number: index for index, trial in enumerate(trials)}
     best = winner(trials)
     chosen = dict(_trial(best))
+    chosen["against"] = against_references(trials, best)
     chosen["command"] = command_line(best, runs, test, seed, averaging_s)
     if judgement is not None:
         chosen["judged"] = judgement_json(judgement)
@@ -91,6 +92,8 @@ def _trial(trial: FrozenTrial) -> dict[str, Any]:
         "features": attributes.get("features", ""),
         "parameters": attributes.get("parameters", {}),
         "rms": figure(trial, "rms") if whole else None,
+        "bias_stability": figure(trial, "bias_stability") if whole else None,
+        "reference": attributes.get("reference", ""),
         "bytes": attributes.get("bytes"),
         "operations": attributes.get("operations"),
         "folds": len(attributes.get("fold_errors", [])),

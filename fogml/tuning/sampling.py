@@ -60,6 +60,6 @@ class SeededByTrial(BaseSampler):
             return kind(seed=seed).sample_independent(study, trial, param_name, param_distribution)
 
 
-def place_of(trial: FrozenTrial) -> int:
+def place_of(trial: FrozenTrial | optuna.Trial) -> int:
     """Which of the trials asked for one is."""
     return int(trial.user_attrs.get(PLACE, trial.number))

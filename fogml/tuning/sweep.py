@@ -6,6 +6,7 @@ import multiprocessing
 import os
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from fogml.errors import FogmlError, InputError
 from fogml.processes import begin_worker
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.plan import Plan
+from fogml.tuning.references import reference_choices
 from fogml.tuning.storage import storage_errors
 from fogml.tuning.study import Recovery, finished_count, open_study
 
@@ -49,6 +51,8 @@ def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) ->
     if workers < 1:
         raise InputError(f"workers {workers}: at least 1 is needed")
     plan.check()
+    if plan.references is None:
+        plan = replace(plan, references=reference_choices(plan.read(), plan.seed))
     held_out = _held_out(plan)
     with storage_errors(plan.storage):
         study = open_study(plan, held_out.runs)
@@ -62,7 +66,10 @@ def run_sweep(plan: Plan, workers: int = 1, progress: Progress | None = None) ->
 
 
 def _held_out(plan: Plan) -> HeldOut:
-    return HeldOut(plan.read(), plan.space, folds=plan.folds, count=plan.fold_count, seed=plan.seed)
+    references = (plan.references or {}).values()
+    return HeldOut(
+        plan.read(), plan.space, references, folds=plan.folds, count=plan.fold_count, seed=plan.seed
+    )
 
 
 def _work_alone(study: optuna.Study, plan: Plan, held_out: HeldOut, progress: Progress | None) -> None:

@@ -15,6 +15,8 @@ from fogml.tuning.worker import score_of
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
+EQUAL = 1.0
+"""Standard errors of the difference within which a smaller trial counts as equal to the best."""
 _TREES = 200
 _LEAST_TRIALS = 10
 
@@ -44,14 +46,22 @@ def _at_least_as_good(other: FrozenTrial, trial: FrozenTrial) -> bool:
 
 
 def figure(trial: FrozenTrial, name: str) -> float:
-    """Held-out rms [deg/h], bytes or operations of a complete trial."""
-    if name != "rms":
-        return float(trial.user_attrs[name])
-    return float(np.sqrt(score_of(trial).mean_square))
+    """Held-out rms or bias stability [deg/h], bytes or operations of a complete trial."""
+    if name == "rms":
+        squares, rows = (np.concatenate(trial.user_attrs[key]) for key in ("fold_errors", "fold_rows"))
+        return float(np.sqrt(np.average(squares, weights=rows)))
+    if name == "bias_stability":
+        return float(np.sqrt(score_of(trial).mean_square))
+    return float(trial.user_attrs[name])
 
 
-def winner(trials: Sequence[FrozenTrial]) -> FrozenTrial:
-    """The smallest trial that the one with the least error does not beat beyond noise.
+def winner(trials: Sequence[FrozenTrial], standard_errors: float = EQUAL) -> FrozenTrial:
+    """The smallest trial that does as well as the best on the parts held out.
+
+    Trials are compared block by block of the same rows, the mean of each run held out apart: the bias
+    moves from run to run by more than models differ by. As well as the best does what that one beats by no
+    more than a standard error of the difference (the one-standard-error rule: L. Breiman et al.,
+    Classification and Regression Trees (1984) 3.4.3).
 
     Raises
     ------
@@ -63,10 +73,35 @@ def winner(trials: Sequence[FrozenTrial]) -> FrozenTrial:
         reasons = [t.user_attrs["reason"] for t in trials if "reason" in t.user_attrs]
         why = f": {reasons[0]}" if reasons else ""
         raise InputError(f"no trial could be fitted{why}")
-    best = min(found, key=lambda t: (figure(t, "rms"), place_of(t)))
+    best = min(found, key=lambda t: (figure(t, "bias_stability"), place_of(t)))
     score = score_of(best)
-    as_good = [t for t in found if not score.beats(score_of(t))]
-    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "rms"), place_of(t)))
+    as_good = [t for t in found if t is best or not score.beats(score_of(t), standard_errors)]
+    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "bias_stability"), place_of(t)))
+
+
+def against_references(trials: Sequence[FrozenTrial], best: FrozenTrial) -> list[dict[str, Any]]:
+    """The winner beside the default polynomial and what `auto` chooses, on the same parts held out.
+
+    Each with its name, its trial's number, held-out bias stability [deg/h], whether the winner is worse, and
+    whether that is beyond two standard errors.
+    """
+    mine, told = score_of(best), []
+    for trial in complete(trials):
+        name = trial.user_attrs.get("reference")
+        if name is None:
+            continue
+        score = score_of(trial)
+        worse = bool(score.mean_square < mine.mean_square)
+        told.append(
+            {
+                "reference": name,
+                "number": place_of(trial),
+                "bias_stability": figure(trial, "bias_stability"),
+                "winner_worse": worse,
+                "beyond_noise": worse and score.beats(mine),
+            }
+        )
+    return told
 
 
 def train_settings(trial: FrozenTrial) -> dict[str, Any]:

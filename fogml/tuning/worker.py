@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from fogml.errors import FogmlError
 from fogml.models.candidates import Candidate
 from fogml.models.score import Score
+from fogml.runs.run import FloatArray
 from fogml.tuning.held_out import FoldResult, HeldOut
 from fogml.tuning.plan import Plan
 from fogml.tuning.sampling import place_of
@@ -81,8 +82,10 @@ def _one_trial(study: optuna.Study, plan: Plan, held_out: HeldOut, place: int) -
 
 def _evaluate(study: optuna.Study, plan: Plan, held_out: HeldOut, trial: optuna.Trial) -> list[float] | None:
     """Values of the objectives; None for a trial that is pruned or that can't be fitted."""
-    choice = plan.space.suggest(trial)
+    references = dict(enumerate((plan.references or {}).items()))
+    reference, choice = references.get(place_of(trial)) or (None, plan.space.suggest(trial))
     told: dict[str, Any] = {
+        **({} if reference is None else {"reference": reference}),
         "model": choice.model,
         "features": choice.features,
         "parameters": choice.parameters,
@@ -95,8 +98,9 @@ def _evaluate(study: optuna.Study, plan: Plan, held_out: HeldOut, trial: optuna.
             folds.append(result)
             _note(trial, folds)
             if len(plan.objectives) == 1:
-                trial.report(rms_of(folds), len(folds) - 1)
-            if plan.prune and _LEAST_FOLDS <= len(folds) < len(held_out.folds):
+                error = bias_stability_of if "bias_stability" in plan.objectives else rms_of
+                trial.report(error(folds), len(folds) - 1)
+            if plan.prune and reference is None and _LEAST_FOLDS <= len(folds) < len(held_out.folds):
                 better = _beaten_by(study, plan, choice, folds)
                 if better is not None:
                     trial.set_user_attr("reason", f"beaten by trial {better} on {len(folds)} folds")
@@ -105,12 +109,18 @@ def _evaluate(study: optuna.Study, plan: Plan, held_out: HeldOut, trial: optuna.
         known = isinstance(error, FogmlError)
         trial.set_user_attr("reason", str(error) if known else f"{type(error).__name__}: {error}")
         return None
-    figures = {"rms": rms_of(folds), "bytes": float(size_of(folds)), "operations": float(work_of(folds))}
+    figures = {
+        "rms": rms_of(folds),
+        "bias_stability": bias_stability_of(folds),
+        "bytes": float(size_of(folds)),
+        "operations": float(work_of(folds)),
+    }
     return [figures[name] for name in plan.objectives]
 
 
 def _note(trial: optuna.Trial, folds: list[FoldResult]) -> None:
     trial.set_user_attr("fold_errors", [fold.squared_errors for fold in folds])
+    trial.set_user_attr("fold_means", [fold.mean_errors for fold in folds])
     trial.set_user_attr("fold_rows", [fold.rows for fold in folds])
     trial.set_user_attr("bytes", size_of(folds))
     trial.set_user_attr("operations", work_of(folds))
@@ -121,6 +131,25 @@ def rms_of(folds: list[FoldResult]) -> float:
     squares = np.concatenate([fold.squared_errors for fold in folds])
     rows = np.concatenate([fold.rows for fold in folds])
     return float(np.sqrt(np.average(squares, weights=rows)))
+
+
+def bias_stability_of(folds: list[FoldResult]) -> float:
+    """As `rms_of`, each held-out run's mean error apart [deg/h]."""
+    squares = [about_mean(fold.squared_errors, fold.mean_errors, fold.rows) for fold in folds]
+    rows = np.concatenate([fold.rows for fold in folds])
+    return float(np.sqrt(np.average(np.concatenate(squares), weights=rows)))
+
+
+def about_mean(squares: Sequence[float], means: Sequence[float], rows: Sequence[int]) -> FloatArray:
+    """Mean squared errors of a held-out run's blocks about the run's mean error; as they are without means.
+
+    How far the bias of a run lies from that of another no model of temperature tells.
+    """
+    if not len(means):
+        return np.asarray(squares, dtype=np.float64)
+    own = np.asarray(means)
+    mean = float(np.average(own, weights=rows))
+    return np.maximum(np.asarray(squares) - 2.0 * mean * own + mean**2, 0.0)
 
 
 def size_of(folds: list[FoldResult]) -> int:
@@ -134,10 +163,15 @@ def work_of(folds: list[FoldResult]) -> int:
 
 
 def score_of(trial: FrozenTrial, folds: int | None = None) -> Score:
-    """How a finished trial did on its first folds; on all where `folds` is None."""
+    """How a finished trial did on its first folds, each held-out run's mean apart.
+
+    On all where `folds` is None.
+    """
     attributes = trial.user_attrs
     candidate = Candidate(attributes["features"], attributes["model"].startswith("rbf"))
-    squares, rows = attributes["fold_errors"][:folds], attributes["fold_rows"][:folds]
+    errors, rows = attributes["fold_errors"][:folds], attributes["fold_rows"][:folds]
+    means = attributes.get("fold_means", [[]] * len(errors))[:folds]
+    squares = [about_mean(*fold) for fold in zip(errors, means, rows, strict=True)]
     return Score(candidate, 0, np.concatenate(squares), np.concatenate(rows))
 
 
@@ -146,7 +180,7 @@ def _beaten_by(study: optuna.Study, plan: Plan, choice: Choice, folds: list[Fold
     mine = Score(
         Candidate(choice.features),
         0,
-        np.concatenate([fold.squared_errors for fold in folds]),
+        np.concatenate([about_mean(fold.squared_errors, fold.mean_errors, fold.rows) for fold in folds]),
         np.concatenate([fold.rows for fold in folds]),
     )
     sizes = {"bytes": size_of(folds), "operations": work_of(folds)}

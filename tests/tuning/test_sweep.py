@@ -14,13 +14,16 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
+from fogml.models.names import make_model
+from fogml.report.sweep_page import worse_than
+from fogml.runs.run import Run
 from fogml.tuning.held_out import HeldOut
 from fogml.tuning.results import study_json
 from fogml.tuning.space import Choice, Space
 from fogml.tuning.storage import JOURNAL
 from fogml.tuning.study import begin_trial, free_place, is_finished, open_study
 from fogml.tuning.sweep import run_sweep
-from fogml.tuning.winner import complete, figure, pareto, winner
+from fogml.tuning.winner import against_references, complete, figure, pareto, winner
 from tests.tuning.world import SPACE, plan, runs
 
 optuna = pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
@@ -222,3 +225,54 @@ def test_a_choice_that_cannot_be_fitted_is_told_and_the_rest_go_on(tmp_path):
     assert states[-1.0].state.name == "PRUNED"
     assert "alpha" in states[-1.0].user_attrs["reason"]
     assert states[1.0].state.name == "COMPLETE"
+
+
+def test_the_default_and_autos_choice_are_tried_first(tmp_path):
+    """Whatever the space offers, and the winner is held against them."""
+    space = {"features": ["T"], "models": {"polynomial": {"ridge": {"low": 1e-4, "high": 1e-2}}}}
+    study = run_sweep(plan(tmp_path, space=space, trials=4, references=None))
+    trials = [trial for trial in study.get_trials() if is_finished(trial)]
+    assert len(trials) == 4
+    (default, *others) = [trial for trial in trials if "reference" in trial.user_attrs]
+    assert default.number == 0 and default.user_attrs["features"] == make_model("polynomial").features
+    names = ", ".join(trial.user_attrs["reference"] for trial in (default, *others))
+    assert names == "default, auto"
+    # The space knows nothing of the rate, which the drift holds.
+    best = winner(trials)
+    assert "reference" in best.user_attrs
+    worst = max(trials, key=lambda trial: figure(trial, "bias_stability"))
+    told = against_references(trials, worst)
+    assert all(one["winner_worse"] and one["beyond_noise"] for one in told)
+    assert "worse than default" in worse_than({"bias_stability": 1.0, "against": told})[0]
+    assert not worse_than({"bias_stability": 1.0, "against": against_references(trials, best)}) or (
+        best.user_attrs["bytes"] < default.user_attrs["bytes"]
+    )
+
+
+def test_a_bias_that_moves_from_run_to_run_does_not_hide_the_better_model(tmp_path):
+    """Biases of 0.3 deg/h on runs whose rate term is a third of that: it is in the winner still."""
+
+    def biased() -> list[Run]:
+        return [
+            Run(run.name, {**run.columns, "gyro": run.gyro + 0.3 * (-1) ** number}, run.facts)
+            for number, run in enumerate(runs(3))
+        ]
+
+    space = {"features": {"static": ["T"], "rate": ["", "dT"]}, "models": ["polynomial"]}
+    asked = replace(
+        plan(tmp_path, space=space, objectives=("bias_stability", "bytes"), trials=8), read=biased
+    )
+    trials = run_sweep(asked).get_trials()
+    best = winner(trials)
+    assert "dT" in best.user_attrs["features"]
+    assert figure(best, "bias_stability") < 0.1 < 0.25 < figure(best, "rms")
+    # Of each run's errors about its own mean, from the errors themselves.
+    held = HeldOut(biased(), asked.space)
+    squares, rows = [], []
+    for result in held.judged(Choice("polynomial", best.user_attrs["features"], {})):
+        mean = np.average(result.mean_errors, weights=result.rows)
+        squares.append(np.average(result.squared_errors, weights=result.rows) - mean**2)
+        rows.append(sum(result.rows))
+    assert figure(best, "bias_stability") == pytest.approx(
+        np.sqrt(np.average(squares, weights=rows)), rel=1e-6
+    )

@@ -34,6 +34,6 @@ def runs(count: int = 2, rows: int = 1200) -> list[Run]:
 
 def plan(folder: object, **more: Any) -> Plan:
     """A plan of a few quick trials."""
-    settings: dict[str, Any] = {"trials": 8, "heartbeat_s": 0.5, "prune": False, **more}
+    settings: dict[str, Any] = {"trials": 8, "heartbeat_s": 0.5, "prune": False, "references": {}, **more}
     space = Space.model_validate(settings.pop("space", SPACE))
     return Plan("test", runs, space, folder=str(folder), **settings)
