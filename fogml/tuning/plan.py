@@ -90,7 +90,8 @@ class Plan:
             )
         if not {"rms", "bias_stability"} & set(self.objectives):
             raise InputError(
-                "objectives: rms or bias_stability is missing; a model's error is always among them"
+                "objectives: rms is missing, or bias_stability in its place; "
+                "a model's error is always among them"
             )
         self.space.check()
 
