@@ -461,16 +461,16 @@ def _folders(world: World) -> Iterator[Hostile]:
 
         folder = fresh(box)
         write(folder, some(world, "a."))
-        was = reading.read_run
+        was = reading.read_runs
 
         def broken(*arguments: Any, **options: Any) -> Any:
             raise RuntimeError("planted")
 
-        reading.read_run = broken
+        reading.read_runs = broken
         try:
             status, _, stderr = box.command(("inspect", "a.csv", QUIET))
         finally:
-            reading.read_run = was
+            reading.read_runs = was
         one = len(stderr.strip().splitlines()) == 1
         return Outcome(status, {} if one else {"message": stderr[-200:]}, told=stderr.strip()[:200])
 

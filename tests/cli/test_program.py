@@ -57,6 +57,7 @@ def test_bad_input_is_status_2_and_one_line(run_files, tmp_path):
 WAITING_IN_THE_FIT = """
 import pathlib, signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
+signal.signal(signal.SIGHUP, signal.SIG_DFL)
 import sklearn.svm
 
 def fit(self, *rows, **more):

@@ -1,4 +1,4 @@
-"""The examination sees the faults that it looks for, and draws the same inputs again."""
+"""Spoiled inputs of every kind end as they must; and the examination sees the faults that it looks for."""
 
 from __future__ import annotations
 
@@ -14,13 +14,29 @@ import pytest
 
 from experiments.faults.batches import outcomes, sandbox
 from experiments.faults.case import Case
-from experiments.faults.fuzz import drawn
+from experiments.faults.fuzz import drawn, fuzz
 from experiments.faults.independent import compare
 from experiments.faults.inputs import KINDS
 from experiments.faults.mutate import MARKER
 from experiments.faults.sandbox import FAULTS, Limits, Outcome
 
 RUN = b"time [s],gyro [deg/h],T [degC]\n" + b"".join(b"%d,%d.5,25\n" % (10 * k, k % 3) for k in range(40))
+
+INPUTS = 300
+LIMITS = Limits(cpu_s=30.0, wall_s=120.0)
+
+
+@pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")
+def test_spoiled_inputs(tmp_path: Path) -> None:
+    found = fuzz(INPUTS, seed=11, limits=LIMITS, kept=tmp_path, quick=True)
+    assert found["inputs"] >= INPUTS
+    faults = {
+        f"{kind}: {fault}": counts[fault] for kind, counts in found["kinds"].items() for fault in FAULTS
+        if fault in counts
+    }  # fmt: skip
+    told = [path.read_text() for path in sorted(tmp_path.rglob("case.json"))][:3]
+    assert not faults, told
+    assert sum(counts.get("compared", 0) for counts in found["kinds"].values()) > INPUTS / 20
 
 
 def test_the_same_seed_draws_the_same_inputs() -> None:
@@ -40,7 +56,7 @@ def planted(home: Path, what: str, limits: Limits) -> Outcome:
     import fogml.runs.reading as reading
 
     box = sandbox(home, limits, compare)
-    whole = reading.read_run
+    whole = reading.read_runs
 
     def faulty(path: str | Path, **options: object) -> object:
         if what == "traceback":
@@ -67,18 +83,15 @@ def planted(home: Path, what: str, limits: Limits) -> Outcome:
             Path(MARKER).touch()
         if what == "not finite":
             Path("x.json").write_text('{"rms": NaN}')
-        run = whole(path, **options)
-        return (
-            replace(run, columns={**run.columns, "gyro": run.gyro * 1.001})
-            if what == "silent change"
-            else run
-        )
+        (run,) = whole(path, **options)
+        changed = replace(run, columns={**run.columns, "gyro": run.gyro * 1.001})
+        return [changed if what == "silent change" else run]
 
-    reading.read_run = box.noted(faulty)
+    reading.read_runs = box.noted(faulty)
     try:
         return box.judged(Case(("inspect", "x.csv", "--quiet"), {"x.csv": RUN}, "x.csv"))
     finally:
-        reading.read_run = whole
+        reading.read_runs = whole
 
 
 @pytest.mark.filterwarnings("ignore:This process:DeprecationWarning")

@@ -102,9 +102,9 @@ def test_rows_without_noise_are_saved_in_double_precision() -> None:
 def test_cut_arrays_are_refused() -> None:
     inputs, target, _ = rows(5, 500)
     values, arrays = RBFRegressor(centres=4).fit(inputs, target).to_saved()
-    with pytest.raises(ValueError, match="match"):
+    with pytest.raises(InputError, match=r"'centres' .* was expected"):
         RBFRegressor.from_saved(values, {**arrays, "centres": arrays["centres"][:-1]})
-    with pytest.raises(ValueError, match="match"):
+    with pytest.raises(InputError, match=r"'linear' .* was expected"):
         RBFRegressor.from_saved(values, {**arrays, "linear": arrays["linear"][1:]})
 
 

@@ -61,6 +61,7 @@ UNITS = [
     ("compressor [%]", 50.0, "compressor", 0.5),
     ("heater [0/1]", 1.0, "heater", 1.0),
     ("fan [%]", 100.0, "fan", 1.0),
+    ("dose [krad]", 2.0, "dose", 20.0),
     ("B_x [G]", 0.5, "B_x", 50.0),
     ("B_y [uT]", 50.0, "B_y", 50.0),
     ("B_z [µT]", 50.0, "B_z", 50.0),

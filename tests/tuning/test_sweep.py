@@ -219,12 +219,13 @@ def test_a_study_made_for_something_else_is_refused(tmp_path):
 
 
 def test_a_choice_that_cannot_be_fitted_is_told_and_the_rest_go_on(tmp_path):
-    space = {**SPACE, "models": {"sklearn.linear_model.Ridge": {"alpha": [-1.0, 1.0]}}}
+    # The rows alone tell that this kernel can't take them: it is of numbers above 0.
+    space = {**SPACE, "models": {"sklearn.kernel_ridge.KernelRidge": {"kernel": ["chi2", "rbf"]}}}
     study = run_sweep(plan(tmp_path, space=space, trials=6, sampler="random"))
-    states = {t.params["sklearn.linear_model.Ridge.alpha"]: t for t in study.get_trials()}
-    assert states[-1.0].state.name == "PRUNED"
-    assert "alpha" in states[-1.0].user_attrs["reason"]
-    assert states[1.0].state.name == "COMPLETE"
+    states = {t.params["sklearn.kernel_ridge.KernelRidge.kernel"]: t for t in study.get_trials()}
+    assert states["chi2"].state.name == "PRUNED"
+    assert "negative" in states["chi2"].user_attrs["reason"]
+    assert states["rbf"].state.name == "COMPLETE"
 
 
 def test_the_default_and_autos_choice_are_tried_first(tmp_path):

@@ -13,7 +13,7 @@ FOLDER = Path(blind.__file__).parent
 MAKING = sorted(
     [*(FOLDER / "reality").rglob("*.py"), *(FOLDER / f"{n}.py" for n in ("make", "case", "plan"))]
 )
-MAY = ("fogml.gap.blind", "fogml.runs", "fogml.outputs", "fogml.errors")
+MAY = ("fogml.gap.blind", "fogml.runs", "fogml.outputs", "fogml.processes", "fogml.errors")
 
 
 @pytest.mark.parametrize("path", MAKING, ids=lambda path: path.stem)
