@@ -252,3 +252,16 @@ class NoiseEffect(Effect):
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray | float:
         """Size of the noise over that of `draw`, shape (n,) or one number; no memory of other samples."""
         return 1.0
+
+
+class WhiteNoiseEffect(NoiseEffect):
+    """White noise of the rate; its amplitude is an angle random walk in deg/sqrt(h) for a strength of 1."""
+
+    def draw(
+        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
+    ) -> FloatArray:
+        """One realisation [deg/h], of strength 1 throughout; shape (count,)."""
+        from fogml.signals.random_noise import white_noise
+
+        # From deg/sqrt(h) to deg/h sqrt(s).
+        return white_noise(rng, count, sample_s, 60.0 * amplitude)

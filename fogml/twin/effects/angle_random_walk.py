@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from fogml.runs.run import FloatArray
-from fogml.twin.effect import NoiseEffect
+from fogml.twin.effect import WhiteNoiseEffect
 from fogml.twin.quantities import Quantity
 
 
-class AngleRandomWalk(NoiseEffect):
+class AngleRandomWalk(WhiteNoiseEffect):
     """White noise of the rate, which walks the angle.
 
     ::
@@ -34,12 +31,3 @@ class AngleRandomWalk(NoiseEffect):
         "arw_physics": "not apart: that one says where this one comes from",
     }
     candidate = True
-
-    def draw(
-        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
-    ) -> FloatArray:
-        """One realisation [deg/h], shape (count,)."""
-        from fogml.signals.random_noise import white_noise
-
-        # From deg/sqrt(h) to deg/h sqrt(s).
-        return white_noise(rng, count, sample_s, 60.0 * amplitude)

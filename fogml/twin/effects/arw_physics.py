@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import FloatArray
-from fogml.twin.effect import NoiseEffect
+from fogml.twin.effect import WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.optics import Receiver, phase_noise_to_walk
 from fogml.twin.quantities import Quantity
 
 
-class ArwPhysics(NoiseEffect):
+class ArwPhysics(WhiteNoiseEffect):
     """Shot, thermal and excess noise of the light at the receiver.
 
     ::
@@ -48,15 +48,6 @@ class ArwPhysics(NoiseEffect):
         "angle_random_walk": "not apart: this one says where that one comes from",
     }
     candidate = False
-
-    def draw(
-        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
-    ) -> FloatArray:
-        """One realisation of A deg/sqrt(h) [deg/h], shape (count,)."""
-        from fogml.signals.random_noise import white_noise
-
-        # From deg/sqrt(h) to deg/h sqrt(s).
-        return white_noise(rng, count, sample_s, 60.0 * amplitude)
 
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Angle random walk of the unit's coil [deg/sqrt(h)], shape (n,)."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import FloatArray
-from fogml.twin.effect import NoiseEffect
+from fogml.twin.effect import WhiteNoiseEffect
 from fogml.twin.effects.radiation import Radiation, effective_dose
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 
 
-class RadiationNoise(NoiseEffect):
+class RadiationNoise(WhiteNoiseEffect):
     """White noise that is left to find where radiation darkened the fibre.
 
     ::
@@ -41,15 +41,6 @@ class RadiationNoise(NoiseEffect):
         "arw_physics": "temperature: this one follows the dose alone",
     }
     candidate = False
-
-    def draw(
-        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
-    ) -> FloatArray:
-        """One realisation of A [deg/h], shape (count,)."""
-        from fogml.signals.random_noise import white_noise
-
-        # From deg/sqrt(h) to deg/h sqrt(s).
-        return white_noise(rng, count, sample_s, 60.0 * amplitude)
 
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Noise over that of the light before, shape (n,)."""

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
-from fogml.twin.effect import NoiseEffect
+from fogml.twin.effect import WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Quantity
 
 
-class VibrationNoise(NoiseEffect):
+class VibrationNoise(WhiteNoiseEffect):
     """White noise of the rate under vibration, which random strain of the coil makes.
 
     ::
@@ -36,15 +34,6 @@ class VibrationNoise(NoiseEffect):
         "vibration_rectification": "the mean, which that one shifts",
     }
     candidate = False
-
-    def draw(
-        self, rng: np.random.Generator, count: int, sample_s: float, amplitude: float, **shape: float
-    ) -> FloatArray:
-        """One realisation at 1 g [deg/h], shape (count,)."""
-        from fogml.signals.random_noise import white_noise
-
-        # From deg/sqrt(h) to deg/h sqrt(s).
-        return white_noise(rng, count, sample_s, 60.0 * amplitude)
 
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Vibration [g], shape (n,)."""
