@@ -23,7 +23,6 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
 from fogml.models.intervals import Intervals
 from fogml.models.rbf.rates import RATES_THAT_TELL
-from fogml.models.score import choose
 from fogml.models.trial import Trial, fit_candidate
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
@@ -75,8 +74,7 @@ class AutoModel(DriftModel):
             if self.progress is not None:
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
-        told = trial.rates >= RATES_THAT_TELL
-        self.choice_ = choose(scores, rates_told=told, both_directions=trial.both_directions)
+        self.choice_ = trial.chosen(scores)
         self.chosen_ = fit_candidate(self.choice_.candidate, group, self.seed)
         notes = (*self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

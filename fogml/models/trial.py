@@ -23,7 +23,7 @@ from fogml.models.regressors import (
     parameter_count,
     predict_rows,
 )
-from fogml.models.score import Score
+from fogml.models.score import Score, choose
 from fogml.models.table import RunRows, TrainingTable, recorded_s, run_rows
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
@@ -107,6 +107,11 @@ class Trial:
             rows.append(by_block[1])
         of_runs = len(rows[0]) if self.several_runs else None
         return Score(candidate, parameters, np.concatenate(squares), np.concatenate(rows), of_runs)
+
+    def chosen(self, scores: Sequence[Score]) -> Score:
+        """The score of the candidate that these runs speak for."""
+        told = self.rates >= RATES_THAT_TELL
+        return choose(scores, rates_told=told, both_directions=self.both_directions)
 
     def _predicted(
         self, candidate: Candidate, fitted: IndexArray, held: IndexArray

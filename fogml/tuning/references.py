@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fogml.models.auto import choose
 from fogml.models.names import make_model
-from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.trial import Trial
 from fogml.runs.run import Run
 from fogml.tuning.space import Choice
@@ -32,9 +30,7 @@ def reference_choices(runs: Sequence[Run], seed: int = 0) -> dict[str, Choice]:
     features = make_model("polynomial", None, seed).get_params()["features"]
     default = Choice("polynomial", str(features), {})
     trial = Trial(runs, seed)
-    scores = [trial.score(candidate) for candidate in trial.candidates]
-    told = trial.rates >= RATES_THAT_TELL
-    found = choose(scores, rates_told=told, both_directions=trial.both_directions).candidate
+    found = trial.chosen([trial.score(candidate) for candidate in trial.candidates]).candidate
     kind = "rbf" if found.network else "polynomial"
     auto = Choice(kind, found.features, {}) if found.features else Choice("mean", "", {})
     if auto == default:
