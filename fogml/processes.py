@@ -50,7 +50,7 @@ def _interrupt(number: int, frame: FrameType | None) -> NoReturn:
 def quiet_libraries() -> None:
     """Keep warnings of libraries from stderr, unless Python was started with some asked for.
 
-    What is wrong with a result is found in the result, see `fogml.results_file`.
+    What is wrong with a result is found in the result, see `fogml.json_files`.
     """
     if not sys.warnoptions:
         warnings.simplefilter("ignore")

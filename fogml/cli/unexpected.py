@@ -13,9 +13,10 @@ from itertools import pairwise
 from pathlib import Path
 
 from fogml import __version__
+from fogml.errors import printable
 
-_QUOTED = 60
 _FRAMES = 50
+# Innermost frames that a report holds.
 
 
 def report_unexpected(error: BaseException, arguments: Sequence[str]) -> str:
@@ -31,8 +32,7 @@ def report_unexpected(error: BaseException, arguments: Sequence[str]) -> str:
     arguments
         The command line without the program's name.
     """
-    text = str(error).strip().split("\n")[0]
-    text = text if len(text) <= _QUOTED else text[: _QUOTED - 1] + "…"
+    text = printable(str(error).strip().split("\n")[0])
     line = f"fogml: unexpected error ({type(error).__name__}{': ' if text else ''}{text})"
     path = _written(_report(error, arguments), arguments)
     where = f"report written to {path}" if path else "no report could be written"

@@ -44,6 +44,4 @@ def reaching_box(box: Box, terms: Sequence[Term], atoms: Sequence[Atom]) -> Box:
 
 def is_rate_or_gradient(atom: Atom) -> bool:
     """Whether an atom is a temperature's change in time, or its difference between sensors."""
-    weights = [coefficient for _, coefficient in atom.signal.parts]
-    between = abs(sum(weights)) <= 1e-9 * sum(abs(weight) for weight in weights)
-    return atom.operator in ("d", "diff") or (atom.operator == "value" and between)
+    return atom.operator in ("d", "diff") or (atom.operator == "value" and atom.signal.is_difference)

@@ -72,6 +72,12 @@ class Signal:
         return len(self.parts) == 1 and self.parts[0][1] == 1.0
 
     @property
+    def is_difference(self) -> bool:
+        """Whether its coefficients cancel: what all its columns have in common leaves it unchanged."""
+        weights = [coefficient for _, coefficient in self.parts]
+        return abs(sum(weights)) <= 1e-9 * sum(abs(weight) for weight in weights)
+
+    @property
     def sensors(self) -> tuple[str, ...]:
         """Names of what it takes."""
         return tuple(name for name, _ in self.parts)

@@ -27,7 +27,7 @@ from scipy.optimize import minimize
 from fogml.features.terms import Term
 from fogml.models.intervals import LEVELS, Intervals
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects_basis import Basis, SizePriors, basis_of
+from fogml.models.mixed_effects_basis import ScaledColumns, SizePriors, basis_of
 from fogml.models.table import TrainingTable
 from fogml.runs.run import BoolArray, FloatArray
 
@@ -145,7 +145,7 @@ def skill_of(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[float, flo
 class _Posterior:
     """The posterior of the shared part, in units of the outputs' spread."""
 
-    basis: Basis
+    basis: ScaledColumns
     mean: float
     spread: float
     weights: FloatArray
@@ -156,7 +156,7 @@ class _Posterior:
     columns: FloatArray
 
     @classmethod
-    def of(cls, table: TrainingTable, basis: Basis, priors: SizePriors) -> _Posterior:
+    def of(cls, table: TrainingTable, basis: ScaledColumns, priors: SizePriors) -> _Posterior:
         mean, spread = float(table.y.mean()), float(table.y.std()) or 1.0
         z = (table.y - mean) / spread
         columns = (table.X - basis.shift) @ basis.mix

@@ -47,7 +47,7 @@ class SizePriors:
     offset: float = 5.0
 
 
-class Basis(NamedTuple):
+class ScaledColumns(NamedTuple):
     """Columns that are centred, scaled and pulled apart, and how they come from features.
 
     Attributes
@@ -68,7 +68,7 @@ class Basis(NamedTuple):
     medians: FloatArray
 
 
-def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Basis:
+def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> ScaledColumns:
     """Columns whose prior sizes mean something: standardised, powers orthogonal, memories as differences.
 
     A power of a signal is taken orthogonal to the lower ones over the training rows, and its prior falls as
@@ -94,7 +94,7 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Basis:
         if plain and power > 1:
             groups[i] = group(("curved", atom), priors.curved)
             degrees[i] = power
-        elif plain and not _is_difference(atom.signal.parts):
+        elif plain and not atom.signal.is_difference:
             groups[i] = group(("linear", atom), priors.linear)
         elif atom.operator == "since_on" and not others:
             groups[i] = group("since_on", priors.other)
@@ -122,12 +122,7 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Basis:
         size = float(np.sqrt(np.mean((centred @ mix[:, i]) ** 2)))
         still = size <= 1e-9 * (1.0 + float(np.abs(shift) @ np.abs(mix[:, i])))
         mix[:, i] *= 0.0 if still else 1.0 / (size * degrees[i])
-    return Basis(shift, mix, groups, np.array(medians))
-
-
-def _is_difference(parts: Sequence[tuple[str, float]]) -> bool:
-    weights = [coefficient for _, coefficient in parts]
-    return abs(sum(weights)) <= 1e-9 * sum(abs(weight) for weight in weights)
+    return ScaledColumns(shift, mix, groups, np.array(medians))
 
 
 def _is_value_of(term: Term, signal: object) -> bool:
