@@ -47,9 +47,9 @@ def markup(text: object) -> Markup:
     return escape(text) if isinstance(text, Markup) else escape(_lines(text))
 
 
-def script_data(json_text: str) -> Markup:
+def script_data(json: str) -> Markup:
     """JSON inside a script element of HTML, which no text in it can end."""
-    return Markup(json_text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
+    return Markup(json.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029"))
 
 
 def figure_text(text: object) -> str:

@@ -18,7 +18,7 @@ from tempfile import TemporaryFile
 
 
 @dataclass(frozen=True)
-class Limits:
+class ProgramLimits:
     """What a program may take.
 
     Attributes
@@ -52,7 +52,7 @@ class Finished:
     errors: str
 
 
-def run_limited(words: Sequence[str], limits: Limits, data: bytes = b"") -> Finished:
+def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") -> Finished:
     """Run a program; its words go to it as they are, and no shell reads them.
 
     Parameters

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from fogml.limited import LimitExceededError, Limits, run_limited
+from fogml.limited import LimitExceededError, ProgramLimits, run_limited
 
 PYTHON = [sys.executable, "-I", "-S", "-c"]
 
@@ -17,7 +17,7 @@ def test_words_and_input_arrive_as_they_are():
     words = ["$(id)", "; touch x", "a b", "*"]
     done = run_limited(
         [*PYTHON, "import sys; print(sys.argv[1:]); sys.stdout.write(sys.stdin.read()); sys.exit(3)", *words],
-        Limits(),
+        ProgramLimits(),
         b"in",
     )
     assert done.status == 3 and done.output.decode() == f"{words}\nin"
@@ -26,10 +26,10 @@ def test_words_and_input_arrive_as_they_are():
 @pytest.mark.parametrize(
     ("limits", "code", "told"),
     [
-        (Limits(cpu_s=1), "while True: pass", "1 s of processor time"),
-        (Limits(wall_s=0.5), "import time; time.sleep(60)", r"more than 0\.5 s"),
+        (ProgramLimits(cpu_s=1), "while True: pass", "1 s of processor time"),
+        (ProgramLimits(wall_s=0.5), "import time; time.sleep(60)", r"more than 0\.5 s"),
         (
-            Limits(output_bytes=1 << 20),
+            ProgramLimits(output_bytes=1 << 20),
             "import signal; signal.signal(signal.SIGXFSZ, signal.SIG_DFL); print('x' * (2 << 20))",
             "wrote more than 1 MB",
         ),
@@ -41,7 +41,7 @@ def test_each_limit_is_told(limits, code, told):
 
 
 def test_memory_has_a_limit():
-    done = run_limited([*PYTHON, "bytearray(1 << 30)"], Limits(memory_bytes=1 << 28))
+    done = run_limited([*PYTHON, "bytearray(1 << 30)"], ProgramLimits(memory_bytes=1 << 28))
     assert done.status == 1 and "MemoryError" in done.errors
 
 
@@ -53,7 +53,7 @@ def test_what_a_program_started_ends_with_it(tmp_path):
         "if child == 0: time.sleep(60)\n"
         "open(sys.argv[1], 'w').write(str(child))\n"
     )
-    run_limited([*PYTHON, code, str(note)], Limits())
+    run_limited([*PYTHON, code, str(note)], ProgramLimits())
     child = int(note.read_text())
     status = Path(f"/proc/{child}/status")
     for _ in range(100):

@@ -19,9 +19,9 @@ from fogml.fleet.shared import shared_model
 from fogml.fleet.summary import fleet_json
 from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.json_files import finite_json, write_json
-from fogml.json_text import read_json
 from fogml.outputs import sole_writer, whole_folder
 from fogml.runs.sources import sources_stamp
+from fogml.strict_json import read_json
 
 _SHOWN = 40
 

@@ -14,15 +14,15 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.escaping import terminal_text
 from fogml.export.c_source import DRIVER, SOURCE, CSource
-from fogml.limited import Finished, LimitExceededError, Limits, run_limited
+from fogml.limited import Finished, LimitExceededError, ProgramLimits, run_limited
 
 FloatArray = NDArray[np.float64]
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion")
 CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
-COMPILING = Limits(cpu_s=120, wall_s=300.0, memory_bytes=4 << 30, output_bytes=256 << 20)
+COMPILING = ProgramLimits(cpu_s=120, wall_s=300.0, memory_bytes=4 << 30, output_bytes=256 << 20)
 """What a compiler may take: a hundred times what the largest network needs."""
-RUNNING = Limits(cpu_s=120, wall_s=300.0, memory_bytes=1 << 30, output_bytes=1 << 30)
+RUNNING = ProgramLimits(cpu_s=120, wall_s=300.0, memory_bytes=1 << 30, output_bytes=1 << 30)
 """What generated C may take on points and a history: under an emulator or sanitizers too."""
 
 
@@ -70,7 +70,7 @@ class CProgram:
         compiler: str | None = None,
         flags: Sequence[str] = FLAGS,
         runner: Sequence[str] = (),
-        running: Limits = RUNNING,
+        running: ProgramLimits = RUNNING,
     ) -> None:
         self._running = running
         for name, text in {**source.files, DRIVER: source.driver}.items():
@@ -176,7 +176,7 @@ def _sizes(tool: str, target: Path) -> list[int]:
     return [int(word) for word in _compile([tool, str(target)]).splitlines()[1].split()[:3]]
 
 
-def _limited(words: Sequence[str], limits: Limits, name: str, data: bytes = b"") -> Finished:
+def _limited(words: Sequence[str], limits: ProgramLimits, name: str, data: bytes = b"") -> Finished:
     try:
         return run_limited(words, limits, data)
     except LimitExceededError as error:

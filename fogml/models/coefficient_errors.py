@@ -11,7 +11,7 @@ from fogml.models.linear import LinearRegressor
 from fogml.models.table import Compose, RunRows, averaged_table, recorded_s
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_spectrum import spectrum_of
-from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, Terms, term_shapes
+from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms, term_shapes
 
 ROWS = 8192
 """Rows of all runs that the noise is told from and the columns are transformed at: slow ones are all that the
@@ -19,7 +19,7 @@ coefficients of temperatures feel."""
 _FEWEST = 32
 _GAP = 1.5
 """Steps longer than this many usual ones part a run."""
-_OWN = Terms(("N", "B", "K"))
+_OWN = SpectrumTerms(("N", "B", "K"))
 
 
 def noise_covariance(

@@ -29,7 +29,6 @@ from pydantic import Field
 
 from fogml.errors import InputError, quoted
 from fogml.json_files import json_text
-from fogml.json_text import content_hash, json_object, read_bytes, read_json
 from fogml.models.arrays import arrays_from_bytes, arrays_to_bytes
 from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
@@ -37,6 +36,7 @@ from fogml.models.intervals import Intervals
 from fogml.models.names import PRESETS
 from fogml.outputs import whole_folder
 from fogml.strict import Strict, strictly
+from fogml.strict_json import content_hash, json_object, read_bytes, read_json
 
 SCHEMA = "fogml.model/2"
 MODEL_FILE = "model.json"

@@ -23,7 +23,7 @@ from fogml.errors import InputError
 from fogml.signals.allan import Segments, segment_bounds
 from fogml.signals.averages import block_averages
 from fogml.signals.noise_spectrum import spectrum_of
-from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, Terms, term_shapes
+from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms, term_shapes
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -194,7 +194,7 @@ def floor_model(
     evidence: list[float] = []
     for more in _subsets(own):
         for drift in _subsets(beside):
-            model = SpectrumModel(spectrum, Terms(("N", *more, *drift)), used=slow)
+            model = SpectrumModel(spectrum, SpectrumTerms(("N", *more, *drift)), used=slow)
             fit = model.fit()
             fits.append((model, fit))
             evidence.append(-fit.loss - size * (1 + len(more) + len(drift)))
@@ -225,7 +225,7 @@ def averages_variance(name: str, sample_s: float, averaging_s: float, windows: i
     m = max(averaging_s / sample_s, 1.0)
     lowest = 1.0 / (50.0 * m * windows)
     cycles = np.geomspace(lowest, 0.5, int(64 * np.log2(0.5 / lowest)) + 1)
-    density = term_shapes(cycles / sample_s, sample_s, Terms((name,)))[..., 0]
+    density = term_shapes(cycles / sample_s, sample_s, SpectrumTerms((name,)))[..., 0]
     sine = np.sin(np.pi * cycles)
     # Where the grid no longer follows a square, its mean does.
     one = np.where(m * cycles < 8.0, np.sin(np.pi * m * cycles) ** 2, 0.5) / (m * sine) ** 2

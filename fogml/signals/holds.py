@@ -19,7 +19,7 @@ _SPREAD = 0.3
 
 
 @dataclass(frozen=True)
-class Hold:
+class ValueHold:
     """Samples that are new.
 
     Attributes
@@ -34,7 +34,7 @@ class Hold:
     rows: IndexArray
 
 
-def hold_of(values: FloatArray) -> Hold:
+def hold_of(values: FloatArray) -> ValueHold:
     """How long each value of an evenly sampled series is held.
 
     A coarse converter repeats values by chance, for a random number of samples; a hold lasts the same
@@ -45,7 +45,7 @@ def hold_of(values: FloatArray) -> Hold:
     values
         A stretch without gaps, shape (n,).
     """
-    every = Hold(1.0, np.arange(len(values)))
+    every = ValueHold(1.0, np.arange(len(values)))
     changes = np.flatnonzero(values[1:] != values[:-1]) + 1
     if len(changes) < _FEWEST or len(changes) > 0.9 * len(values):
         return every
@@ -59,10 +59,10 @@ def hold_of(values: FloatArray) -> Hold:
             return every
     elif float(np.var(lengths)) > _SPREAD or int(lengths.max()) > 2:
         return every
-    return Hold(float(np.mean(lengths)), changes.astype(np.intp))
+    return ValueHold(float(np.mean(lengths)), changes.astype(np.intp))
 
 
-def _whole(values: FloatArray, changes: IndexArray, lengths: IndexArray, samples: int) -> Hold:
+def _whole(values: FloatArray, changes: IndexArray, lengths: IndexArray, samples: int) -> ValueHold:
     """New values every so many samples, those that happen to equal the one before included."""
     between = (
         [np.arange(a, b - samples // 2, samples) for a, b in zip(changes[:-1].tolist(), changes[1:].tolist())]
@@ -70,4 +70,4 @@ def _whole(values: FloatArray, changes: IndexArray, lengths: IndexArray, samples
         else [changes[:-1]]
     )
     last = np.arange(int(changes[-1]), len(values) - samples + 1, samples)
-    return Hold(float(samples), np.concatenate((*between, last)).astype(np.intp))
+    return ValueHold(float(samples), np.concatenate((*between, last)).astype(np.intp))

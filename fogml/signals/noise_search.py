@@ -13,7 +13,7 @@ from fogml.signals.output_filters import LONGEST_MEAN, LOW_PASSES, NO_FILTER, Ou
 from fogml.signals.spectrum_fit import (
     SpectrumFit,
     SpectrumModel,
-    Terms,
+    SpectrumTerms,
     excess_of,
     relative_errors,
 )
@@ -21,9 +21,9 @@ from fogml.signals.spectrum_fit import (
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
-PLAIN = Terms()
-BEHIND = Terms(("N", "B", "K", "Q", "W"))
-FAR_BEHIND = Terms(("N", "B", "K", "Q", "W", "E"))
+PLAIN = SpectrumTerms()
+BEHIND = SpectrumTerms(("N", "B", "K", "Q", "W"))
+FAR_BEHIND = SpectrumTerms(("N", "B", "K", "Q", "W", "E"))
 """Behind a filter, and behind one that lets so little pass at high frequencies that the ends are seen."""
 _STARTS = np.log([0.02, 0.2, 1.5])
 """Warped corners to begin with."""
@@ -36,7 +36,7 @@ _LIVE = 5.0
 
 
 @dataclass(frozen=True)
-class Candidate:
+class NoiseChoice:
     """A fitted model and its evidence [nats], by Schwarz' criterion (Ann. Statist. 6 (1978) 461)."""
 
     model: SpectrumModel
@@ -68,7 +68,7 @@ class NoiseSearch:
     """
 
     spectrum: Spectrum
-    candidates: tuple[Candidate, ...]
+    candidates: tuple[NoiseChoice, ...]
     weights: FloatArray
     excess: float
     fit_p_value: float
@@ -117,7 +117,7 @@ def search_noise(
     """
     size = np.log(max(float(spectrum.count.sum()), 2.0))
     plain = SpectrumModel(spectrum, PLAIN)
-    found = [Candidate(plain, plain.fit(), 0.0)]
+    found = [NoiseChoice(plain, plain.fit(), 0.0)]
     if filters and np.any(spectrum.power > 0.0):
         found += _filtered(spectrum, found[0], size)
         best = max(found, key=lambda c: c.evidence)
@@ -145,18 +145,22 @@ def fit_p_value(model: SpectrumModel, fit: SpectrumFit) -> float:
     return float(chi2.sf(float(errors @ errors), freedom)) if freedom > 0 else 1.0
 
 
-def _filtered(spectrum: Spectrum, plain: Candidate, size: float) -> list[Candidate]:
+def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[NoiseChoice]:
     first = [form for form in LOW_PASSES if form.kind == "butterworth" and form.warp == "bilinear"]
     mean = _running_mean(spectrum)
     if mean is not None:
         first.append(mean)
 
-    def fitted(forms: Sequence[OutputFilter], corners: FloatArray, used: BoolArray | None) -> list[Candidate]:
+    def fitted(
+        forms: Sequence[OutputFilter], corners: FloatArray, used: BoolArray | None
+    ) -> list[NoiseChoice]:
         models = [
             SpectrumModel(spectrum, BEHIND if form.order == 1 else FAR_BEHIND, form, used) for form in forms
         ]
         penalty = 0.5 * size + _of_levels(spectrum, used)
-        tried = [Candidate(m, m.scanned(corners if m.filter.free else corners[:1]), penalty) for m in models]
+        tried = [
+            NoiseChoice(m, m.scanned(corners if m.filter.free else corners[:1]), penalty) for m in models
+        ]
         # What lets more past than it holds back is no filter.
         return [c for c in tried if c.fit["W"] <= 0.5 * c.fit["N"]]
 
@@ -200,9 +204,9 @@ def _of_levels(spectrum: Spectrum, used: BoolArray | None) -> float:
     return 0.5 * float(np.sum(np.log(np.maximum(spectrum.count[~used], 2.0))))
 
 
-def _from_lower_on(spectrum: Spectrum) -> list[Candidate]:
+def _from_lower_on(spectrum: Spectrum) -> list[NoiseChoice]:
     """Plain models of the rows below an octave's end: the rows above have a level of their own each."""
-    found: list[Candidate] = []
+    found: list[NoiseChoice] = []
     top = 0.25 / spectrum.sample_s
     low = spectrum.frequency_hz[:, -1]
     while True:
@@ -210,11 +214,11 @@ def _from_lower_on(spectrum: Spectrum) -> list[Candidate]:
         if float(spectrum.count[used].sum()) < 64.0:
             return found
         model = SpectrumModel(spectrum, PLAIN, used=used)
-        found.append(Candidate(model, model.fit(), _of_levels(spectrum, used)))
+        found.append(NoiseChoice(model, model.fit(), _of_levels(spectrum, used)))
         top *= 0.5
 
 
-def _correlated(spectrum: Spectrum, best: Candidate, size: float, times: int = 10) -> list[Candidate]:
+def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int = 10) -> list[NoiseChoice]:
     """Models with a Gauss-Markov term, where slow noise is there at all."""
     fit = best.fit
     slow = fit["B"] + fit["K"]
@@ -224,14 +228,14 @@ def _correlated(spectrum: Spectrum, best: Candidate, size: float, times: int = 1
     longest, shortest = 1.0 / (4.0 * np.pi * lowest), 2.0 * spectrum.sample_s
     if longest <= 2.0 * shortest:
         return []
-    found: list[Candidate] = []
+    found: list[NoiseChoice] = []
     for tau in np.geomspace(shortest, longest, times):
-        terms = Terms((*fit.terms.names, "G"), float(tau))
+        terms = SpectrumTerms((*fit.terms.names, "G"), float(tau))
         model = SpectrumModel(spectrum, terms, fit.filter, best.model.used)
         start = replace(fit, terms=terms, coefficients=np.append(fit.coefficients, 1e-6 * fit["N"] / tau))
         fitted = model.fit(start)
         # What makes the density at its upper end too is white noise behind a filter of first order.
         top = int(np.flatnonzero(model.used)[-1])
         if fitted["G"] * model.design(fitted.log_corner)[0][top, -1] < 0.5 * fitted.density[top]:
-            found.append(Candidate(model, fitted, best.penalty + size))
+            found.append(NoiseChoice(model, fitted, best.penalty + size))
     return sorted(found, key=lambda c: c.fit.loss)[:1]

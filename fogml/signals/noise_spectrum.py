@@ -46,7 +46,7 @@ class Resolution:
 
 
 @dataclass(frozen=True)
-class Line:
+class SpectralLine:
     """A sinusoid in the data: frequency [Hz] and amplitude, in the unit of the data."""
 
     frequency_hz: float
@@ -84,7 +84,7 @@ class Spectrum:
     values: FloatArray
     columns: FloatArray
     removed: FloatArray
-    lines: tuple[Line, ...] = ()
+    lines: tuple[SpectralLine, ...] = ()
 
 
 def spectrum_of(
@@ -222,14 +222,14 @@ def _cosine(values: FloatArray) -> FloatArray:
 
 def _lines(
     square: FloatArray, edges: NDArray[np.int64], sample_s: float, n: int, offset: int, chance: float
-) -> tuple[NDArray[np.bool_] | None, list[Line]]:
+) -> tuple[NDArray[np.bool_] | None, list[SpectralLine]]:
     """Coefficients of sinusoids that stand out of their bins' noise, and what they are."""
     from scipy.stats import chi2
 
     # Median and limit of a squared normal value.
     typical, limit = float(chi2.ppf(0.5, 1)), float(chi2.isf(chance, 1))
     masked: NDArray[np.bool_] | None = None
-    lines: list[Line] = []
+    lines: list[SpectralLine] = []
     for low, high in pairwise(edges.tolist()):
         # A median of few, or of one side of a line, says nothing.
         if high - low < 32:
@@ -262,5 +262,5 @@ def _lines(
             weight = np.maximum(energy, 0.0)
             middle = float(np.average(np.arange(a, b + 1), weights=weight))
             frequency = (offset + middle) / (2.0 * n * sample_s)
-            lines.append(Line(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
+            lines.append(SpectralLine(frequency, float(np.sqrt(max(energy.sum(), 0.0) / (sample_s * n)))))
     return masked, lines

@@ -23,7 +23,7 @@ _TOLERANCE = 1e-7
 
 
 @dataclass(frozen=True)
-class Terms:
+class SpectrumTerms:
     """Which terms a model has.
 
     Attributes
@@ -60,7 +60,7 @@ class SpectrumFit:
         Rows that the fit stands on.
     """
 
-    terms: Terms
+    terms: SpectrumTerms
     filter: OutputFilter
     log_corner: float
     coefficients: FloatArray
@@ -99,7 +99,7 @@ class SpectrumModel:
     def __init__(
         self,
         spectrum: Spectrum,
-        terms: Terms,
+        terms: SpectrumTerms,
         output_filter: OutputFilter = NO_FILTER,
         used: NDArray[np.bool_] | None = None,
     ) -> None:
@@ -276,7 +276,7 @@ class SpectrumModel:
         return loss, power, constants, covariance
 
 
-def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: Terms) -> FloatArray:
+def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms) -> FloatArray:
     """Sampled one-sided density of each term of coefficient 1, shape of frequencies and (terms,).
 
     Samples are means over the sample interval, as a gyro's are: what lies above half the sampling rate

@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError
-from fogml.json_text import parse_json
 from fogml.processes import process_is_alive, process_start
 from fogml.runs.run import Run
+from fogml.strict_json import parse_json
 from fogml.tuning.plan import Plan
 from fogml.tuning.sampling import PLACE, place_of
 from fogml.tuning.storage import import_optuna, open_storage, shown

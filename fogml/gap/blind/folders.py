@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fogml import json_text
+from fogml import strict_json
 from fogml.errors import InputError
 
 DIAGNOSIS = "diagnosis"
@@ -118,7 +118,7 @@ def read_json(path: Path) -> dict[str, Any]:
     InputError
         If it can't be read or holds no mapping.
     """
-    values = json_text.read_json(path, "fogml blind makes, answers and scores cases")
+    values = strict_json.read_json(path, "fogml blind makes, answers and scores cases")
     if not isinstance(values, dict):
         raise InputError(f"{path}: a JSON object was expected")
     return values

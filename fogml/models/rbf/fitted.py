@@ -24,7 +24,7 @@ _ROUNDING_OF_NOISE = 1e-3
 # Greatest change by rounding to float32, as a share of the noise, for keeping float32.
 
 
-class Fitted(Strict):
+class SavedFit(Strict):
     """Fitted attributes that are saved beside the arrays."""
 
     n_features_in_: int = Field(ge=1)
@@ -67,7 +67,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
     """
 
     _linear_part = True
-    _fitted: ClassVar[type[Fitted]]
+    _fitted: ClassVar[type[SavedFit]]
     _parameter_constraints: ClassVar[dict[str, Any]] = {
         "seed": [Interval(Integral, 0, None, closed="left")],
         "threads": [None, Interval(Integral, 1, None, closed="left")],

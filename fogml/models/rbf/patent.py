@@ -17,7 +17,7 @@ from fogml.models.folds import dealt_folds
 from fogml.models.parameters import check_parameters
 from fogml.models.rbf.centres import orthogonal_least_squares, thinned, thinned_rows
 from fogml.models.rbf.evaluate import basis_functions
-from fogml.models.rbf.fitted import Fitted, NetworkRegressor
+from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
 from fogml.models.rbf.levels import Frame
 
 FloatArray = NDArray[np.float64]
@@ -30,7 +30,7 @@ _SEARCH_ROWS = 50_000
 _PIECE = 1 << 13
 
 
-class _Fitted(Fitted):
+class _Fitted(SavedFit):
     width_: float = Field(gt=0.0)
     held_out_mse_: float
 

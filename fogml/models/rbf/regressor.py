@@ -15,7 +15,7 @@ from fogml.errors import InputError
 from fogml.models.parameters import Device, WholeNumbers, check_parameters
 from fogml.models.rbf.beyond import Edge
 from fogml.models.rbf.blocks import average_in_blocks
-from fogml.models.rbf.fitted import Fitted, NetworkRegressor
+from fogml.models.rbf.fitted import NetworkRegressor, SavedFit
 from fogml.models.rbf.levels import Frame
 from fogml.models.rbf.rates import RATES_THAT_TELL, followed_columns, restrained_inputs, training_rates
 from fogml.models.rbf.search import COARSE_ROWS, COARSE_ROWS_PER_CENTRE, Search, SearchSettings
@@ -31,7 +31,7 @@ SIZES = (16, 32, 64)
 """Numbers of centres among which ``centres="evidence"`` chooses."""
 
 
-class _Fitted(Fitted):
+class _Fitted(SavedFit):
     sizes_tried_: dict[str, float]
     independent_share_: float
 

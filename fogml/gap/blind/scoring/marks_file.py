@@ -22,8 +22,8 @@ import fogml
 from fogml.errors import InputError
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.truth import KINDS, Truth
-from fogml.json_text import MOST_BYTES, parse_json
 from fogml.outputs import whole_file
+from fogml.strict_json import MOST_BYTES, parse_json
 
 MARKS = "marks.json.gz"
 SCHEMA = "fogml.blind_marks/1"
