@@ -30,7 +30,7 @@ from fogml.processes import process_is_alive, process_start
 NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
 """Errors of a disk that takes no more."""
 PARTIAL, COMMIT = ".partial-", ".commit-"
-_CONTENT, _LOCK, _REPLACED = "content", "lock", "replaced"
+_CONTENT, _LOCK = "content", "lock"
 
 
 @contextmanager

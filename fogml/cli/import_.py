@@ -19,6 +19,8 @@ def import_(
         str | None, typer.Option("--profile", help="Name of a profile that ships, or a YAML file.")
     ] = None,
     axis: Annotated[str | None, typer.Option("--axis", help="One axis of the profile (all).")] = None,
+    repair: options.Repair = None,
+    repair_anyway: options.RepairAnyway = None,
     out: options.Out = None,
     seed: options.Seed = None,
     config: options.Config = None,
@@ -27,7 +29,8 @@ def import_(
 ) -> None:
     """Bring a logger's file into the run format.
 
-    Writes one run for each leg and axis, STEM[-LEG][-AXIS].csv, with its side file.
+    Writes one run for each leg and axis, STEM[-LEG][-AXIS].csv, with its side file; with --repair one for
+    each restart of the clock.
     """
     from fogml.cli.import_job import ImportSettings, import_and_write
 
@@ -37,6 +40,7 @@ def import_(
             "file": file,
             "profile": profile,
             "axis": axis,
+            "repair": options.repairing(repair, repair_anyway),
             "out": str(out) if out else None,
             "seed": seed,
         },

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import ClassVar
 
-from fogml.cli.settings import Settings
+from fogml.cli.runs import most_dropped
+from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
@@ -19,6 +20,7 @@ class ImportSettings(Settings):
     file: str | None = None
     profile: str | None = None
     axis: str | None = None
+    repair: Repairing = False
     out: str | None = None
 
     def _ships(self, key: str, value: str) -> bool:
@@ -41,7 +43,13 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     written = []
     with whole_folder(settings.out, shared=True) as folder:
         with terminal.work(f"reading {settings.file}") as work:
-            runs = import_recording(settings.file, settings.profile, settings.axis)
+            runs = import_recording(
+                settings.file,
+                settings.profile,
+                settings.axis,
+                repair=bool(settings.repair),
+                most_dropped=most_dropped(settings.repair),
+            )
             _check_apart(settings.file, settings.out, [run.name for run in runs])
             for run in runs:
                 work.doing(f"writing {run.name}")

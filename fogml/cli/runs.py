@@ -17,7 +17,7 @@ def open_run(path: str, *, repair: Repairing = False) -> Run:
     from fogml.runs.shipped import shipped_run
 
     if not path.startswith(SHIPPED):
-        return read_run(path, repair=bool(repair), most_dropped=_most_dropped(repair))
+        return read_run(path, repair=bool(repair), most_dropped=most_dropped(repair))
     return shipped_run(path.removeprefix(SHIPPED))
 
 
@@ -27,7 +27,7 @@ def open_legs(path: str, *, repair: Repairing = False) -> list[Run]:
 
     if path.startswith(SHIPPED):
         return [open_run(path)]
-    return read_runs(path, repair=bool(repair), most_dropped=_most_dropped(repair))
+    return read_runs(path, repair=bool(repair), most_dropped=most_dropped(repair))
 
 
 def open_blocks(path: str, *, repair: Repairing = False) -> Iterable[Run]:
@@ -36,10 +36,11 @@ def open_blocks(path: str, *, repair: Repairing = False) -> Iterable[Run]:
 
     if path.startswith(SHIPPED):
         return [open_run(path)]
-    return read_blocks(path, repair=bool(repair), most_dropped=_most_dropped(repair))
+    return read_blocks(path, repair=bool(repair), most_dropped=most_dropped(repair))
 
 
-def _most_dropped(repair: Repairing) -> float:
+def most_dropped(repair: Repairing) -> float:
+    """Share of the rows that the setting ``repair`` lets go."""
     from fogml.runs.assemble import MOST_DROPPED
 
     return 1.0 if repair == "anyway" else MOST_DROPPED

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -13,18 +13,18 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.arrival_times import burst_ends, sampling_times
-from fogml.runs.clock_order import Ordered, in_order
+from fogml.runs.clock_order import in_order
 from fogml.runs.columns import column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
 from fogml.runs.other_rate import on_gyro_rows
-from fogml.runs.possible import clock_fault, fault_of, faulty, float32_reason
+from fogml.runs.possible import clock_fault, faulty, float32_reason
 from fogml.runs.raw_table import RawTable
+from fogml.runs.row_faults import REPAIR, Rows, finite_rows, order_error, step_error
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
-_REPAIR = "--repair"
 DROPPING = ("repaired_rows", "repaired_repeats")
 """Codes of the findings that count rows which are gone."""
 _MOST_NAMES = 20
@@ -48,11 +48,59 @@ def runs_of_table(
     """
     columns, gyro_unit, tick_s, notes = _internal_columns(table)
     findings = [*table.findings, *notes]
-    total = len(table) + sum(f.count for f in findings if f.code == "repaired_rows")
+    return runs_of_columns(
+        columns,
+        Rows(table.file, table.row_name),
+        _facts(table, path),
+        name or path.name,
+        gyro_unit=gyro_unit,
+        tick_s=tick_s,
+        findings=findings,
+        repair=repair,
+        most_dropped=most_dropped,
+    )
+
+
+def runs_of_columns(
+    columns: dict[str, FloatArray],
+    table: Rows,
+    facts: Facts,
+    name: str,
+    *,
+    gyro_unit: Literal["deg/h", "count"],
+    tick_s: float,
+    findings: list[Finding],
+    repair: bool,
+    most_dropped: float,
+) -> list[Run]:
+    """The runs that columns in internal units hold, NaN where a row has no value; as `runs_of_table`.
+
+    Parameters
+    ----------
+    columns
+        Columns of the table, each of shape (n,).
+    table
+        Names its rows.
+    facts
+        Set-up facts.
+    name
+        What the run is called; legs are called by it and their number.
+    gyro_unit
+        Unit of the gyro's column.
+    tick_s
+        One count of the clock [s].
+    findings
+        What was noticed before.
+    repair
+        Whether faults are repaired.
+    most_dropped
+        Share of the rows that repair may drop.
+    """
+    total = len(columns["time"]) + sum(f.count for f in findings if f.code == "repaired_rows")
     # Rows of another rate may share their times with the gyro's, so these are told apart first.
     columns, rows, found = _of_gyro_rate(columns)
     findings += found
-    kept, finding = _finite_rows(table, {"time": columns["time"]}, rows, repair)
+    kept, finding = finite_rows(table, {"time": columns["time"]}, rows, repair)
     rows, columns = _taken(rows, columns, kept, finding, findings)
     if len(rows) < 2:
         raise too_short(table.file, len(rows))
@@ -61,7 +109,7 @@ def runs_of_table(
     )
     if ordered.faults or ordered.hopeless:
         if not repair or ordered.hopeless or float32_reason(columns["time"]):
-            raise _order_error(table, rows, columns["time"], ordered)
+            raise order_error(table, rows, columns["time"], ordered)
         columns = {key: values[ordered.rows] for key, values in columns.items()} | {"time": ordered.time}
         rows = rows[ordered.rows]
         findings += [fault.done for fault in ordered.faults]
@@ -72,19 +120,19 @@ def runs_of_table(
         if ordered.faults:
             part, kept, found = _of_gyro_rate(part)
             part_rows, said = part_rows[kept], [*said, *found]
-        kept, finding = _finite_rows(table, part, part_rows, repair)
+        kept, finding = finite_rows(table, part, part_rows, repair)
         part_rows, part = _taken(part_rows, part, kept, finding, said)
         _check_clock_steps(table.file, part["time"])
         time, finding = sampling_times(part)
         part["time"] = time
-        facts, called = _facts(table, path), name or path.name
+        called, own = name, facts
         if len(ordered.legs) > 1:
-            called = f"{called} leg {number + 1}"
-            facts = facts if number == 0 else facts.model_copy(update={"powered_on": None})
+            called = f"{name} leg {number + 1}"
+            own = facts if number == 0 else facts.model_copy(update={"powered_on": None})
         if len(part_rows) < 2:
             raise too_short(table.file, len(part_rows))
         said += [finding] if finding else []
-        runs.append(Run.derived(called, part, facts, gyro_unit, tuple(said)))
+        runs.append(Run.derived(called, part, own, gyro_unit, tuple(said)))
     _check_dropped(table.file, runs, total, most_dropped)
     return runs
 
@@ -120,8 +168,8 @@ def _check_dropped(file: str, runs: list[Run], total: int, most_dropped: float) 
     if count > max(1.0, most_dropped * total):
         what = "; ".join(f.message for f in dropped)
         raise InputError(
-            f"{file}: {_REPAIR} would drop {count} of {total} rows ({what}), more than "
-            f"{most_dropped:.0%}: correct the file, or {_REPAIR} --repair-anyway drops them"
+            f"{file}: {REPAIR} would drop {count} of {total} rows ({what}), more than "
+            f"{most_dropped:.0%}: correct the file, or {REPAIR} --repair-anyway drops them"
         )
 
 
@@ -143,14 +191,14 @@ class Assembler:
             For every fault, also for time that goes back or repeats from one block to the next.
         """
         columns, gyro_unit, tick_s, findings = _internal_columns(table)
-        rows = np.arange(len(table), dtype=np.intp)
-        _finite_rows(table, columns, rows, repair=False)
+        rows, named = np.arange(len(table), dtype=np.intp), Rows(table.file, table.row_name)
+        finite_rows(named, columns, rows, repair=False)
         time = columns["time"]
         ordered = in_order(time, columns, tick_s=tick_s, row_name=table.row_name) if len(time) else None
         if ordered is not None and (ordered.faults or ordered.hopeless):
-            raise _order_error(table, rows, time, ordered)
+            raise order_error(named, rows, time, ordered)
         if len(time) and time[0] <= self.last_time:
-            raise _step_error(table, 0, time[0] == self.last_time)
+            raise step_error(named, 0, time[0] == self.last_time)
         if len(time):
             _check_clock_steps(table.file, time)
             self.last_time = float(time[-1])
@@ -223,52 +271,6 @@ def _listed(names: Collection[str]) -> str:
     shown = [f"'{name[:_LONGEST_NAME]}'" for name in islice(names, _MOST_NAMES)]
     more = [f"{len(names) - len(shown)} more"] if len(names) > len(shown) else []
     return ", ".join(shown + more) or "nothing"
-
-
-def _finite_rows(
-    table: RawTable, columns: Mapping[str, FloatArray], rows: IndexArray, repair: bool
-) -> tuple[IndexArray, Finding | None]:
-    """Rows whose values of the run format are all numbers that a recording can hold."""
-    bad: NDArray[np.bool_] | None = None
-    for name, values in columns.items():
-        found = faulty(name, values)
-        if found is None:
-            continue
-        if not repair:
-            row = int(np.argmax(found))
-            raise InputError(
-                f"{table.file}, column '{name}', {table.row_name(int(rows[row]))}: the value is "
-                f"{fault_of(values[row])}, {int(found.sum())} such in the column; correct them, or {_REPAIR} "
-                "drops the rows"
-            )
-        bad = found if bad is None else bad | found
-    if bad is None:
-        return rows, None
-    first = int(rows[np.argmax(bad)])
-    count = int(bad.sum())
-    message = f"rows dropped for missing or infinite values: {count}, the first: {table.row_name(first)}"
-    return np.flatnonzero(~bad), Finding("repaired_rows", message, row=first + 1, count=count)
-
-
-def _order_error(table: RawTable, rows: IndexArray, time: FloatArray, ordered: Ordered) -> InputError:
-    """What to say of a clock out of order: what it suffers from, and only what mends that."""
-    at = int(np.argmax(time[1:] <= time[:-1])) + 1 if np.any(time[1:] <= time[:-1]) else 0
-    why = float32_reason(time) or ordered.hopeless
-    if why:
-        cure = f"{why}; correct it, or give 'sample_s' in an import profile in place of the clock"
-        return _step_error(table, int(rows[at]), time[at] == time[at - 1], cure)
-    told = ", and ".join(fault.told for fault in ordered.faults)
-    cures = " and ".join(dict.fromkeys(fault.cure for fault in ordered.faults))
-    return _step_error(
-        table, int(rows[at]), time[at] == time[at - 1], f"{told}; correct it, or {_REPAIR} {cures}"
-    )
-
-
-def _step_error(table: RawTable, row: int, repeats: bool, cure: str = "correct it") -> InputError:
-    what = "repeats" if repeats else "goes back"
-    return InputError(
-        f"{table.file}, column 'time', {table.row_name(row)}: time {what}; it must strictly increase: {cure}"
-    )
 
 
 def _check_clock_steps(file: str, time: FloatArray) -> None:

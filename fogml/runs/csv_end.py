@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 from fogml.errors import InputError, quoted
-from fogml.runs.csv_dialect import CsvDialect, number
+from fogml.runs.csv_dialect import number
 from fogml.runs.findings import Finding
 
 _TAIL_BYTES = 1 << 15
@@ -21,9 +21,20 @@ def note_of_end(path: Path) -> list[Finding]:
     return [Finding("unfinished_line", message)]
 
 
-def cut_line(path: Path, dialect: CsvDialect) -> str | None:
+def cut_line(path: Path, separator: str | None, decimal: str) -> str | None:
     """The last line where it is evidently cut within its last number, else None.
 
+    Parameters
+    ----------
+    path
+        The file.
+    separator
+        Between fields; None for blanks.
+    decimal
+        Decimal mark.
+
+    Notes
+    -----
     It has no end, and its last number has fewer decimals (or, for whole numbers, fewer digits)
     than that of every one of at least 20 lines before it: what wrote these was stopped there.
     """
@@ -32,22 +43,22 @@ def cut_line(path: Path, dialect: CsvDialect) -> str | None:
         return None
     # The first line of the tail may be a part of one.
     lines = [line for line in re.split(r"[\r\n]+", tail.decode("latin-1"))[1:] if line.strip()]
-    fields = [line.rsplit(dialect.separator, 1)[-1].strip(' "') for line in lines]
-    if len(fields) <= _LEAST_LINES or any(number(field, dialect.decimal) is None for field in fields):
+    fields = [line.rsplit(separator, 1)[-1].strip(' "') for line in lines]
+    if len(fields) <= _LEAST_LINES or any(number(field, decimal) is None for field in fields):
         return None
-    sizes = [_digits(field, dialect.decimal) for field in fields]
+    sizes = [_digits(field, decimal) for field in fields]
     (whole, decimals), before = sizes[-1], sizes[:-1]
     least = min(size[1] for size in before)
     is_cut = decimals < least if least else whole < min(size[0] for size in before)
     return lines[-1] if is_cut else None
 
 
-def cut_error(path: Path, line: str) -> InputError:
-    """What to say of a file that ends with such a line."""
+def cut_error(path: Path, line: str, cure: str = "--repair drops the row") -> InputError:
+    """What to say of a file that ends with such a line, and what else than a new copy helps."""
     shown = quoted(line.strip())
     return InputError(
         f"{path.name}, last line: the file ends in the middle of a number, {shown}; "
-        "copy or export it again, or --repair drops the row"
+        f"copy or export it again, or {cure}"
     )
 
 

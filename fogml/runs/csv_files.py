@@ -49,7 +49,7 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
         if table.num_rows == 0:
             raise no_samples(path.name)
         whole = _raw(path, dialect, table, 0)
-    cut = cut_line(path, dialect)
+    cut = cut_line(path, dialect.separator, dialect.decimal)
     if cut is None:
         return whole.noting(note_of_end(path))
     if not repair:
@@ -73,7 +73,7 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     from pyarrow import csv as arrow_csv
 
     dialect = csv_dialect(path).only(columns)
-    if (cut := cut_line(path, dialect)) is not None:
+    if (cut := cut_line(path, dialect.separator, dialect.decimal)) is not None:
         raise cut_error(path, cut)
     start = 0
     try:

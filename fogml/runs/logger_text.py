@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, listed, quoted
+from fogml.runs.csv_end import cut_error, cut_line
 from fogml.runs.findings import Finding
+from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_schema import ImportProfile
 
 FloatArray = NDArray[np.float64]
@@ -28,7 +30,8 @@ class LoggerTable:
     Attributes
     ----------
     columns
-        Source (name or position) to values, shape (n,).
+        Source (name or position) to values, shape (n,); NaN in rows of which a source of another rate
+        has none.
     rows
         Number of each row among all data rows of the file, shape (n,), counted from 0, so that
         rejected rows keep their place.
@@ -111,7 +114,11 @@ def read_logger_text(path: str | Path, profile: ImportProfile, profile_name: str
         holds faulty rows that the profile does not reject; the message names file and line.
     """
     path = Path(path)
-    return _Reader(path.name, profile, profile_name).read(_content(path, profile))
+    content = _content(path, profile)
+    cut = cut_line(path, profile.text_separator, profile.decimal)
+    if cut is not None and not profile.reject.not_numbers:
+        raise cut_error(path, cut, "'reject: {not_numbers: true}' in the profile leaves the row out")
+    return _Reader(path.name, profile, profile_name, is_cut=cut is not None).read(content)
 
 
 def _content(path: Path, profile: ImportProfile) -> bytes:
@@ -135,8 +142,9 @@ def _content(path: Path, profile: ImportProfile) -> bytes:
 
 
 class _Reader:
-    def __init__(self, file: str, profile: ImportProfile, profile_name: str) -> None:
+    def __init__(self, file: str, profile: ImportProfile, profile_name: str, is_cut: bool) -> None:
         self.file = file
+        self.is_cut = is_cut
         self.profile = profile
         self.hint = f"is this a file for the profile {quoted(profile_name)}?"
 
@@ -212,7 +220,9 @@ class _Reader:
             findings.append(_rejected(f"without {fields} fields", short))
         rows = np.flatnonzero(~short)
         values = self._values(lines.keep(numbers[rows]), fields, list(places.values()))
-        faulty = ~np.isfinite(values).all(axis=0)
+        faulty = np.any(~np.isfinite(values[self._filled(places, values)]), axis=0)
+        if self.is_cut and len(rows) and rows[-1] == len(numbers) - 1:
+            faulty[-1] = True
         if faulty.any():
             line = int(numbers[rows[np.argmax(faulty)]])
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
@@ -226,6 +236,12 @@ class _Reader:
             rows, values = rows[~faulty], values[:, ~faulty]
         columns = dict(zip(places, values))
         return LoggerTable(columns, rows, len(numbers), tuple(findings))
+
+    def _filled(self, places: dict[str | int, int], values: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """Which sources have a value in every row: those of another rate are empty in most, evenly so."""
+        clock = self.profile.columns["time"].source if "time" in self.profile.columns else None
+        kinds = zip(places, values, strict=True)
+        return np.array([source == clock or not is_of_another_rate(column) for source, column in kinds])
 
     def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
         """The source columns as numbers, shape (columns, rows); NaN where there is none."""

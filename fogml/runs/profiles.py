@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,12 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, quoted
+from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion
-from fogml.runs.facts import Facts, read_side_file
+from fogml.runs.facts import Facts, read_side_file, side_file
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.profile_schema import ImportColumn, ImportProfile, LeadingJump, load_profile, profile_names
+from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 
@@ -24,7 +27,12 @@ FloatArray = NDArray[np.float64]
 
 
 def import_recording(
-    path: str | Path, profile: str | Path | ImportProfile, axis: str | None = None
+    path: str | Path,
+    profile: str | Path | ImportProfile,
+    axis: str | None = None,
+    *,
+    repair: bool = False,
+    most_dropped: float = MOST_DROPPED,
 ) -> list[Run]:
     """Bring a logger's file into the run format.
 
@@ -37,13 +45,15 @@ def import_recording(
         Name of a profile that ships, path of a YAML file, or a profile.
     axis
         One axis of the profile; all of them if None.
+    repair, most_dropped
+        As for `fogml.runs.reading.read_runs`.
 
     Returns
     -------
     list of Run
-        One for each leg and axis, named ``STEM[-LEG][-AXIS]``, in the internal units of the run
-        format. Time begins at 0 in each; every row left out is counted in the findings, which also
-        hold what `check_run` noticed.
+        One for each leg and axis, named ``STEM[-LEG][-AXIS]``, and with `repair` for each restart of the
+        clock, in the internal units of the run format. Time begins at 0 in each; every row left out is
+        counted in the findings, which also hold what `check_run` noticed.
 
     Raises
     ------
@@ -52,12 +62,18 @@ def import_recording(
     """
     path = Path(path)
     name = "given" if isinstance(profile, ImportProfile) else Path(profile).stem
+    beside = side_file(path)
+    if beside is not None and not isinstance(profile, ImportProfile) and Path(profile).is_file():
+        # A profile of the log's own name lies where its side file would.
+        beside = None if beside.samefile(profile) else beside
     profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
     _check_axis(profile, axis)
     with unchanged(*run_sources(path)):
         table = read_logger_text(path, profile, name)
-        facts = read_side_file(path)
-    return runs_from_table(table, profile, path.stem, path.name, axis, facts)
+        facts = Facts() if beside is None else read_side_file(path)
+    return runs_from_table(
+        table, profile, path.stem, path.name, axis, facts, repair=repair, most_dropped=most_dropped
+    )
 
 
 def run_names(profile: ImportProfile, stem: str) -> dict[str, tuple[str | None, str | None]]:
@@ -76,6 +92,9 @@ def runs_from_table(
     file: str,
     axis: str | None = None,
     facts: Facts | None = None,
+    *,
+    repair: bool = False,
+    most_dropped: float = MOST_DROPPED,
 ) -> list[Run]:
     """The runs that a profile makes of a logger's table: legs, axes, units, facts, notes.
 
@@ -93,6 +112,8 @@ def runs_from_table(
         One axis, or all.
     facts
         Facts that override the profile's.
+    repair, most_dropped
+        As for `fogml.runs.reading.read_runs`.
 
     Raises
     ------
@@ -104,13 +125,46 @@ def runs_from_table(
     runs = []
     for name, (leg, this_axis) in run_names(profile, stem).items():
         if axis is None or this_axis == axis:
-            part, findings = _leg(table, profile, leg, file)
-            columns = _columns(table, part, profile, this_axis, file)
-            _check_clock(columns["time"], table.rows[part], file)
-            run_facts = _facts(profile, this_axis, facts)
-            runs.append(Run(name, columns, run_facts, findings=(*table.findings, *findings)))
-    runs = [_with_unit(run, profile) for run in runs]
+            part, found = _leg(table, profile, leg, file)
+            rows = table.rows[part]
+            if not len(rows):
+                raise InputError(f"{file}: no rows are left; the profile rejects them all")
+            findings = [*table.findings, *found]
+            runs += runs_of_columns(
+                _columns(table, part, profile, this_axis, file),
+                Rows(file, lambda i, rows=rows: f"data row {int(rows[i]) + 1}"),  # type: ignore[misc]
+                _with_losses(_facts(profile, this_axis, facts), findings, len(rows), most_dropped),
+                name,
+                gyro_unit="count" if profile.columns["gyro"].unit == "count" else "deg/h",
+                tick_s=_tick_s(profile),
+                findings=findings,
+                repair=repair,
+                most_dropped=most_dropped,
+            )
+    runs = [_from_zero(run) for run in runs]
     return [run.with_findings(check_run(run)) for run in runs]
+
+
+def _tick_s(profile: ImportProfile) -> float:
+    """One count of the logger's clock [s]."""
+    clock = profile.columns.get("time")
+    return 1.0 if clock is None else clock.scale * conversion("time", clock.unit, "import profile")[0]
+
+
+def _from_zero(run: Run) -> Run:
+    """The run with a clock that begins at 0."""
+    columns = {**run.columns, "time": run.time - run.time[:1]}
+    return Run.derived(run.name, columns, run.facts, run.gyro_unit, run.findings)
+
+
+def _with_losses(facts: Facts, findings: Sequence[Finding], kept: int, most: float) -> Facts:
+    """Facts whose notes say that more than a share `most` of the recording's rows was left out."""
+    lost = {f.message: f.count for f in findings if f.code == "rejected_rows"}
+    count = sum(lost.values())
+    if count <= most * (kept + count):
+        return facts
+    told = f"On import {count} of {kept + count} rows were left out: {'; '.join(lost)}."
+    return facts.model_copy(update={"notes": " ".join([*([facts.notes] if facts.notes else []), told])})
 
 
 def _check_axis(profile: ImportProfile, axis: str | None) -> None:
@@ -177,9 +231,8 @@ def _columns(
     with np.errstate(over="ignore", invalid="ignore"):
         if profile.sample_s is not None:
             columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
-        columns["time"] = columns["time"] - columns["time"][:1]
     for name, values in columns.items():
-        lost = ~np.isfinite(values)
+        lost = np.isinf(values)
         if lost.any():
             raise InputError(
                 f"{file}: column '{name}' is no finite number at data row {int(rows[np.argmax(lost)]) + 1} "
@@ -195,19 +248,6 @@ def _internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray
         return (values * column.scale + column.offset) * factor + shift
 
 
-def _check_clock(time: FloatArray, rows: NDArray[np.intp], file: str) -> None:
-    if len(time) == 0:
-        raise InputError(f"{file}: no rows are left; the profile rejects them all")
-    back = np.diff(time) <= 0.0
-    if back.any():
-        at = int(np.argmax(back)) + 1
-        raise InputError(
-            f"{file}: column 'time' goes back or repeats at data row {int(rows[at]) + 1} "
-            f"({int(np.count_nonzero(back))} such rows); where the clock cannot be trusted, "
-            "give 'sample_s' in the profile in place of a column 'time'"
-        )
-
-
 def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None) -> Facts:
     """Facts of the profile, then of the axis, then of the side file; notes are joined."""
     layers = [profile.facts, profile.axis_facts.get(axis or "", Facts()), overriding or Facts()]
@@ -217,7 +257,3 @@ def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None) -
     notes = [*profile.notes, *(layer.notes for layer in layers if layer.notes)]
     values["notes"] = " ".join(notes) or None
     return Facts(**values)  # type: ignore[arg-type]
-
-
-def _with_unit(run: Run, profile: ImportProfile) -> Run:
-    return replace(run, gyro_unit="count") if profile.columns["gyro"].unit == "count" else run

@@ -196,8 +196,8 @@ def test_a_missing_column_lists_those_there(write):
         ("1,2,3", "7 fields were expected, line 6 has 3"),
         ("1,2,3,4,five,6,30000", "line 6 holds text or nothing"),
         ("1,2,3,4,,6,30000", "line 6 holds text or nothing"),
-        ("1,2,3,4,5,6,20000", "goes back or repeats at data row 5"),
-        ("1,2,3,4,5,6,19000", "goes back or repeats at data row 5"),
+        ("1,2,3,4,5,6,20000", "column 'time', data row 5: time repeats; .*--repair drops the repeats"),
+        ("1,2,3,4,5,6,19000", "column 'time', data row 5: time goes back; .*--repair makes each leg"),
     ],
 )
 def test_a_faulty_row_that_the_profile_does_not_reject_is_an_error(write, row, message):
@@ -408,3 +408,88 @@ def test_axes_name_no_other_place(write, name):
     own = OWN.replace("gyro: {source: rate, ", "gyro: {").rstrip() + f"\naxes: {{'{name}': rate}}\n"
     with pytest.raises(InputError, match="key 'axes'"):
         load_profile(write("own.yaml", own))
+
+
+PLAIN = """
+schema: fogml.import/1
+description: plain columns
+columns:
+  time: {source: t, unit: us}
+  gyro: {source: rate, unit: deg/h}
+  T: {source: temp, unit: degC}
+"""
+
+
+def plain_log(time_us: np.ndarray, blanks: np.ndarray | None = None) -> tuple[str, np.ndarray, np.ndarray]:
+    """A log of a ramp, with blank temperatures; its gyro and its temperature everywhere."""
+    rows = np.arange(len(time_us))
+    gyro, T = np.round(np.random.default_rng(0).normal(5.0, 1.0, len(rows)), 4), 20.0 + 0.01 * rows
+    blank = np.zeros(len(rows), dtype=bool) if blanks is None else blanks
+    lines = [
+        f"{t:.0f},{g:.4f},{'' if b else f'{x:.3f}'}"
+        for t, g, x, b in zip(time_us, gyro, T, blank, strict=True)
+    ]
+    return "\n".join(["t,rate,temp", *lines]) + "\n", gyro, T
+
+
+@pytest.mark.parametrize("rejects", ["", "reject: {not_numbers: true}\n"])
+@pytest.mark.parametrize("every", [2, 10])
+def test_a_column_of_another_rate_costs_no_rows(write, rejects, every):
+    rows = np.arange(400)
+    log, gyro, T = plain_log(1e5 * rows, rows % every != 0)
+    (run,) = import_recording(write("log.csv", log), write("p.yaml", PLAIN + rejects))
+    np.testing.assert_array_equal(run.gyro, gyro)
+    last = rows[-1] // every * every
+    np.testing.assert_allclose(run.columns["T"][: last + 1], T[: last + 1], atol=1e-9)
+    assert [f.code for f in run.findings if f.code in ("other_rate", "rejected_rows")] == ["other_rate"]
+
+
+def test_rows_that_a_profile_rejects_are_told_in_the_runs_notes(write):
+    rows = np.arange(400)
+    blanks = np.random.default_rng(1).uniform(size=400) < 0.3
+    log, *_ = plain_log(1e5 * rows, blanks)
+    path = write("log.csv", log)
+    with pytest.raises(InputError, match="holds text or nothing"):
+        import_recording(path, write("p.yaml", PLAIN))
+    (run,) = import_recording(path, write("p.yaml", PLAIN + "reject: {not_numbers: true}\n"))
+    assert len(run) == 400 - blanks.sum()
+    assert f"On import {blanks.sum()} of 400 rows were left out" in run.facts.notes
+    log, *_ = plain_log(1e5 * rows, rows == 7)
+    (run,) = import_recording(write("log.csv", log), write("p.yaml", PLAIN + "reject: {not_numbers: true}\n"))
+    assert run.facts.notes is None
+
+
+def test_a_recording_cut_within_its_last_number_is_refused_or_loses_that_row(write):
+    log, gyro, _ = plain_log(1e5 * np.arange(100))
+    path = write("log.csv", log.rstrip("\n")[:-4])
+    with pytest.raises(InputError, match=r"log.csv, last line: .* middle of a number.*reject: "):
+        import_recording(path, write("p.yaml", PLAIN))
+    (run,) = import_recording(path, write("p.yaml", PLAIN + "reject: {not_numbers: true}\n"))
+    np.testing.assert_array_equal(run.gyro, gyro[:-1])
+    (whole,) = import_recording(write("log.csv", log.rstrip("\n")), write("p.yaml", PLAIN))
+    assert len(whole) == 100
+
+
+def test_a_counter_that_wraps_is_unwrapped_and_one_that_restarts_makes_legs(write):
+    wrapped = (2**32 - 2e7 + 1e5 * np.arange(400)) % 2**32
+    log, gyro, _ = plain_log(wrapped)
+    with pytest.raises(InputError, match="wraps"):
+        import_recording(write("log.csv", log), write("p.yaml", PLAIN))
+    (run,) = import_recording(write("log.csv", log), write("p.yaml", PLAIN), repair=True)
+    np.testing.assert_allclose(run.time, 0.1 * np.arange(400), atol=1e-9)
+    np.testing.assert_array_equal(run.gyro, gyro)
+    log, gyro, _ = plain_log(np.concatenate([1e5 * np.arange(200), 1e5 * np.arange(200)]))
+    legs = import_recording(write("log.csv", log), write("p.yaml", PLAIN), repair=True)
+    assert [run.name for run in legs] == ["log leg 1", "log leg 2"]
+    for number, leg in enumerate(legs):
+        np.testing.assert_allclose(leg.time, 0.1 * np.arange(200), atol=1e-9)
+        np.testing.assert_array_equal(leg.gyro, gyro[200 * number : 200 * (number + 1)])
+
+
+def test_a_profile_of_the_logs_own_name_is_no_side_file(write):
+    log, gyro, _ = plain_log(1e5 * np.arange(100))
+    (run,) = import_recording(write("day.csv", log), write("day.yaml", PLAIN))
+    np.testing.assert_array_equal(run.gyro, gyro)
+    write("day.yaml", "unit: F-7\n")
+    (run,) = import_recording(write("day.csv", log), write("p.yaml", PLAIN))
+    assert run.facts.unit == "F-7"
