@@ -35,6 +35,8 @@ EXP_ERROR = 3e-8
 """Greatest absolute error of the generated exponential, its argument's rounding included."""
 _HELD_BITS = 20
 _SIGNAL_SHIFT = 24
+_LAG_BITS = _HELD_BITS + 2
+# A lag's distance from its signal: up to 2**9 degC times a decay of 30 bits fits.
 
 
 def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
@@ -74,11 +76,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         plan, gyro, "time_us [us]", f"whole steps of 2^-{bits} degC, in the order of the places below"
     )
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
-    rates = any(o.method != "first" or o.unit_s is not None for o in windows.operators)
+    rates = any(o.method not in ("first", "lag") or (not o.lag and o.unit_s) for o in windows.operators)
     return {
         "fixed": fixed,
         "rates": rates,
-        "ratios": rates or bool(plan.centres and plan.edge_columns),
+        "ratios": rates or bool(windows.of_method("lag")) or bool(plan.centres and plan.edge_columns),
         "real": "int64_t",
         "suffix": "",
         "time_type": "int64_t",
@@ -100,6 +102,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "evaluate": _evaluations(plan, windows, scales),
         "exponential_arguments": _exponential_arguments(windows),
         "atom_expressions": [_atom(i, plan, windows, scales) for i in range(len(plan.atoms))],
+        "lag_arguments": {
+            i: f"INT64_C({round(operator.window.length_s * 1e6)}), INT64_C({operator.needed_ticks})"
+            for i, operator in windows.of_method("lag")
+        },
+        "half_widths": [f"INT64_C({round(atom.memory * 2.0**_HELD_BITS)})" for atom in windows.plays],
         "columns": _columns(plan, scales),
     }
 
@@ -114,8 +121,9 @@ def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
 
 
 def _divide_bits(unit_ticks: float, step_bits: int = _HELD_BITS) -> int:
-    """Bits of a quotient with which rates up to 1024 degC per unit stay within 2**36."""
-    return max(0, floor(log2(unit_ticks)) + 26 - step_bits)
+    """Bits of a quotient with which rates up to 1024 degC per unit fit, and their product with the unit."""
+    unit_bits = log2(unit_ticks)
+    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - step_bits)
 
 
 def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:
@@ -145,6 +153,9 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
         found[i] = f"slope_value({arguments}, {step_bits + divide - bits[i]})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
+    for place, (i, operator) in enumerate(windows.of_method("lag")):
+        behind = f"(int64_t)signal[{operator.signal}] * 4 - state->lag[{place}].behind"
+        found[i] = f"scaled({behind}, {_LAG_BITS - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("first")):
         difference = f"(int64_t)signal[{operator.signal}] - state->first[{place}]"
         if operator.unit_s is None:
@@ -168,6 +179,9 @@ def _exponential_arguments(windows: Layout) -> dict[int, str]:
 
 def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     place, bits = windows.of_atom[i], int(scales.atoms[i])
+    if plan.atoms[i].operator == "play":
+        value = f"state->play[{windows.plays.index(plan.atoms[i])}].state"
+        return f"(int32_t)clipped(scaled({value}, {_HELD_BITS - bits}), INT32_MAX)"
     if place < 0:
         value = f"scaled(signal[{windows.signal_of_atom[i]}], {_HELD_BITS - bits})"
         return f"(int32_t)clipped({value}, INT32_MAX)"
@@ -175,7 +189,8 @@ def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     if plan.atoms[i].operator == "sign":
         band = round(DEAD_BAND * (1.0 + 1e-9) * 2.0 ** _operator_bits(windows, plan, scales)[place])
         value = f"direction({value}, INT64_C({band}), INT64_C({2**bits}))"
-    return f"full ? (int32_t)clipped({value}, INT32_MAX) : 0"
+    clipped = f"(int32_t)clipped({value}, INT32_MAX)"
+    return clipped if plan.atoms[i].operator == "lag" else f"full ? {clipped} : 0"
 
 
 def _columns(plan: Plan, scales: Scales) -> list[str]:

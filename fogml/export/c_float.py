@@ -8,13 +8,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
-from fogml.features.signal import Signal
+from fogml.features.signal import Signal, unit_of
+from fogml.runs.columns import is_temperature
 
+OTHER_LIMIT = 1e15
+"""Values of other columns than temperatures up to this size, in their units, are taken."""
 EXP_TERMS = {"float64": 13, "float32": 7}
 EXP_MOST = {"float64": 700.0, "float32": 80.0}
 EXP_ERROR = {"float64": 4e-16, "float32": 2e-7}
@@ -63,7 +66,8 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     def number(value: float) -> str:
         return literal(value, dtype)
 
-    temperature = "[degC], in the order of the places below"
+    plain = all(is_temperature(name) for name in plan.sensors)
+    temperature = "[degC], in the order of the places below" if plain else "in the order and units below"
     gyro = f"[{plan.gyro_unit}]" if plan.form == "joint" else "output as rate [deg/h]"
     return {
         "fixed": None,
@@ -91,7 +95,12 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
             for i, operator in enumerate(windows.operators)
         },
-        "atom_expressions": [_atom(i, plan, windows, "0.0" + suffix) for i in range(len(plan.atoms))],
+        "atom_expressions": [_atom(i, plan, windows, "0.0" + suffix, number) for i in range(len(plan.atoms))],
+        "lag_arguments": {
+            i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
+            for i, operator in windows.of_method("lag")
+        },
+        "half_widths": [number(atom.memory) for atom in windows.plays],
         "columns": column_expressions(plan),
     }
 
@@ -106,16 +115,21 @@ def column_expressions(plan: Plan) -> list[str]:
     ]
 
 
-def _atom(i: int, plan: Plan, windows: Layout, zero: str) -> str:
-    operator = windows.of_atom[i]
+def _atom(i: int, plan: Plan, windows: Layout, zero: str, number: Any) -> str:
+    atom, operator = plan.atoms[i], windows.of_atom[i]
+    signal = f"signal[{windows.signal_of_atom[i]}]"
+    if atom.operator == "play":
+        return f"state->play[{windows.plays.index(atom)}].state"
+    if atom.operator == "since_on":
+        return f"exp_of_minus({signal} > {zero} ? {signal} / {number(atom.memory)} : {zero})"
     if operator < 0:
-        return f"signal[{windows.signal_of_atom[i]}]"
-    value = f"direction(value[{operator}])" if plan.atoms[i].operator == "sign" else f"value[{operator}]"
-    return f"full ? {value} : {zero}"
+        return signal
+    value = f"direction(value[{operator}])" if atom.operator == "sign" else f"value[{operator}]"
+    return value if atom.operator == "lag" else f"full ? {value} : {zero}"
 
 
 def _signal(signal: Signal, plan: Plan, number: Any) -> str:
-    """A combination of temperatures, worked out in the library's order."""
+    """A combination of columns, worked out in the library's order."""
     pieces = []
     for index, (name, coefficient) in enumerate(signal.parts):
         place = f"temperatures[{sensor_identifier(name)}]"
@@ -127,17 +141,25 @@ def _signal(signal: Signal, plan: Plan, number: Any) -> str:
 
 
 def sensor_identifier(name: str) -> str:
-    """The identifier of a temperature's place in the array of temperatures.
+    """The identifier of a column's place in the array of temperatures; that of no temperature says INPUT.
 
     Raises
     ------
-    ValueError
-        If the name is not a word of ASCII; those that features can name all are.
+    InputError
+        If the name is not a word of ASCII.
     """
-    identifier = f"FOGML_{name.upper()}"
+    identifier = f"FOGML_{name.upper()}" if is_temperature(name) else f"FOGML_INPUT_{name.upper()}"
     if not (identifier.isascii() and identifier.isidentifier()):
-        raise ValueError(f"temperature {name!r} makes no identifier of C")
+        raise InputError(
+            f"export: the model takes column {quoted(name)}, which makes no identifier of C; name it in "
+            "plain letters and train again"
+        )
     return identifier
+
+
+def input_units(plan: Plan) -> dict[str, str]:
+    """Unit of each column that the code takes, for comments."""
+    return {name: unit_of(name) or "own unit" for name in plan.sensors}
 
 
 def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
@@ -154,6 +176,8 @@ def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
     for place, (i, operator) in enumerate(windows.of_method("exp")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"
+    for place, (i, operator) in enumerate(windows.of_method("lag")):
+        found[i] = f"signal[{operator.signal}] - state->lag[{place}].behind"
     for place, (i, operator) in enumerate(windows.of_method("first")):
         difference = f"(signal[{operator.signal}] - state->first[{place}])"
         rate = "" if operator.unit_s is None else f" * {number(operator.unit_s)} / interval"
@@ -172,6 +196,9 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
             f"#define COLUMNS {len(plan.steps)} /* features */",
             f"#define TEMPERATURE_LIMIT {number(2.0**RANGE_BITS)} /* [degC], either way */",
         ]
+        if not all(is_temperature(name) for name in plan.sensors):
+            most = [2.0**RANGE_BITS if is_temperature(name) else OTHER_LIMIT for name in plan.sensors]
+            lines += array("INPUT_LIMIT", most, dtype, "[FOGML_TEMPERATURES]", real, "either way")
     if windows.operators:
         lines += [
             f"#define TIME_LIMIT {number(1e15)} /* [s] */",

@@ -14,10 +14,11 @@ from fogml import __version__
 from fogml.errors import InputError
 from fogml.escaping import c_text
 from fogml.export.c_fixed import fixed_context
-from fogml.export.c_float import float_context, sensor_identifier
+from fogml.export.c_float import float_context, input_units, sensor_identifier
 from fogml.export.layout import Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
+from fogml.runs.columns import is_temperature
 
 C_DTYPES = ("float64", "float32", "q31", "q15")
 """Number formats that C code computes in."""
@@ -88,7 +89,12 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
             f"{dtype} weights are for --to onnx, json and mat"
         )
     if len(plan.sensors) > _MOST_INPUTS:
-        raise InputError(f"export: {len(plan.sensors)} temperatures, C code takes at most {_MOST_INPUTS}")
+        raise InputError(f"export: {len(plan.sensors)} inputs, C code takes at most {_MOST_INPUTS}")
+    places = [sensor_identifier(name) for name in plan.sensors]
+    if len(set(places)) < len(places):
+        raise InputError(
+            "export: two columns of the model differ in upper and lower case alone, which places in C do not"
+        )
     number: Number = "fixed" if dtype in ("q15", "q31") else dtype  # type: ignore[assignment]
     windows = layout(plan, number)
     numbers = (
@@ -123,6 +129,11 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "layout": windows,
         "sensors": plan.sensors,
         "identifier": sensor_identifier,
+        "input_units": input_units(plan),
+        "others": not all(is_temperature(name) for name in plan.sensors),
+        "decays": any(atom.operator == "since_on" for atom in plan.atoms),
+        "plays": windows.plays,
+        "lags": windows.of_method("lag"),
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),

@@ -1,4 +1,4 @@
-"""How C code keeps the feature windows: clock ticks, rings of held samples, running integer sums.
+"""How C code keeps feature windows and memories: clock ticks, rings of held samples, running integer sums.
 
 Times are kept in ticks and temperatures as whole multiples of a small step, so that running sums
 are exact however long the firmware runs, cost the same at every sample, and come out alike on
@@ -8,13 +8,14 @@ every machine. The rules of gaps and fullness are those of `fogml.signals.window
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window
 from fogml.features.signal import Signal
+from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
@@ -40,7 +41,7 @@ _HEADROOM = 8
 
 @dataclass(frozen=True)
 class Operator:
-    """One running difference or rate.
+    """One running difference, rate or lag.
 
     Attributes
     ----------
@@ -58,6 +59,8 @@ class Operator:
         Age at which a sample leaves the newest window, both windows; time until full.
     tick_step, x_step
         Of a slope: ticks and temperature steps are divided by these, so that sums fit 63 bits.
+    lag
+        Whether it is a first-order lag, with the window's length as its time constant.
     """
 
     window: Window
@@ -71,16 +74,17 @@ class Operator:
     needed_ticks: int
     tick_step: int = 1
     x_step: int = 1
+    lag: bool = False
 
     @property
     def method(self) -> str:
-        """``block``, ``slope``, ``exp`` or ``first``."""
-        return self.window.method
+        """``block``, ``slope``, ``exp``, ``first`` or ``lag``."""
+        return "lag" if self.lag else self.window.method
 
 
 @dataclass(frozen=True)
 class Layout:
-    """The windows of a plan.
+    """The windows and memories of a plan.
 
     Attributes
     ----------
@@ -101,7 +105,9 @@ class Layout:
     ring
         Samples that each ring holds.
     longest_gap_s, longest_gap_ticks
-        An interval longer than this restarts everything.
+        An interval longer than this restarts everything but plays, which know no time.
+    plays
+        The distinct play operators.
     """
 
     tick_s: float
@@ -114,6 +120,7 @@ class Layout:
     ring: int
     longest_gap_s: float
     longest_gap_ticks: int
+    plays: tuple[Atom, ...] = ()
 
     def of_method(self, method: str) -> list[tuple[int, Operator]]:
         """Operators of a method with their places."""
@@ -121,35 +128,39 @@ class Layout:
 
 
 def layout(plan: Plan, number: Number) -> Layout:
-    """The windows of a plan for C code.
+    """The windows and memories of a plan for C code.
 
     Raises
     ------
     InputError
-        If a window is shorter than the sample interval, or too long for C.
+        If a window is shorter than the sample interval, or too long for C, or C code in this number format
+        does not hold what a window or a memory is of.
     """
+    for atom in plan.atoms:
+        _check_held(atom, number)
     signals = tuple(dict.fromkeys(atom.signal for atom in plan.atoms))
     keys = tuple(dict.fromkeys(key for atom in plan.atoms if (key := _key(atom)) is not None))
-    for _, window, _ in keys:
-        _check(window, plan.sample_s)
-    held = tuple(dict.fromkeys(signals.index(s) for s, w, _ in keys if w.method in ("block", "slope")))
-    ring = max((_samples(window, plan.sample_s) for _, window, _ in keys), default=0)
+    for _, window, _, lag in keys:
+        _check(window, plan.sample_s, lag)
+    held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in ("block", "slope")))
+    ring = max((_samples(window, plan.sample_s) for _, window, _, _ in keys), default=0)
     if ring:
         ring += ring // _HEADROOM + 4
     most = _LONGEST_FIXED_RING if number == "fixed" else _LONGEST_RING
     if ring > most:
-        longest = max((window for _, window, _ in keys), key=lambda window: window.span_s)
+        longest = max((w for _, w, _, _ in keys if _samples(w, plan.sample_s)), key=lambda w: w.span_s)
         raise InputError(
             f"export: a window of {longest.length_s:g} s at a sample every {plan.sample_s:g} s holds "
             f"{ring} samples, C code in {number} at most {most}; train with shorter windows or "
             "[exp, ...], or run the model at a longer --sample-s"
         )
-    gaps = [_gap_s(window, plan.sample_s) for _, window, _ in keys]
-    tick_s = _tick_s(plan.sample_s, max([w.span_s for _, w, _ in keys] + gaps, default=0.0), number)
+    gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
+    tick_s = _tick_s(plan.sample_s, max([w.span_s for _, w, _, _ in keys] + gaps, default=0.0), number)
     operators = []
-    for (signal, window, unit_s), gap_s in zip(keys, gaps):
+    for (signal, window, unit_s, lag), gap_s in zip(keys, gaps):
         place = signals.index(signal)
-        operators.append(_operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s, number))
+        operator = _operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s, number)
+        operators.append(replace(operator, lag=lag))
     of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
     longest_gap = max(gaps, default=0.0)
     return Layout(
@@ -163,18 +174,39 @@ def layout(plan: Plan, number: Number) -> Layout:
         ring,
         longest_gap,
         round(longest_gap / tick_s),
+        tuple(dict.fromkeys(atom for atom in plan.atoms if atom.operator == "play")),
     )
 
 
-def _key(atom: Atom) -> tuple[Signal, Window, float | None] | None:
+def _check_held(atom: Atom, number: Number) -> None:
+    """Refuse what C code can't hold in a number format: columns whose range it can't know."""
+    if all(is_temperature(name) for name in atom.signal.sensors):
+        return
+    if number == "fixed":
+        raise InputError(
+            f"export: the model takes {atom.text}; C code in fixed point takes temperatures alone, whose "
+            "range it knows; use --dtype float32 or float64"
+        )
+    if atom.window is not None and atom.window.method in ("block", "slope"):
+        raise InputError(
+            f"export: the model takes {atom.text}; C code holds windows of temperatures alone, whose range "
+            f"it knows; train with {atom.text.partition('[')[0]}[exp, {atom.window.length_s:g} s]"
+        )
+
+
+def _key(atom: Atom) -> tuple[Signal, Window, float | None, bool] | None:
     """What tells running operators apart: a rate and its direction share one."""
+    if atom.operator == "lag":
+        return atom.signal, Window("exp", atom.memory), None, True
     if atom.window is None:
         return None
-    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S
+    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S, False
 
 
-def _check(window: Window, sample_s: float) -> None:
-    if window.method == "block":
+def _check(window: Window, sample_s: float, lag: bool) -> None:
+    if lag:
+        check_window(window.length_s, sample_s, 1, "a lag's time constant")
+    elif window.method == "block":
         check_window(window.length_s, sample_s, 1, "a block window")
     elif window.method == "slope":
         check_window(window.length_s, sample_s, 2, "a slope's window")

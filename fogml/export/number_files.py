@@ -129,6 +129,7 @@ def _document(plan: Plan) -> dict[str, Any]:
             "window": None
             if atom.window is None
             else {"method": atom.window.method, "length_s": atom.window.length_s},
+            "memory": atom.memory or None,
             "unit": atom.unit,
             "low": limits.low[i],
             "high": limits.high[i],

@@ -12,7 +12,8 @@ from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
-from fogml.features.atoms import DEAD_BAND, Atom, evaluate
+from fogml.features.atoms import DEAD_BAND, MEMORIES, Atom, evaluate
+from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -90,8 +91,14 @@ def window_weights(plan: Plan) -> FloatArray:
     Raises
     ------
     InputError
-        If the windows look back too far.
+        If the windows look back too far, or something remembers more than any window holds.
     """
+    for atom in plan.atoms:
+        if atom.operator in MEMORIES or not all(is_temperature(name) for name in atom.signal.sensors):
+            raise InputError(
+                f"export: the model takes {atom.text}; a graph from a window holds windows of "
+                "temperatures alone; leave out --with-pipeline, or export --to c"
+            )
     rates = tuple(
         Atom("d", atom.signal, atom.window) if atom.operator == "sign" else atom for atom in plan.atoms
     )

@@ -7,12 +7,15 @@ from fogml.export.plan import Plan
 WINDOW_OPERATIONS = {"block": 24, "slope": 32, "exp": 6, "first": 4}
 """Additions, multiplications and divisions of a full window's step, one sample leaving it."""
 EXPONENTIAL_OPERATIONS = 20
+MEMORY_OPERATIONS = {"lag": 6, "play": 8, "since_on": EXPONENTIAL_OPERATIONS + 1}
+"""The same of a memory's step, at a steady sample interval."""
 
 
 def operations_per_sample(plan: Plan) -> int:
     """Additions, multiplications and divisions at a sample inside the trained box, windows full."""
     windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in plan.atoms if atom.window}
     count = sum(WINDOW_OPERATIONS[window.method] for _, window, _ in windows if window is not None)
+    count += sum(MEMORY_OPERATIONS[a.operator] for a in plan.atoms if a.operator in MEMORY_OPERATIONS)
     count += sum(2 * len(atom.signal.parts) - 1 for atom in plan.atoms)
     count += 4 * len(plan.atoms)
     count += sum(len(step.atoms) - (step.column is None) for step in plan.steps)

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.features.atoms import MEMORIES, Atom, AtomValues
+from fogml.features.atoms import Atom, AtomValues
 from fogml.features.box import OVERSHOOT, TOLERANCE, Box
 from fogml.features.features import Features
 from fogml.features.reach import reaching_box
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
-from fogml.runs.columns import is_temperature
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -88,7 +87,7 @@ class Plan:
         ``constant``; ``linear``: constant + linear . f; ``network``: that and Gaussians;
         ``joint``: rate = (scale0 + scale1 T + scale2 T^2) D + constant + linear . f.
     sensors
-        Temperatures needed, by their names in formulas.
+        Temperatures and other columns needed, by their names in formulas.
     atoms, steps, names
         The features' atoms, how columns are made of them, and the columns' names.
     limits
@@ -146,7 +145,6 @@ class Plan:
         if features is None:
             arrays = {"constant": np.array([float(getattr(model, "bias_", 0.0))])}
             return cls(model.kind, "constant", (), (), (), (), Limits.none(), arrays, interval)
-        _check_exportable(model.kind, features)
         shared: dict[str, Any] = {
             "kind": model.kind,
             "sensors": features.sensors,
@@ -234,17 +232,6 @@ class Plan:
         drawn = columns.copy()
         drawn[:, where] = rates * share[:, None]
         return drawn
-
-
-def _check_exportable(kind: str, features: Features) -> None:
-    """Refuse features that no export computes, naming the first."""
-    for atom in features.atoms:
-        if atom.operator in MEMORIES or not all(is_temperature(name) for name in atom.signal.sensors):
-            raise InputError(
-                f"export: the model '{kind}' takes {atom.text}; what is exported computes values, "
-                "differences and rates of temperatures; train with features of these, "
-                'e.g. --features "T^1..3, dT, T*dT"'
-            )
 
 
 def chosen_model(model: DriftModel) -> DriftModel:

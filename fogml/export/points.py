@@ -12,8 +12,11 @@ from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
+from fogml.features.signal import TIME_ON
+from fogml.runs.columns import is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
+from fogml.signals.clock import EXPONENTIAL_SPAN
 
 FloatArray = NDArray[np.float64]
 POINTS = 4096
@@ -37,7 +40,7 @@ def box_points(plan: Plan, seed: int, beyond: float = 0.0, count: int = POINTS) 
 
 @dataclass(frozen=True)
 class History:
-    """Temperatures and output over time, with gaps, and the atoms that they make.
+    """Temperatures, other columns and output over time, with gaps, and the atoms that they make.
 
     Attributes
     ----------
@@ -73,7 +76,9 @@ class History:
 def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths."""
     rng = np.random.default_rng([seed, 2])
-    longest = max((atom.window.span_s for atom in plan.atoms if atom.window), default=0.0)
+    spans = [atom.window.span_s for atom in plan.atoms if atom.window]
+    spans += [EXPONENTIAL_SPAN * atom.memory for atom in plan.atoms if atom.operator == "lag"]
+    longest = max(spans, default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
     count = max(count, least)
     step = plan.sample_s
@@ -83,7 +88,10 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     for i, (low, high, fastest) in enumerate(ranges):
         span = high - low
         speed = fastest / 60.0
-        if i == 0:
+        if plan.sensors[i] == TIME_ON:
+            paths[:, i] = np.linspace(low, high + 0.1 * span, count)
+            continue
+        if i == 0 or not is_temperature(plan.sensors[i]):
             paths[:, i] = _walk(rng, count, step, low - 0.1 * span, high + 0.1 * span, speed)
             continue
         # Sensors of one gyro move together; how far apart is told by their difference, or by their ranges.

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.export.layout import Layout
 from fogml.export.plan import Plan
+from fogml.runs.columns import is_temperature
 
 _CHECKS = 8
 _PERIOD = 12
@@ -93,7 +94,7 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
     for i, sensor in enumerate(plan.sensors):
         low, high, fastest = sensor_range(plan, sensor)
         first[i] = low + 0.3 * (high - low)
-        rise[i] = min(0.4 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
+        rise[i] = min(0.65 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
         jump[i] = 0.9 * (high - low) + 3.0
     checks = (0, *np.unique(np.linspace(full_at, full_at + _PERIOD, _CHECKS - 2).astype(int)).tolist())
     gyro = 1000.0 / abs(plan.arrays["scale"][0]) if plan.form == "joint" else 7.5
@@ -125,16 +126,25 @@ def _interval(plan: Plan, windows: Layout) -> tuple[float, int]:
 
 
 def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
-    """Lowest and highest value of a sensor [degC] in the trained box, and its fastest rate [degC/min]."""
+    """Lowest and highest value of a column in the trained box, and its fastest rate [per min].
+
+    That of its value itself, else of what is remembered of it; a rate that crosses all of it in a quarter of
+    an hour where the box tells none.
+    """
     low, high, fastest = 10.0, 40.0, np.inf
-    for i, atom in enumerate(plan.atoms):
+    remembered = sorted(range(len(plan.atoms)), key=lambda i: plan.atoms[i].operator == "value")
+    for i in remembered:
+        atom = plan.atoms[i]
         ends = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
         weights = dict(atom.signal.parts)
         total = abs(sum(weights.values()))
-        if atom.operator == "value" and atom.signal.is_sensor and sensor in weights:
+        if atom.operator == "since_on" and sensor in weights:
+            high, low = (-atom.memory * np.log(np.clip(end, 1e-3, 1.0)) for end in ends)
+        elif atom.operator in ("value", "lag", "play") and atom.signal.is_sensor and sensor in weights:
             low, high = ends
         elif atom.window and atom.operator in ("d", "diff") and sensor in weights and total > 1e-9:
             seconds = atom.window.length_s or plan.sample_s
             per_minute = 60.0 / seconds if atom.operator == "diff" else 1.0
             fastest = min(fastest, max(abs(end) for end in ends) * per_minute / total)
-    return low, high, fastest if np.isfinite(fastest) else _USUAL_RATE
+    usual = _USUAL_RATE if is_temperature(sensor) else (high - low) / 15.0
+    return low, high, fastest if np.isfinite(fastest) else usual

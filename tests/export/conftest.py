@@ -20,7 +20,11 @@ RICH = (
     "sign(dT_in[block, 32 s]), T_in^2*dT_out[slope, 60 s], 0.5*T_in+0.5*T_out, diff(T_out)[exp, 50 s], "
     "diff(T_in-T_out), dT_in[first]"
 )
-NAMES = ("none", "mean", "polynomial", "M2", "rich", "rbf", "rbf-patent", "joint", "joint-patent")
+MEMORY = (
+    "T_in, play(T_in, 6 degC), lag(T_in-T_out, 300 s), lag(T_out, 900 s), T_in*play(T_out, 15 degC), "
+    "dT_in[exp, 40 s]"
+)
+NAMES = ("none", "mean", "polynomial", "M2", "rich", "memory", "rbf", "rbf-patent", "joint", "joint-patent")
 
 
 @cache
@@ -50,8 +54,9 @@ def turning_run() -> Run:
 @cache
 def fitted(name: str) -> DriftModel:
     """A fitted model by a short name."""
-    if name == "rich":
-        return make_model("polynomial", features=RICH).fit(training_run())
+    if name in ("rich", "memory"):
+        features = RICH if name == "rich" else MEMORY
+        return make_model("polynomial", features=features).fit(training_run())
     if name == "rbf":
         regressor = RBFRegressor(centres=12, tune=False, average_rows=500)
         return FeatureModel("T, dT, T*dT", regressor, kind="rbf").fit(training_run())

@@ -21,6 +21,7 @@ from fogml.export.plan import Plan
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 from tests.export.conftest import NAMES, training_run
+from tests.models.test_memory_features import made_run
 
 needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 pytestmark = needs_cc
@@ -74,6 +75,36 @@ def test_equals_compensate_sample_by_sample(model_of, tmp_path, name, dtype):
         assert set(flag.tolist()) == {0, 1, 2}
 
 
+@pytest.mark.parametrize("dtype", ["float64", "float32"])
+def test_other_columns_and_time_since_power_on_are_inputs(tmp_path, dtype):
+    text = "T, lag(light, 600 s), play(light, 5), T*light, since_on(900 s), d(light)[exp, 100 s]"
+    model = make_model("polynomial", features=text).fit(made_run(1, 1.0))
+    source = c_source(Plan.of(model), dtype, [])
+    run = made_run(3, 2.0)
+    inputs = {"T": run.columns["T"], "light": run.columns["light"], "time_on": run.time}
+    assert "#define FOGML_INPUT_LIGHT" in source.files["fogml_model.h"]
+    places = np.column_stack([inputs[name] for name in source.plan.sensors])
+    out, flag = CProgram(source, tmp_path).steps(run.time, places, run.gyro)
+    expected = model.compensate(run)
+    np.testing.assert_allclose(out, expected.compensated, atol=1e-9 if dtype == "float64" else 1e-4)
+    np.testing.assert_array_equal(flag, expected.flag)
+    assert flag[0] == 2 and 0 in flag
+
+
+@pytest.mark.parametrize(
+    ("text", "dtype", "told"),
+    [
+        ("T, since_on(900 s)", "q31", "takes since_on.*float32"),
+        ("T, light", "q15", "takes light;.*float32"),
+        ("T, d(light)", "float64", r"train with d\(light\)\[exp, 64 s\]"),
+    ],
+)
+def test_what_c_does_not_hold_is_said_with_what_it_does(text, dtype, told):
+    model = make_model("polynomial", features=text).fit(made_run(1, 1.0))
+    with pytest.raises(InputError, match=told):
+        c_source(Plan.of(model), dtype, [])
+
+
 def test_true_times_are_heeded(model_of, tmp_path):
     model = model_of("rich")
     source = c_source(Plan.of(model), "float64", [])
@@ -85,7 +116,7 @@ def test_true_times_are_heeded(model_of, tmp_path):
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
-@pytest.mark.parametrize("name", ["mean", "rich", "rbf", "joint"])
+@pytest.mark.parametrize("name", ["mean", "rich", "memory", "rbf", "joint"])
 def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name, dtype):
     source = c_source(Plan.of(model_of(name)), dtype, ["a card with a */ in it".replace("*/", "* /")])
     source = source.with_expected(*expected_outputs(source, tmp_path))
@@ -136,6 +167,17 @@ def test_a_clock_that_steps_back_starts_the_windows_anew(model_of, tmp_path):
     np.testing.assert_array_equal(flag[:100], flag[100:])
     assert flag[0] == 2
     assert flag[99] == 0
+
+
+def test_a_lag_of_hours_holds_in_fixed_point(tmp_path):
+    # Ten samples a second of a sensor that steps by a sixteenth of a degree: 2250 degC in a time constant.
+    model = make_model("polynomial", features="T_in, lag(T_in, 3600 s)").fit(training_run())
+    source = c_source(Plan.of(model, 0.1), "q31", [])
+    time = 0.1 * np.arange(40_000)
+    T = np.round(16.0 * (20.0 + 30.0 * np.sin(time / 900.0))) / 16.0
+    run = Run("fine", {"time": time, "gyro": np.zeros(len(time)), "T_in": T, "T_out": T})
+    out, _ = outputs(CProgram(source, tmp_path), source, run)
+    assert np.abs(out - model.compensate(run).compensated).max() < 3e-3
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
@@ -66,13 +65,6 @@ def test_samples_are_flagged_until_the_memories_have_settled() -> None:
     moved = np.abs(test.columns["T"] - test.columns["T"][0]) >= 12.0
     settled = (test.time >= 3600.0 - 10.1) & (np.maximum.accumulate(moved))
     np.testing.assert_array_equal(flag == 2, ~settled)
-
-
-@pytest.mark.parametrize("features", ["T, lag(T, 600 s)", "T, light", "T, since_on(400 s)"])
-def test_what_no_export_computes_is_refused(features: str) -> None:
-    model = make_model("polynomial", features=features).fit(made_run(1, 1.0))
-    with pytest.raises(InputError, match="export: the model 'polynomial' takes"):
-        Plan.of(model)
 
 
 def test_a_test_run_that_lacks_a_column_is_refused_with_the_place() -> None:
