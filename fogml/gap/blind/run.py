@@ -6,6 +6,7 @@ import queue
 import shutil
 import threading
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed, wait
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -109,8 +110,13 @@ class _Shared:
     failed: int = 0
     workers: list[Worker] = field(default_factory=list)
     stop: threading.Event = field(default_factory=threading.Event)
-    error: BaseException | None = None
     lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def begun(self, worker: Worker) -> None:
+        """Note a worker whose process runs; one that begins after the stop is ended at once."""
+        self.workers.append(worker)
+        if self.stop.is_set():
+            worker.kill()
 
 
 def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
@@ -131,25 +137,19 @@ def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int
     for name in left:
         waiting.put(name)
     shared = _Shared(plan, code_state(plan.method, plan.code), waiting, progress)
-    keepers = [
-        threading.Thread(target=_keep, args=(shared,), daemon=True)
-        for _ in range(min(plan.workers, len(left)))
-    ]
-    for keeper in keepers:
-        keeper.start()
-    try:
-        for keeper in keepers:
-            keeper.join()
-    except KeyboardInterrupt:
-        shared.stop.set()
-        # Their keepers then leave what they are at, unwritten.
-        for worker in list(shared.workers):
-            worker.kill()
-        for keeper in keepers:
-            keeper.join()
-        raise
-    if shared.error is not None:
-        raise shared.error
+    with ThreadPoolExecutor(max_workers=plan.workers) as pool:
+        keepers = [pool.submit(_keep, shared) for _ in range(min(plan.workers, len(left)))]
+        try:
+            for keeper in as_completed(keepers):
+                keeper.result()
+        except BaseException:
+            shared.stop.set()
+            # Their keepers then leave what they are at, unwritten.
+            for worker in list(shared.workers):
+                worker.kill()
+            # Of futures, not of threads: a join that a signal interrupts takes its thread for ended.
+            wait(keepers)
+            raise
     return len(left), shared.failed
 
 
@@ -216,13 +216,10 @@ def _keep(shared: _Shared) -> None:
             except queue.Empty:
                 return
             if worker is None:
-                worker = Worker(plan.method, plan.code, plan.threads, shared.workers.append)
+                worker = Worker(plan.method, plan.code, plan.threads, shared.begun)
             if not _one(shared, worker, name):
                 worker.end()
                 worker = None
-    except BaseException as error:
-        shared.error = error
-        shared.stop.set()
     finally:
         if worker is not None:
             worker.end()
