@@ -1,8 +1,7 @@
 """Noise terms of greatest likelihood for a spectrum, behind an output filter.
 
-Whittle's likelihood: each row of a spectrum is chi-square about the model's density. The constants of the
-columns are integrated out of the lowest rows (restricted likelihood), so that a ramp or a drift costs slow
-noise nothing but its own degrees of freedom.
+Whittle's likelihood: rows of a spectrum are chi-square about the model's density. Constants of the columns
+are integrated out of the lowest rows (restricted likelihood): they cost only their degrees of freedom.
 """
 
 from __future__ import annotations
@@ -108,6 +107,8 @@ class SpectrumModel:
         self.used = np.ones(rows, dtype=np.bool_) if used is None else used
         self._single = len(spectrum.values)
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
+        # A filter that lets nothing of the whole spectrum pass is told from no other.
+        self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
         shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, terms)
         self._before = [i for i, name in enumerate(terms.names) if name not in AFTER]
         after = [i for i, name in enumerate(terms.names) if name in AFTER]
@@ -164,7 +165,7 @@ class SpectrumModel:
         from scipy.optimize import nnls
 
         freedom = self.freedom / (1.0 + 0.5 * self.freedom * excess)
-        corner = start.log_corner if start is not None else log_corner
+        corner = max(start.log_corner if start is not None else log_corner, self._lowest_corner)
         design, slopes = self.design(corner)
         terms = design.shape[1]
         free = [j for j in range(terms) if held is None or j != held[0]]
@@ -193,12 +194,10 @@ class SpectrumModel:
             found = nnls(triangle[:, :-1], triangle[:, -1])[0] / norms
             proposed = coefficients.copy()
             proposed[free] = found[: len(free)]
-            moved = 0.0
-            if slopes is not None:
-                moved = float(np.clip(found[-2] - found[-1], -1.0, 1.0))
+            moved = 0.0 if slopes is None else float(np.clip(found[-2] - found[-1], -1.0, 1.0))
             step, better = 1.0, False
             while step > 1e-3:
-                new_corner = corner + step * moved
+                new_corner = max(corner + step * moved, self._lowest_corner)
                 new_design, new_slopes = self.design(new_corner) if slopes is not None else (design, None)
                 mixed = proposed if not np.isfinite(loss) else coefficients + step * (proposed - coefficients)
                 new_density = new_design @ mixed

@@ -211,6 +211,17 @@ def test_no_noise_at_all_and_few_points():
     assert all(np.isfinite(term.upper) for term in few.terms.values())
 
 
+def test_what_a_filter_may_hide_is_bounded_by_what_is_there():
+    """A series as smooth as a filter's output has no more white noise than the slowest filter allows."""
+    rng = np.random.default_rng(4)
+    values = np.cumsum(lfilter(*butter(2, 0.02), rng.normal(size=400)))
+    terms = noise_terms_of(values, 4.0).terms
+    # Behind a corner at the lowest frequency, half of a line's width 1/(2nT), the density 2 N^2 is all there.
+    largest = np.sqrt(np.mean((values - values.mean()) ** 2) * len(values) * 4.0) / 60.0
+    assert terms["N"].upper < 10.0 * largest
+    assert all(np.isfinite(term.upper) and term.upper < 1e4 * largest for term in terms.values())
+
+
 def test_windows_must_overlap():
     series = np.arange(100.0) % 7
     with pytest.raises(InputError, match="overlapping"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -52,6 +53,7 @@ def packages() -> list[str]:
     return sorted(p.name for p in ROOT.iterdir() if p.is_dir() and any(p.glob("*.py")))
 
 
+@cache
 def edges() -> dict[str, set[str]]:
     return {
         package: set().union(*(imported_packages(f) for f in (ROOT / package).rglob("*.py"))) - {package}
