@@ -44,6 +44,18 @@ def make(
         float | None,
         typer.Option("--least-d-prime", metavar="D", help="Only strata of d' that begin there or above."),
     ] = None,
+    d_prime: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--d-prime", metavar="LOW-HIGH", help="Draw d' within these bounds instead; may be repeated."
+        ),
+    ] = None,
+    reality: Annotated[
+        str | None,
+        typer.Option(
+            "--reality", metavar="NAME", help="first (default), another one, or mix for all of them in turn."
+        ),
+    ] = None,
     leave_one_out: Annotated[
         bool | None,
         typer.Option("--leave-one-out", help="Only cases with an effect left out, each effect in turn."),
@@ -74,6 +86,8 @@ def make(
         "sample": sample,
         "kinds": kinds,
         "least_d_prime": least_d_prime,
+        "d_prime": d_prime,
+        "reality": reality,
         "leave_one_out": leave_one_out,
         "relatives_stay": relatives_stay,
         "workers": workers,

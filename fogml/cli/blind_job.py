@@ -51,9 +51,23 @@ class MakeSettings(SuiteSettings):
     sample: float = 10.0
     kinds: list[str] = []
     least_d_prime: float = 0.0
+    d_prime: list[str] = []
+    reality: str = "first"
     leave_one_out: bool = False
     relatives_stay: bool = False
     workers: int = 2
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Bounds of d' as numbers."""
+        found = []
+        for text in self.d_prime:
+            low, _, high = text.partition("-")
+            try:
+                found.append((float(low), float(high)))
+            except ValueError:
+                raise InputError(f"d' '{text}': write LOW-HIGH, e.g. 20-60") from None
+        return tuple(found)
 
 
 class RunSettings(SuiteSettings):
@@ -140,6 +154,8 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             progress=lambda done, total: work.reached(done, total, f"made {done} of {total}"),
             first=settings.first,
             least_d_prime=settings.least_d_prime,
+            of=settings.reality,
+            d_prime=settings.bounds,
         )
     if not settings.relatives_stay:
         from fogml.gap.blind.without import leave_out_relatives

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
 
+from fogml.gap.blind.frame.form import Form, compatible
+from fogml.gap.blind.frame.reality import Reality
+from fogml.gap.blind.frame.reckoning import AVERAGING_S, Reckoning, recorded_output
+from fogml.gap.blind.frame.record import FloatArray, World
+from fogml.gap.blind.frame.strength import Acting, Scales, TooWeak, recorded
+from fogml.gap.blind.frame.unit import Unit, UnitRun
 from fogml.gap.blind.plan import Plan, Strata
-from fogml.gap.blind.reality.catalogue import INVENTED, KNOWN, WRONG_STRUCTURE
-from fogml.gap.blind.reality.form import Form
-from fogml.gap.blind.reality.noise import UNITS as NOISE_UNITS
-from fogml.gap.blind.reality.reckoning import AVERAGING_S, Reckoning, recorded_output
-from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, recorded
-from fogml.gap.blind.reality.unit import Unit, UnitRun, compatible, draw_unit
+from fogml.gap.blind.realities import reality
 from fogml.gap.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, write_truth
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, Heading
@@ -60,12 +61,12 @@ def make_case(folder: Path, truth_folder: Path, plan: Plan, seed: int, sample_s:
 
 def draw_case(plan: Plan, seed: int, sample_s: float) -> tuple[Unit, tuple[Acting, ...]]:
     """The unit and the effects of a case; units are drawn until one shows its effects as wanted."""
-    attempt = 0
+    world, attempt = reality(plan.reality), 0
     while True:
         rng = np.random.default_rng([seed, plan.number, attempt])
-        forms = _draw_forms(rng, plan)
+        forms = _draw_forms(rng, plan, world)
         runs = max(plan.runs, 2) if any(f.several_runs for f in forms) else plan.runs
-        unit = draw_unit(rng, forms, runs, plan.static, sample_s)
+        unit = world.draw_unit(rng, forms, runs, plan.static, sample_s)
         scales = Scales(unit)
         try:
             return unit, tuple(_set_strength(rng, scales, form, plan.strata) for form in forms)
@@ -75,14 +76,13 @@ def draw_case(plan: Plan, seed: int, sample_s: float) -> tuple[Unit, tuple[Actin
                 raise RuntimeError(f"case {plan.name}: no unit shows {error} as wanted") from None
 
 
-def _draw_forms(rng: np.random.Generator, plan: Plan) -> list[type[Form]]:
-    everything = (*KNOWN, *INVENTED, WRONG_STRUCTURE)
+def _draw_forms(rng: np.random.Generator, plan: Plan, world: Reality) -> list[type[Form]]:
     forms: list[type[Form]] = []
     if plan.first is not None:
-        own = [form for form in everything if form.name == plan.first]
+        own = world.forms_of(plan.first)
         forms.append(own[int(rng.integers(len(own)))])
     while len(forms) < plan.known + (plan.first is not None):
-        more = KNOWN[int(rng.integers(len(KNOWN)))]
+        more = world.known[int(rng.integers(len(world.known)))]
         if more.name not in plan.left_out and compatible([*forms, more]):
             forms.append(more)
     return forms
@@ -107,12 +107,7 @@ def recorded_run(unit: Unit, run: UnitRun, effects: tuple[Acting, ...], plan: Pl
     }
     if unit.turning:
         columns["rate"] = np.round(world.table_rate, 9)
-    names = [name for name in unit.instruments.others if name in world.drives]
-    if any(steps for steps in (r.world.programme.power_steps for r in unit.runs)):
-        names.append("power")
-    if any(r.world.programme.fan_stops for r in unit.runs):
-        names.append("fan")
-    for name in dict.fromkeys(names):
+    for name in unit.shown:
         columns[name] = np.round(world.drives[name], _DIGITS)
     if "angle" in unit.instruments.others:
         columns["angle"] = np.round(world.angle, _DIGITS)
@@ -124,17 +119,23 @@ def recorded_run(unit: Unit, run: UnitRun, effects: tuple[Acting, ...], plan: Pl
         latitude=unit.set_up.latitude if known else None,
         input_axis=("up" if heading is None else Heading(heading=heading)) if known else None,
         powered_on=world.programme.powered_on,
+        started=_started(unit, world),
     )
     return Run(name=run.name, columns=columns, facts=facts)
 
 
+def _started(unit: Unit, world: World) -> datetime | None:
+    return None if unit.first_day is None else unit.first_day + timedelta(seconds=round(world.since_first))
+
+
 def _truth(plan: Plan, seed: int, unit: Unit, reckoning: Reckoning) -> Truth:
-    noise = {name: Amount(value=value, unit=NOISE_UNITS[name]) for name, value in asdict(unit.noise).items()}
+    noise = {name: Amount(value=value, unit=of) for name, (value, of) in unit.noise.amounts().items()}
     return Truth(
         schema="fogml.blind_truth/1",
         case=plan.name,
         seed=seed,
         kind=plan.kind,
+        reality=plan.reality,
         runs=Runs(
             fit=tuple(run.name for run in unit.fit),
             held_out=tuple(run.name for run in unit.held_out),

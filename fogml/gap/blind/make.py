@@ -8,7 +8,8 @@ from pathlib import Path
 
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
-from fogml.gap.blind.plan import Plan, plans
+from fogml.gap.blind.plan import Plan, Strata, plans
+from fogml.gap.blind.realities import FIRST
 from fogml.gap.blind.truth import read_truth, write_sums
 from fogml.processes import in_processes
 
@@ -23,6 +24,8 @@ def make_cases(
     progress: Callable[[int, int], None] | None = None,
     first: int = 1,
     least_d_prime: float = 0.0,
+    of: str = FIRST,
+    d_prime: Strata = (),
 ) -> int:
     """Make `count` cases under `directory`, in ``cases``, and their truth in ``truth``.
 
@@ -51,6 +54,10 @@ def make_cases(
         Number of the first one.
     least_d_prime
         Effects are drawn from the strata of d' that begin there or above; from all if 0.
+    of
+        A reality's name, or ``mix`` for all of them in turn.
+    d_prime
+        Bounds of d' to draw within, in place of the strata.
 
     Returns
     -------
@@ -68,7 +75,7 @@ def make_cases(
         )
     if not 0.1 <= sample_s <= 30.0:
         raise InputError(f"sample interval {sample_s:g} s: 0.1 to 30 s are possible")
-    wanted = plans(first - 1 + count, seed, kinds, least_d_prime)[first - 1 :]
+    wanted = plans(first - 1 + count, seed, kinds, least_d_prime, of, d_prime)[first - 1 :]
     folder = BlindFolder(Path(directory))
     folder.cases.mkdir(parents=True, exist_ok=True)
     folder.truth.mkdir(parents=True, exist_ok=True)
@@ -104,6 +111,10 @@ def _is_there(folder: BlindFolder, plan: Plan, seed: int, sample_s: float) -> bo
         raise InputError(
             f"{path}: is of seed {held.seed}, {held.sample_s:g} s and kind {held.kind}, not of seed {seed}, "
             f"{sample_s:g} s and kind {plan.kind}; choose another folder"
+        )
+    if held.reality != plan.reality:
+        raise InputError(
+            f"{path}: is of the {held.reality} reality, not of the {plan.reality}; choose another folder"
         )
     if held.mix != plan.mix:
         which = "the whole mix" if held.mix else "chosen kinds or strata of d'"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.blind.reality.catalogue import INVENTED, known_names
+from fogml.gap.blind.realities import FIRST, chosen, reality
 from fogml.gap.blind.truth import KINDS, Kind
 
 PER_BLOCK: dict[Kind, int] = {
@@ -53,6 +53,8 @@ class Plan:
         Bounds of d' that its effects are drawn within.
     mix
         Whether it is drawn from the whole mix.
+    reality
+        Which reality it is of.
     """
 
     number: int
@@ -64,6 +66,7 @@ class Plan:
     static: bool
     strata: Strata = STRATA
     mix: bool = True
+    reality: str = FIRST
 
     @property
     def name(self) -> str:
@@ -86,7 +89,12 @@ def strata_from(least_d_prime: float) -> Strata:
 
 
 def plans(
-    count: int, seed: int, kinds: Sequence[str] | None = None, least_d_prime: float = 0.0
+    count: int,
+    seed: int,
+    kinds: Sequence[str] | None = None,
+    least_d_prime: float = 0.0,
+    of: str = FIRST,
+    d_prime: Strata = (),
 ) -> list[Plan]:
     """The first `count` cases of a seed; a longer list begins with a shorter one.
 
@@ -96,22 +104,38 @@ def plans(
         Only cases of these kinds, in the mix's proportions among them; all if None.
     least_d_prime
         Only strata of d' that begin there or above.
+    of
+        A reality's name, or ``mix`` for all of them in turn, each with the plans that it has alone.
+    d_prime
+        Bounds of d' in place of the strata.
 
     Raises
     ------
     InputError
-        If a kind is not known, or no stratum is left.
+        If a kind or the reality is not known, bounds are not possible, or no stratum is left.
     """
-    strata = strata_from(least_d_prime)
-    mix = kinds is None and strata == STRATA
+    for low, high in d_prime:
+        if not 0.0 < low < high:
+            raise InputError(f"d' from {low:g} to {high:g}: two positive bounds are needed, the lower first")
+    strata = d_prime or strata_from(least_d_prime)
     for kind in kinds or ():
         if kind not in KINDS:
             raise InputError(f"there is no kind of case '{kind}'; kinds are {', '.join(KINDS)}")
+    names = chosen(of)
+    own = [_of_one(-(-count // len(names)), seed, kinds, strata, name) for name in names]
+    found = [own[place % len(own)][place // len(own)] for place in range(count)]
+    return [replace(plan, number=number) for number, plan in enumerate(found, start=1)]
+
+
+def _of_one(count: int, seed: int, kinds: Sequence[str] | None, strata: Strata, of: str) -> list[Plan]:
+    """Plans of one reality."""
+    held = reality(of)
+    mix = kinds is None and strata == STRATA
     block = [k for k, n in PER_BLOCK.items() if kinds is None or k in kinds for _ in range(n)]
     rng = np.random.default_rng([seed, 0x9E37])
-    known = _Cycle(rng, known_names())
-    left_out = _Cycle(rng, known_names())
-    invented = _Cycle(rng, tuple(form.name for form in INVENTED))
+    known = _Cycle(rng, held.known_names)
+    left_out = _Cycle(rng, held.known_names)
+    invented = _Cycle(rng, held.invented_names)
     unknown_and_known = 0
     found: list[Plan] = []
     while len(found) < count:
@@ -129,13 +153,13 @@ def plans(
                 first = (left_out if unknown_and_known % 2 else invented).next()
                 unknown_and_known += 1
             elif kind == "wrong_thermal":
-                first = "wrong_thermal_structure"
-            if kind.startswith("unknown") and first in known_names():
+                first = held.wrong_structure.name
+            if kind.startswith("unknown") and first in held.known_names:
                 withheld = [first]
             runs = int(rng.choice(_RUNS, p=_RUN_SHARES))
             static = bool(rng.random() < 0.6)
             number = len(found) + 1
-            found.append(Plan(number, kind, first, more, tuple(withheld), runs, static, strata, mix))
+            found.append(Plan(number, kind, first, more, tuple(withheld), runs, static, strata, mix, of))
     return found[:count]
 
 

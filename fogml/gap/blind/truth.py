@@ -143,6 +143,8 @@ class Truth(_Part):
         The suite's; with the case's number it fixes everything that is drawn.
     kind
         What it is drawn as.
+    reality
+        Which reality it is of.
     runs
         Its files.
     sample_s
@@ -173,6 +175,7 @@ class Truth(_Part):
     case: str
     seed: int
     kind: Kind
+    reality: str = "first"
     runs: Runs
     sample_s: float
     turning: bool

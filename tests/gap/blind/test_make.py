@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.gap.blind.first.catalogue import INVENTED, REALITY
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.make import make_cases
 from fogml.gap.blind.plan import plans
-from fogml.gap.blind.reality.catalogue import INVENTED, known_names
 from fogml.gap.blind.truth import check_sums, read_contributions, read_truth
 from fogml.runs.reading import read_run
 
@@ -55,7 +55,7 @@ def test_the_mix_is_that_of_the_specification() -> None:
 
 
 def test_every_effect_is_left_out_in_turn_and_every_invention_comes_up() -> None:
-    names = known_names()
+    names = REALITY.known_names
     left_out = plans(len(names), 1, ["unknown_left_out"])
     assert sorted(plan.left_out[0] for plan in left_out) == sorted(names)
     assert len(INVENTED) >= 10

@@ -1,4 +1,4 @@
-"""The second reality knows nothing of the twin."""
+"""Realities know nothing of the twin, of the diagnosis, or of each other."""
 
 from __future__ import annotations
 
@@ -8,25 +8,35 @@ from pathlib import Path
 import pytest
 
 import fogml.gap.blind as blind
+from fogml.gap.blind.realities import REALITIES
 
 FOLDER = Path(blind.__file__).parent
-MAKING = sorted(
-    [*(FOLDER / "reality").rglob("*.py"), *(FOLDER / f"{n}.py" for n in ("make", "case", "plan"))]
-)
-MAY = ("fogml.gap.blind", "fogml.runs", "fogml.outputs", "fogml.processes", "fogml.errors")
+HOME = "fogml.gap.blind"
+MAY = (HOME, "fogml.runs", "fogml.outputs", "fogml.processes", "fogml.errors")
 
 
-@pytest.mark.parametrize("path", MAKING, ids=lambda path: path.stem)
-def test_no_file_that_makes_cases_imports_the_twin(path: Path) -> None:
+def imported(path: Path) -> set[str]:
+    """Modules of fogml that a file imports."""
+    found: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        names = []
         if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
+            found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
             assert node.level == 0
-            names = [str(node.module)]
-        for name in names:
-            assert not name.startswith("fogml") or name.startswith(MAY), f"{path.name} imports {name}"
-            inside = path.is_relative_to(FOLDER / "reality")
-            if inside and name.startswith("fogml"):
-                assert name.startswith("fogml.gap.blind.reality"), f"{path.name} imports {name}"
+            found.add(str(node.module))
+    return {name for name in found if name.startswith("fogml")}
+
+
+@pytest.mark.parametrize("part", ["frame", *REALITIES])
+def test_a_reality_imports_itself_and_the_frame_alone(part: str) -> None:
+    files = sorted((FOLDER / part).rglob("*.py"))
+    assert files
+    for path in files:
+        for name in imported(path):
+            assert name.startswith((f"{HOME}.{part}", f"{HOME}.frame")), f"{path} imports {name}"
+
+
+@pytest.mark.parametrize("name", ["make", "case", "plan", "realities"])
+def test_no_file_that_makes_cases_imports_the_twin(name: str) -> None:
+    for module in imported(FOLDER / f"{name}.py"):
+        assert module.startswith(MAY), f"{name}.py imports {module}"

@@ -13,16 +13,17 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 
 from fogml.gap.blind.case import recorded_run
+from fogml.gap.blind.first.catalogue import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE
+from fogml.gap.blind.first.effects.coil import SlipEvents
+from fogml.gap.blind.first.noise import record_length
+from fogml.gap.blind.first.recurrences import bouc_wen, lag, play, recurrence
+from fogml.gap.blind.first.unit import draw_unit
+from fogml.gap.blind.frame import nominal
+from fogml.gap.blind.frame.form import Form, compatible
+from fogml.gap.blind.frame.reckoning import Reckoning
+from fogml.gap.blind.frame.strength import Acting, Scales, TooWeak, acting_before, recorded
+from fogml.gap.blind.frame.unit import Unit
 from fogml.gap.blind.plan import Plan
-from fogml.gap.blind.reality import nominal
-from fogml.gap.blind.reality.catalogue import INVENTED, KNOWN, WRONG_STRUCTURE, known_names
-from fogml.gap.blind.reality.effects.coil import SlipEvents
-from fogml.gap.blind.reality.form import Form
-from fogml.gap.blind.reality.noise import record_length
-from fogml.gap.blind.reality.reckoning import Reckoning
-from fogml.gap.blind.reality.recurrences import bouc_wen, lag, play, recurrence
-from fogml.gap.blind.reality.strength import Acting, Scales, TooWeak, acting_before, recorded
-from fogml.gap.blind.reality.unit import Unit, compatible, draw_unit
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effects
@@ -56,7 +57,7 @@ def test_known_names_are_candidates_of_the_catalogue_and_inventions_are_not() ->
         assert catalogue[form.name].stage == form.stage
         assert form.unit in ("", catalogue[form.name].amplitude.unit)
     assert not {form.name for form in (*INVENTED, WRONG_STRUCTURE)} & set(catalogue)
-    assert len(known_names()) >= 30
+    assert len(REALITY.known_names) >= 30
 
 
 @pytest.mark.parametrize("name", ["thermal_hysteresis", "sensor_lag", "deadband", "bias_polynomial"])

@@ -7,8 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
-from fogml.gap.blind.reality.noise import NoiseConstants, draw_noise, draw_series, flicker, record_length
-from fogml.gap.blind.reality.whitening import Projected, Whitening
+from fogml.gap.blind.first.noise import NoiseConstants, draw_noise, draw_series, flicker, record_length
+from fogml.gap.blind.frame.whitening import Projected, Whitening
 
 SAMPLE_S = 10.0
 

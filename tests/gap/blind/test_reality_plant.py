@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.special import j0, j1, y0, y1
 
-from fogml.gap.blind.reality.plant import (
+from fogml.gap.blind.first.plant import (
     CASE,
     ELECTRONICS,
     FIRST_SHELL,

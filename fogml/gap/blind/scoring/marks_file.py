@@ -30,7 +30,7 @@ SCHEMA = "fogml.blind_marks/1"
 _REMEDY = "fogml blind score writes it"
 _EFFECT_KEYS = {"id", "name", "stage", "d_prime"}
 _TRUTH_KEYS: dict[str, Any] = {
-    **dict.fromkeys(("schema_", "case", "seed", "kind", "runs", "sample_s", "turning"), True),
+    **dict.fromkeys(("schema_", "case", "seed", "kind", "reality", "runs", "sample_s", "turning"), True),
     **dict.fromkeys(("left_out", "d_prime", "mix"), True),
     "effects": {"__all__": _EFFECT_KEYS},
 }

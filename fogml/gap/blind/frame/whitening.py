@@ -1,8 +1,6 @@
 """The true whitening: inner products a' C^-1 b under the noise of a run, in O(n).
 
-C is that of `noise`: white, flicker and random walk. The flicker is taken as a ladder of
-Ornstein-Uhlenbeck states fitted to its sampled spectrum, which is within 2 % of it in d' (checked
-against the dense covariance). States and samples form a banded Gaussian system::
+C is that of states of first order beside white noise. States and samples form a banded Gaussian system::
 
     C = H P H' + R,    C^-1 v = R^-1 v - R^-1 H (P^-1 + H' R^-1 H)^-1 H' R^-1 v
 """
@@ -11,66 +9,70 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
-from scipy.optimize import nnls
 
-from fogml.gap.blind.reality.noise import NoiseConstants, record_length
-from fogml.gap.blind.reality.recurrences import FloatArray
-
-_PER_DECADE = 1.5
+from fogml.gap.blind.frame.record import FloatArray
 
 
 @dataclass(frozen=True)
-class Ladder:
-    """States of first order, sampled: ``decay`` per sample, stationary ``variance``; and ``white``."""
+class States:
+    """Noise as independent states of first order and white noise, sampled.
+
+    Attributes
+    ----------
+    decay
+        Factor from one sample to the next; 1 of a random walk; shape (m,).
+    step
+        Variance of what each sample adds [(deg/h)^2], shape (m,).
+    first
+        Variance at the first sample [(deg/h)^2], shape (m,).
+    white
+        Variance of the white noise in a sample [(deg/h)^2].
+    """
 
     decay: FloatArray
-    variance: FloatArray
+    step: FloatArray
+    first: FloatArray
     white: float
 
 
-def flicker_ladder(length: int) -> Ladder:
-    """A ladder for flicker with B = 1, as it is cut from a record of `length` samples."""
-    slowest = 0.5 * length
-    taus = np.geomspace(0.7, slowest, int(np.ceil(np.log10(slowest / 0.7) * _PER_DECADE)) + 1)
-    decay = np.exp(-1.0 / taus)
-    f = np.geomspace(1.0 / length, 0.5, 200)
-    wanted = 1.0 / (np.pi * f)
-    shapes = (1.0 - decay**2) / (1.0 - 2.0 * decay * np.cos(2.0 * np.pi * f)[:, None] + decay**2)
-    design = 2.0 * np.concatenate([shapes, np.ones((len(f), 1))], axis=1) / wanted[:, None]
-    weights, _ = nnls(design, np.ones(len(f)))
-    kept = weights[:-1] > 1e-12
-    return Ladder(decay[kept], weights[:-1][kept], float(weights[-1]))
+class NoiseLaw(Protocol):
+    """The law of a unit's noise."""
+
+    def states(self, count: int, sample_s: float, before: int) -> States:
+        """Of a run's rows from number `before` on, `count` of them."""
+
+    def mean_square_of_means(self, count: int, sample_s: float, before: int, width: int) -> float:
+        """Expected mean square of means over `width` of those rows, over all whole blocks [(deg/h)^2]."""
+
+    def amounts(self) -> dict[str, tuple[float, str]]:
+        """The nearest ``N``, ``B`` and ``K``, each with its unit."""
 
 
 class Whitening:
     """The noise of one run of `count` samples at `sample_s`, as its inverse covariance.
 
-    The random walk began `before` samples before the first of them. `reading` is the variance that
+    The noise began `before` samples before the first of them. `reading` is the variance that
     the noise of temperature sensors adds to each sample of the gap [(deg/h)^2], shape (count,).
     """
 
     def __init__(
         self,
-        constants: NoiseConstants,
+        law: NoiseLaw,
         count: int,
         sample_s: float,
         before: int = 0,
         reading: FloatArray | None = None,
     ) -> None:
-        self.count, self._before = count, before
-        self._hours = hours = sample_s / 3600.0
-        self.constants = constants
-        ladder = flicker_ladder(record_length(count))
-        self._decay = np.concatenate([ladder.decay, [1.0]])
-        self._variance = constants.B**2 * ladder.variance
-        self._step = np.concatenate([self._variance * (1.0 - ladder.decay**2), [constants.K**2 * hours]])
-        self._step = np.maximum(self._step, 1e-18)
-        self._first = np.concatenate([self._variance, [constants.K**2 * hours * (before + 1)]])
-        self._first = np.maximum(self._first, 1e-18)
-        self.white = constants.N**2 / hours + constants.B**2 * ladder.white
+        self.law, self.count = law, count
+        self._sample_s, self._before = sample_s, before
+        states = law.states(count, sample_s, before)
+        self._decay = states.decay
+        self._step, self._first = np.maximum(states.step, 1e-18), np.maximum(states.first, 1e-18)
+        self.white = states.white
         self._each = np.full(count, self.white) + (0.0 if reading is None else reading)
 
     @cached_property
@@ -101,16 +103,7 @@ class Whitening:
 
     def mean_square_of_means(self, width: int) -> float:
         """Expected mean square of means over `width` samples, over all whole blocks [(deg/h)^2]."""
-        blocks = self.count // width
-        length = record_length(self.count)
-        half = np.pi * np.arange(1, length // 2 + 1) / length
-        means = (np.sin(width * half) / (width * np.sin(half))) ** 2
-        flicker = self.constants.B**2 / np.pi * float(np.sum(means / np.arange(1, length // 2 + 1)))
-        step = self.constants.K**2 * self._hours
-        first = self._before + width * np.arange(blocks)
-        pair = np.minimum.outer(np.arange(1, width + 1), np.arange(1, width + 1)).mean()
-        white = self.constants.N**2 / self._hours / width
-        return float(white + flicker + step * np.mean(first + pair))
+        return self.law.mean_square_of_means(self.count, self._sample_s, self._before, width)
 
 
 @dataclass

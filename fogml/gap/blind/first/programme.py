@@ -6,43 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.frame.form import Demands
+from fogml.gap.blind.frame.record import FloatArray
 
 _COLDEST, _HOTTEST = -42.0, 72.0
-
-
-@dataclass(frozen=True)
-class Demands:
-    """What the programmes of a unit's runs must hold, for its effects to show.
-
-    Attributes
-    ----------
-    turns
-        Ladders of table rates in soaks.
-    slow_turns
-        The table goes round slowly through soaks and ramps.
-    small_rates
-        The ladders go down to hundredths of a deg/h.
-    shock
-        One change of the air as fast as the chamber can.
-    power_steps
-        The unit's power and supply step.
-    fan_stops
-        The chamber's fan stops for a while.
-    power_on
-        Each run begins with power-on.
-    top_rate
-        The greatest rate of the unit's ladders [deg/s].
-    """
-
-    turns: bool = False
-    slow_turns: bool = False
-    small_rates: bool = False
-    shock: bool = False
-    power_steps: bool = False
-    fan_stops: bool = False
-    power_on: bool = False
-    top_rate: float = 40.0
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.gap.blind.reality import nominal
-from fogml.gap.blind.reality.form import Additive, Distorting
-from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.strength import Acting, Scales, acting_before, recorded
-from fogml.gap.blind.reality.unit import Unit, UnitRun
-from fogml.gap.blind.reality.whitening import Projected
+from fogml.gap.blind.frame import nominal
+from fogml.gap.blind.frame.form import Additive, Distorting
+from fogml.gap.blind.frame.record import FloatArray
+from fogml.gap.blind.frame.strength import Acting, Scales, acting_before, recorded
+from fogml.gap.blind.frame.unit import Unit, UnitRun
+from fogml.gap.blind.frame.whitening import Projected
 
 AVERAGING_S = 100.0
 _SHORTEST_S = 600.0

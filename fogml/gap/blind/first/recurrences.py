@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from fogml.gap.blind.frame.record import FloatArray
 
 _DEEPEST = 300.0
 """Largest decay within a block, as an exponent; e to this still is a float."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fogml.gap.blind.reality.effects import (
+from fogml.gap.blind.first.effects import (
     coil,
     electrical,
     invented,
@@ -11,7 +11,9 @@ from fogml.gap.blind.reality.effects import (
     sensing,
     turning,
 )
-from fogml.gap.blind.reality.form import Form
+from fogml.gap.blind.first.unit import draw_unit
+from fogml.gap.blind.frame.form import Form
+from fogml.gap.blind.frame.reality import Reality
 
 KNOWN: tuple[type[Form], ...] = (
     *coil.FORMS,
@@ -31,11 +33,4 @@ WRONG_STRUCTURE: type[Form] = memory.DeepPlate
 """Another thermal order than any twin's."""
 
 
-def known_names() -> tuple[str, ...]:
-    """Ids of the catalogue's effects that have a form here, in order."""
-    return tuple(dict.fromkeys(form.name for form in KNOWN))
-
-
-def forms_of(name: str) -> tuple[type[Form], ...]:
-    """Forms of one effect."""
-    return tuple(form for form in KNOWN if form.name == name)
+REALITY = Reality("first", KNOWN, INVENTED, WRONG_STRUCTURE, draw_unit)

@@ -6,11 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.gap.blind.reality import nominal
-from fogml.gap.blind.reality.form import Additive, Distorting, Form, Sensing, Shape
-from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.unit import Unit, UnitRun
-from fogml.gap.blind.reality.whitening import Projected
+from fogml.gap.blind.frame import nominal
+from fogml.gap.blind.frame.form import Additive, Distorting, Form, Sensing, Shape
+from fogml.gap.blind.frame.record import FloatArray
+from fogml.gap.blind.frame.unit import Unit, UnitRun
+from fogml.gap.blind.frame.whitening import Projected
 
 _LEAST_OUTSIDE = 0.02
 """Share of an effect's whitened length that must lie outside the nominal constants' span."""

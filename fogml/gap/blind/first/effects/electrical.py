@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Additive, Shape
-from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray, lag
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import lag
+from fogml.gap.blind.frame.form import Additive, Demands, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 
 class PolarisationChirped(Additive):

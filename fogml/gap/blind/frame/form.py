@@ -1,17 +1,51 @@
-"""The form that an effect takes in this reality: one class, one declaration."""
+"""The form that an effect takes in a reality: one class, one declaration; and what programmes it needs."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
 
-from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.frame.record import FloatArray, World
 
 Shape = dict[str, float]
+
+
+@dataclass(frozen=True)
+class Demands:
+    """What the programmes of a unit's runs must hold, for its effects to show.
+
+    Attributes
+    ----------
+    turns
+        Ladders of table rates in soaks.
+    slow_turns
+        The table goes round slowly through soaks and ramps.
+    small_rates
+        The ladders go down to hundredths of a deg/h.
+    shock
+        One change of the air as fast as the chamber can.
+    power_steps
+        The unit's power and supply step.
+    fan_stops
+        The chamber's fan stops for a while.
+    power_on
+        Each run begins with power-on.
+    top_rate
+        The greatest rate of the unit's ladders [deg/s].
+    """
+
+    turns: bool = False
+    slow_turns: bool = False
+    small_rates: bool = False
+    shock: bool = False
+    power_steps: bool = False
+    fan_stops: bool = False
+    power_on: bool = False
+    top_rate: float = 40.0
 
 
 class Form(ABC):
@@ -121,3 +155,18 @@ class Sensing(Form):
     def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
         """What is recorded of a coil sensor that gives `values` [degC], noise included; shape (n,)."""
         return values
+
+
+def compatible(forms: Sequence[type[Form]]) -> bool:
+    """Whether one set of programmes can show all of them."""
+    turning = any(f.demands.turns or f.demands.slow_turns for f in forms)
+    upright = any(f.demands.slow_turns for f in forms)
+    fast = any(f.demands.turns and not f.demands.small_rates for f in forms)
+    small = any(f.demands.small_rates for f in forms)
+    # Any edge of the table's rate would show the smallest skew, and nothing else.
+    skewed = any(f.name == "logger_skew" for f in forms)
+    flat = any(f.horizontal for f in forms)
+    names = [f.name for f in forms]
+    return len(set(names)) == len(names) and not (
+        (skewed and turning) or (flat and upright) or (small and fast)
+    )

@@ -6,10 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Additive, Sensing, Shape
-from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray, recurrence
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import recurrence
+from fogml.gap.blind.frame.form import Additive, Demands, Sensing, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 
 class StickySensor(Sensing):

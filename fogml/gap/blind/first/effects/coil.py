@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import erf
 
-from fogml.gap.blind.reality.form import Additive, Shape
-from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray, lag, recurrence
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import lag, recurrence
+from fogml.gap.blind.frame.form import Additive, Demands, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 _LEAD_DEG_H_PER_M = 0.525
 

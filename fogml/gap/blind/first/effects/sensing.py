@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Sensing, Shape
-from fogml.gap.blind.reality.recurrences import FloatArray, lag
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import lag
+from fogml.gap.blind.frame.form import Sensing, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 
 class LagOfTwoStages(Sensing):

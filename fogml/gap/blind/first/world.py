@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from fogml.gap.blind.reality.plant import (
+from fogml.gap.blind.first.plant import (
     CASE,
     ELECTRONICS,
     FIRST_SHELL,
@@ -18,82 +15,11 @@ from fogml.gap.blind.reality.plant import (
     PLATE_DEEP,
     Plant,
 )
-from fogml.gap.blind.reality.programme import Programme
-from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.first.programme import Programme
+from fogml.gap.blind.frame.record import FloatArray, SetUp, World
 
-EARTH_DEG_H = 15.041067
 _FINE_S = 2.0
 _DELTA_S = 64.0
-
-
-@dataclass(frozen=True)
-class SetUp:
-    """How the unit is mounted: `heading` in deg for a horizontal axis, None for an upright one."""
-
-    latitude: float
-    heading: float | None
-
-    @property
-    def earth_deg_h(self) -> float:
-        """Earth rate along the input axis [deg/h]."""
-        lat = np.radians(self.latitude)
-        if self.heading is None:
-            return float(EARTH_DEG_H * np.sin(lat))
-        return float(EARTH_DEG_H * np.cos(lat) * np.cos(np.radians(self.heading)))
-
-
-@dataclass(frozen=True, eq=False)
-class World:
-    """Everything that truly happened in one run, at its n samples.
-
-    Attributes
-    ----------
-    time
-        s, shape (n,).
-    nodes
-        True temperatures [degC] by the run format's names, and ``T_hub``, ``T_plate``,
-        ``T_plate_deep``, ``T_coil`` (mean of the winding), each of shape (n,).
-    rates
-        Their rates [degC/min].
-    shell_rates
-        Rates of the coil's shells, inner first [degC/min], shape (n, shells).
-    deltas
-        Mean over the last 64 s less that over the 64 s before of ``T_in`` and ``T_out`` [degC].
-    table_rate
-        Mean over the sample [deg/s]; `angle` [deg] at its end, not wrapped.
-    drives
-        ``supply`` V, ``power`` W, ``humidity`` %, ``vibration`` g, ``compressor``, ``heater``, ``fan``
-        0 to 1, ``B_x`` ``B_y`` ``B_z`` uT.
-    time_on
-        Time since power-on [s].
-    place
-        Number of the run among the unit's.
-    """
-
-    time: FloatArray
-    sample_s: float
-    nodes: dict[str, FloatArray]
-    rates: dict[str, FloatArray]
-    shell_rates: FloatArray
-    deltas: dict[str, FloatArray]
-    table_rate: FloatArray
-    angle: FloatArray
-    drives: dict[str, FloatArray]
-    time_on: FloatArray
-    set_up: SetUp
-    programme: Programme
-    place: int
-
-    @cached_property
-    def rate_deg_h(self) -> FloatArray:
-        """True rate about the input axis, table and Earth [deg/h], shape (n,)."""
-        return 3600.0 * self.table_rate + self.set_up.earth_deg_h
-
-    def mean_cosine(self, harmonic: float, phase_deg: float) -> FloatArray:
-        """Mean of cos(harmonic * angle - phase) over each sample, shape (n,)."""
-        end = harmonic * np.radians(self.angle) - np.radians(phase_deg)
-        half = 0.5 * harmonic * np.radians(self.table_rate * self.sample_s)
-        return np.cos(end - half) * np.sinc(half / np.pi)
 
 
 def happen(

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.gap.blind.reality.recurrences import FloatArray, lag
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import lag
+from fogml.gap.blind.frame.record import FloatArray, World
 
 Layout = str
 """``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4."""
@@ -123,12 +123,3 @@ def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> S
         felt[name] = lag(world.sample_s, world.nodes[place], delay)
         noise[name] = instruments.noise * rng.standard_normal(len(world.time))
     return Sensed(felt, noise, instruments.resolution)
-
-
-def faces(recorded: dict[str, FloatArray], layout: Layout) -> tuple[FloatArray, FloatArray | None]:
-    """Inner and outer face as the run format has them: means of the odd and of the even sensors."""
-    if layout == "one":
-        return recorded["T"], None
-    if layout == "two":
-        return recorded["T_in"], recorded["T_out"]
-    return 0.5 * (recorded["T1"] + recorded["T3"]), 0.5 * (recorded["T2"] + recorded["T4"])

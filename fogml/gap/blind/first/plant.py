@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.gap.blind.reality.recurrences import FloatArray
+from fogml.gap.blind.frame.record import FloatArray
 
 CASE, HUB, ELECTRONICS, PLATE, PLATE_DEEP = range(5)
 FIRST_SHELL = 5

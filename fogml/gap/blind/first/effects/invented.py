@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Additive, Shape
-from fogml.gap.blind.reality.recurrences import FloatArray, play, recurrence
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import play, recurrence
+from fogml.gap.blind.frame.form import Additive, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 
 class ModeHops(Additive):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Additive, ScaleFactor, Shape
-from fogml.gap.blind.reality.recurrences import FloatArray, bouc_wen, lag, play
-from fogml.gap.blind.reality.world import World
+from fogml.gap.blind.first.recurrences import bouc_wen, lag, play
+from fogml.gap.blind.frame.form import Additive, ScaleFactor, Shape
+from fogml.gap.blind.frame.record import FloatArray, World
 
 _GAS_CONSTANT = 8.314
 

@@ -6,10 +6,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from fogml.gap.blind.reality.form import Additive, Distorting, ScaleFactor, Shape
-from fogml.gap.blind.reality.programme import Demands
-from fogml.gap.blind.reality.recurrences import FloatArray
-from fogml.gap.blind.reality.world import EARTH_DEG_H, World
+from fogml.gap.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
+from fogml.gap.blind.frame.record import EARTH_DEG_H, FloatArray, World
 
 
 class SourceBent(ScaleFactor):
