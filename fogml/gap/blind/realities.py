@@ -11,7 +11,7 @@ FIRST = "first"
 """What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
 MIX = "mix"
 """All of them in turn, case by case."""
-REALITIES = (FIRST,)
+REALITIES = (FIRST, "second")
 """Their names, each that of a package beside this module."""
 
 

@@ -48,6 +48,15 @@ class Demands:
     top_rate: float = 40.0
 
 
+_WIDE = 5.0
+
+
+def _within(rng: np.random.Generator, low: float, high: float) -> float:
+    if low > 0.0 and high / low >= _WIDE:
+        return float(np.exp(rng.uniform(np.log(low), np.log(high))))
+    return float(rng.uniform(low, high))
+
+
 class Form(ABC):
     """An effect as it truly acts.
 
@@ -79,6 +88,8 @@ class Form(ABC):
         Whether the input axis must lie east or west.
     quick_plant
         Whether the unit must be light.
+    ranges
+        Lowest and highest value of each shape parameter, for those that `draw` draws one by one.
     largest
         Amplitude beyond which no gyro has it; where it would take more to show, the unit can't show it.
     """
@@ -96,11 +107,12 @@ class Form(ABC):
     drawn_per_run: ClassVar[bool] = False
     horizontal: ClassVar[bool] = False
     quick_plant: ClassVar[bool] = False
+    ranges: ClassVar[dict[str, tuple[float, float]]] = {}
     largest: ClassVar[float] = np.inf
 
-    @abstractmethod
     def draw(self, rng: np.random.Generator) -> Shape:
-        """Shape parameters, continuous over the catalogue's ranges."""
+        """Shape parameters: over `ranges`, evenly in the logarithm where a range spans a factor of 5."""
+        return {name: _within(rng, low, high) for name, (low, high) in self.ranges.items()}
 
 
 class Additive(Form):

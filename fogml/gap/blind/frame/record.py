@@ -72,6 +72,8 @@ class World:
         Number of the run among the unit's.
     since_first
         Time from the beginning of the unit's first run to this one's [s].
+    past
+        Where the winding's temperature turned before the run, oldest first [degC], as far as it is told.
     """
 
     time: FloatArray
@@ -88,6 +90,7 @@ class World:
     programme: Told
     place: int
     since_first: float = 0.0
+    past: tuple[float, ...] = ()
 
     @cached_property
     def rate_deg_h(self) -> FloatArray:
