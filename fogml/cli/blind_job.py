@@ -166,6 +166,14 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
                 settings.workers,
                 lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
             )
+    from fogml.gap.blind.form_distance import measure_forms
+
+    with terminal.work("measuring forms") as work:
+        measure_forms(
+            folder,
+            settings.workers,
+            lambda done, total: work.reached(done, total, f"forms of {done} of {total}"),
+        )
     config = settings.in_full().yaml("blind make", "make.yaml")
     with whole_file(folder.path / "make.yaml") as partial:
         partial.write_text(config, encoding="utf-8")

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fogml.report.blind_words import REALITY, figure_text, kind_words, value_text, wanted_text
+from fogml.report.blind_realities import by_form_table, by_reality_table, reality_words
+from fogml.report.blind_words import figure_text, kind_words, value_text, wanted_text
 from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
@@ -36,6 +37,8 @@ def blind_page(values: Mapping[str, Any]) -> str:
         values=values,
         verdict=_verdict(name, rows, values),
         warnings=_warnings(rows, values, judged),
+        by_reality=by_reality_table(judged["by_reality"]),
+        by_form=by_form_table(judged["by_form"]) if judged["by_form"] else None,
         figures=_figures(rows, values),
         others=_others(methods, name) if len(methods) > 1 else None,
         by_kind=_by_kind(values),
@@ -75,6 +78,10 @@ def _warnings(
         found.append("The seed is one to develop on: these are no final figures.")
     if not values["mix"]:
         found.append("No case is drawn from the whole mix: every figure is one of the kinds that there are.")
+    if len(values["realities"]) < 2:
+        found.append(
+            "All cases are of one reality: what is found here holds for its plant and its forms alone."
+        )
     several = [f"{m} ({len(v['code'])})" for m, v in values["methods"].items() if len(v["code"]) > 1]
     if several:
         found.append(f"Answers were given by several states of the code: {listed(several, 9)}.")
@@ -301,7 +308,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     whole = values["mix"] == values["cases"]
     return [
         ("data", values["data"]),
-        ("second reality", REALITY),
+        *((f"{name} reality", reality_words(name)) for name in values["realities"]),
         ("cases", f"{values['cases']}, {'all' if whole else values['mix']} of them from the whole mix"),
         ("seed", f"{values['seed']} ({'final' if values['final'] else 'to develop on'})"),
         ("sample interval", ", ".join(f"{number(s)} s" for s in values["sample_s"])),

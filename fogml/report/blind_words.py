@@ -19,21 +19,6 @@ _KINDS = {
 }
 
 
-REALITY = (
-    "Another integrator and another thermal order than the twin's, other forms of the catalogue's effects, "
-    "sensors with noise, steps and lag, and effects that no library holds. While the forms were written "
-    "they were compared with the catalogue's signatures, and the ranges of some were drawn in until the "
-    "best-fitted signature had a cosine above 0.95 as a rule (Bouc–Wen's exponent, place and shift of the "
-    "glass transition, slope of the strain's sensitivity, weights of the winding's layers, leads' and "
-    "chamber pick-up's lag): below that an effect is another one, by the measure that tells relatives. "
-    "No effect has a size that no gyro has, so mount_tilt has no form here: it stays under the noise. "
-    "The first 128 s of a run are in no figure, and d′ counts the noise of temperature readings. Nobody "
-    "knows what a held-out run draws for itself (a turn-on bias, the phase of a line): the truth's closing "
-    "leaves that open as well, and where it closes less than 5 % it is compared with nothing."
-)
-"""What must be known of the reality behind the figures."""
-
-
 def kind_words(kind: str) -> str:
     """The name of a kind of case."""
     return _KINDS.get(kind, kind.replace("_", " "))

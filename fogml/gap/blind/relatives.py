@@ -52,14 +52,15 @@ class Likeness:
         self._runs, self._contributions, self._noise = runs, contributions, noise
         self._constants = constants
 
-    def cosine(self, id: str) -> float:
-        """The largest absolute cosine that an effect reaches with one of the contributions."""
+    def cosine(self, id: str, of: int | None = None) -> float:
+        """The largest absolute cosine that an effect reaches with a contribution, or with number `of`."""
+        targets = self._targets if of is None else self._targets[:, of : of + 1]
         candidate = self._stack.model.candidates().get(id)
         if candidate is None:
             return 0.0
         grid = atoms({id: candidate}, ())
         columns = self._seen(np.column_stack([self._stack.column(atom) for atom in grid]))
-        reached = np.abs(self._targets.T @ columns).max(axis=0)
+        reached = np.abs(targets.T @ columns).max(axis=0)
         best = float(reached.max(initial=0.0))
         names = [quantity.name for quantity in candidate.shape]
         if not names or best > ALIKE:
@@ -67,7 +68,7 @@ class Likeness:
         bounds = [quantity.tactical for quantity in candidate.shape]
         for start in np.argsort(reached)[::-1][:_STARTS]:
             fitted = minimize(
-                lambda x: -self._reached(Atom(id, dict(zip(names, map(float, x))))),
+                lambda x: -self._reached(targets, Atom(id, dict(zip(names, map(float, x))))),
                 [grid[start].shape[name] for name in names],
                 method="Nelder-Mead",
                 bounds=bounds,
@@ -90,8 +91,8 @@ class Likeness:
         residual = white[:, 0] - used @ np.linalg.lstsq(used, white[:, 0], rcond=None)[0]
         return float(residual @ residual)
 
-    def _reached(self, atom: Atom) -> float:
-        return float(np.abs(self._targets.T @ self._seen(self._stack.column(atom)[:, None])).max())
+    def _reached(self, targets: FloatArray, atom: Atom) -> float:
+        return float(np.abs(targets.T @ self._seen(self._stack.column(atom)[:, None])).max())
 
     @cached_property
     def _stack(self) -> Stack:

@@ -55,6 +55,10 @@ def stratum(d_prime: float) -> str:
 STRATUM_NAMES = tuple(stratum(low) for low, _ in STRATA)
 
 
+FORM_DISTANCES = {"over 0.95": 0.95, "0.9-0.95": 0.9, "0.8-0.9": 0.8, "under 0.8": 0.0}
+"""How near the catalogue comes to a true form: lowest cosine of each bin."""
+
+
 class _Part(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, protected_namespaces=())
 
@@ -86,6 +90,10 @@ class TrueEffect(_Part):
         Parameters of the reality's form.
     d_prime
         ``||W (I - P) s||`` over all fit runs, of this effect's contribution where nothing else acts.
+    cosine
+        How near the catalogue's form of it comes: the absolute cosine of its best member with this
+        contribution, whitened and beside the nominal constants. None where it was not measured, or no
+        library holds the effect.
     """
 
     id: str | None
@@ -95,11 +103,19 @@ class TrueEffect(_Part):
     amplitude: Amount | None = None
     shape: dict[str, float] = Field(default_factory=dict)
     d_prime: float
+    cosine: float | None = None
 
     @property
     def stratum(self) -> str:
         """The stratum of its d'."""
         return stratum(self.d_prime)
+
+    @property
+    def form_distance(self) -> str | None:
+        """The bin of its cosine, of `FORM_DISTANCES`; None where there is none."""
+        if self.cosine is None:
+            return None
+        return next(name for name, low in FORM_DISTANCES.items() if self.cosine >= low)
 
 
 class Segment(_Part):

@@ -28,7 +28,7 @@ from fogml.strict_json import MOST_BYTES, parse_json
 MARKS = "marks.json.gz"
 SCHEMA = "fogml.blind_marks/1"
 _REMEDY = "fogml blind score writes it"
-_EFFECT_KEYS = {"id", "name", "stage", "d_prime"}
+_EFFECT_KEYS = {"id", "name", "stage", "form", "d_prime", "cosine"}
 _TRUTH_KEYS: dict[str, Any] = {
     **dict.fromkeys(("schema_", "case", "seed", "kind", "reality", "runs", "sample_s", "turning"), True),
     **dict.fromkeys(("left_out", "d_prime", "mix"), True),

@@ -10,6 +10,7 @@ from typing import Any
 
 import fogml
 from fogml.gap.blind.scoring.breakdowns import confusion, left_out, thinned, worst
+from fogml.gap.blind.scoring.by_reality import by_form, by_reality
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.scoring.marks_file import Marks
 from fogml.gap.blind.scoring.statistics import Bin
@@ -47,7 +48,7 @@ def score_values(marks: Marks, final: Path | None = None) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "version": fogml.__version__,
-        "data": "synthetic: a reality written apart from the twin",
+        "data": "synthetic: realities written apart from the twin",
         "seed": marks.seed,
         "final": final is not None,
         "final_uses": uses(final) if final is not None else [],
@@ -55,6 +56,7 @@ def score_values(marks: Marks, final: Path | None = None) -> dict[str, Any]:
         "parts": [part.model_dump(mode="json") for part in marks.parts],
         "cases": len(truths),
         "mix": mix,
+        "realities": _counted([truth.reality for truth in truths]),
         "kinds": _counted([truth.kind for truth in truths], KINDS),
         "strata": _counted([truth.stratum for truth in truths if truth.effects], STRATUM_NAMES),
         "fit_runs": _counted([len(truth.runs.fit) for truth in truths]),
@@ -73,6 +75,8 @@ def _as_mix(marks: Sequence[Mark]) -> list[Mark]:
 def _method(marks: Sequence[Mark]) -> dict[str, Any]:
     return {
         "code": _code_states(marks),
+        "by_reality": by_reality(marks),
+        "by_form": by_form(marks),
         "rows": rows(marks),
         "reliability": [_bin(part) for part in calibration(BY_KEY["calibration_error"].chosen(marks))],
         "open_set": thinned(curve(BY_KEY["auroc"].chosen(marks))),
