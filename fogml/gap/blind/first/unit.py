@@ -13,7 +13,7 @@ from fogml.gap.blind.first.sensors import draw_instruments, sense
 from fogml.gap.blind.first.world import happen
 from fogml.gap.blind.frame import nominal
 from fogml.gap.blind.frame.form import Demands, Form
-from fogml.gap.blind.frame.record import SetUp
+from fogml.gap.blind.frame.record import SetUp, World
 from fogml.gap.blind.frame.unit import Unit, UnitRun
 
 _STATIC_FACTOR = 1.3
@@ -61,15 +61,14 @@ def draw_unit(
         thermal[:-1],
         thermal[-1:],
         quiet,
-        shown=_shown(instruments.others, thermal),
+        shown=_shown(instruments.others, demands, thermal[0].world),
     )
 
 
-def _shown(others: tuple[str, ...], runs: tuple[UnitRun, ...]) -> tuple[str, ...]:
+def _shown(others: tuple[str, ...], demands: Demands, world: World) -> tuple[str, ...]:
     """Recorded columns beside the temperatures: what steps is recorded with what was chosen."""
-    names = [name for name in others if name in runs[0].world.drives]
-    told = [run.world.programme for run in runs]
-    names += ["power"] * any(one.power_steps for one in told) + ["fan"] * any(one.fan_stops for one in told)
+    names = [name for name in others if name in world.drives]
+    names += ["power"] * demands.power_steps + ["fan"] * demands.fan_stops
     return tuple(dict.fromkeys(names))
 
 

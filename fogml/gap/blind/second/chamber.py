@@ -8,10 +8,11 @@ from fogml.gap.blind.frame.record import FloatArray
 
 
 def draw_chamber(rng: np.random.Generator) -> dict[str, float]:
-    """One chamber: its powers [degC/min], loss [1/min], band [degC], shortest times [s], gain [1/degC]."""
+    """One chamber: its powers [degC/min], loss [1/min], band [degC], times [s], gain [1/degC]."""
     return {
-        "heat": float(rng.uniform(6.0, 30.0)),
-        "cool": float(rng.uniform(6.0, 30.0)),
+        "heat": float(rng.uniform(8.0, 30.0)),
+        "cool": float(rng.uniform(8.0, 25.0)),
+        "evaporator": float(rng.uniform(100.0, 400.0)),
         "loss": float(rng.uniform(0.02, 0.06)),
         "band": float(rng.uniform(0.05, 0.5)),
         "shortest": float(rng.uniform(20.0, 120.0)),
@@ -26,12 +27,13 @@ def air_of(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Air [degC], compressor (0 or 1) and heater (0 to 1) under a set point at each step, shape (m,) each.
 
-    The compressor is on or off, and stays so for a shortest time; its power falls with the cold.
+    The compressor is on or off, and stays so for a shortest time; its evaporator answers slowly, and gives
+    less in the cold.
     """
     count = len(set_point)
     air, compressor, heater = np.empty(count), np.zeros(count), np.zeros(count)
     per_step = step_s / 60.0
-    temperature, held, running, since = float(set_point[0]), 0.0, False, 1e9
+    temperature, held, cold, running, since = float(set_point[0]), 0.0, 0.0, False, 1e9
     wanted = set_point.tolist()
     for k in range(count):
         error = wanted[k] - temperature
@@ -46,7 +48,8 @@ def air_of(
         if 0.0 < duty < 1.0:
             held = min(max(held + c["gain"] * error * step_s / c["reset"], 0.0), 1.0)
         air[k], compressor[k], heater[k] = temperature, float(running), duty
-        cooling = c["cool"] * max((temperature + 80.0) / 100.0, 0.1) if running else 0.0
+        cold += (float(running) - cold) * step_s / c["evaporator"]
+        cooling = cold * c["cool"] * max((temperature + 80.0) / 100.0, 0.1)
         change = c["heat"] * duty - cooling - c["loss"] * (temperature - c["room"])
         temperature += per_step * change
     return air, compressor, heater

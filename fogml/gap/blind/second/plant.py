@@ -36,8 +36,8 @@ class PlantConstants:
     base behind the air, ``board_s`` of the board behind the base, ``vent_s`` of it behind the air,
     ``optics_s`` of the optics behind the base, ``source_s`` of the source behind the board. ``thickness_m``
     and ``radius_m`` of the winding, ``diffusivity`` across it and ``along`` times as much along it [m2/s];
-    ``power_w`` in all, of which ``source_share`` goes into the source; ``surge_w`` more after power-on, dying
-    away in ``surge_s``.
+    ``warm`` is by how much the power warms the board in the end [degC], ``source_share`` of it goes into the
+    source; ``surge`` times as much more after power-on, dying away in ``surge_s``.
     """
 
     can_s: float
@@ -54,9 +54,9 @@ class PlantConstants:
     radius_m: float
     diffusivity: float
     along: float
-    power_w: float
+    warm: float
     source_share: float
-    surge_w: float
+    surge: float
     surge_s: float
 
 
@@ -67,7 +67,6 @@ def draw_plant(rng: np.random.Generator, quick: bool = False) -> PlantConstants:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
     light = 0.1 if quick else 1.0
-    power = log(1.5, 6.0)
     return PlantConstants(
         can_s=light * log(200.0, 1200.0),
         lid_s=light * log(150.0, 900.0),
@@ -83,9 +82,9 @@ def draw_plant(rng: np.random.Generator, quick: bool = False) -> PlantConstants:
         radius_m=log(0.02, 0.07),
         diffusivity=log(0.8e-7, 3e-7),
         along=float(rng.uniform(1.0, 4.0)),
-        power_w=power,
+        warm=log(4.0, 20.0),
         source_share=float(rng.uniform(0.1, 0.5)),
-        surge_w=power * float(rng.uniform(0.0, 1.0)),
+        surge=float(rng.uniform(0.0, 1.0)),
         surge_s=log(60.0, 1200.0),
     )
 
@@ -103,6 +102,8 @@ class Plant:
         From each node to the air [W/K], shape (nodes,).
     heated
         Share of the power that goes into each node, shape (nodes,).
+    power_w
+        In the long run [W].
     """
 
     def __init__(self, constants: PlantConstants, radial: int = RADIAL, axial: int = AXIAL) -> None:
@@ -160,6 +161,7 @@ class Plant:
         self._back = modes / root[:, None]
         self._gains = np.stack([self.to_air, self.heated], axis=1) / root[:, None]
         self._gains = modes.T @ self._gains
+        self.power_w = c.warm / float(self.rest(0.0, 1.0)[board])
 
     def temperatures(self, step_s: float, air: FloatArray, power: FloatArray) -> FloatArray:
         """Temperatures of all nodes [degC], shape (m, nodes), from rest at the first step.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.signal import lfilter
@@ -11,8 +11,6 @@ from fogml.gap.blind.frame.record import FloatArray, World
 
 _AT_REST, _IN_TURNS = 0.1, 0.4
 """What the thermometers' noise may add to the gyro's white noise in a sample, rms, in shares of it."""
-_LAGGING = 0.1 / 60.0
-"""Rate of temperature that the lag is judged by [degC/s]."""
 
 
 @dataclass(frozen=True)
@@ -82,13 +80,12 @@ def draw_instruments(
     most = min(_AT_REST * white / (rest + 1e-30), _IN_TURNS * white / (turning + 1e-30))
     error = min(float(np.exp(rng.uniform(np.log(1e-3), np.log(8e-3)))) * (0.3 if fine else 1.0), most)
     steps = [q for q in (0.02, 0.01, 0.005, 0.002, 0.001, 1e-4) if q < 2.0 * error]
-    slowest = min(1.5, _IN_TURNS * white / (_LAGGING * turning + 1e-30))
     coil = {"one": ("T",), "two": ("T_in", "T_out"), "four": ("T1", "T2", "T3", "T4")}[layout]
     places = {name: "T_out" if name in ("T_out", "T2", "T4") else "T_in" for name in coil}
     places |= {name: name for name in others if name.startswith("T_")}
 
     def thermometer(name: str, place: str) -> Thermometer:
-        lag = slowest if name in coil else 5.0
+        lag = 2.0 if name in coil else 10.0
         gain, offset = rng.normal(0.0, 1e-3), rng.normal(0.0, 0.1)
         return Thermometer(place, float(gain), float(offset), float(lag * rng.uniform(0.2, 1.0)))
 
@@ -106,21 +103,32 @@ class Sensed:
 
     def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
         """Recorded columns; of other `felt` temperatures with the same noise, if given."""
-        q, found = self.instruments.resolution, {}
-        for name, values in (self.felt if felt is None else felt).items():
-            one = self.instruments.each[name]
-            reading = (1.0 + one.gain) * values + one.offset + self.noise[name]
-            found[name] = np.round(np.round(reading / q) * q, 7)
-        return found
+        q, exact = self.instruments.resolution, self.exact(felt)
+        return {n: np.round(np.round((x + self.noise[n]) / q) * q, 7) for n, x in exact.items()}
+
+    def exact(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """The same without noise and steps."""
+        each = self.instruments.each
+        held = self.felt if felt is None else felt
+        return {name: (1.0 + each[name].gain) * x + each[name].offset for name, x in held.items()}
+
+
+def slower(instruments: Instruments, factor: float) -> Instruments:
+    """The same thermometers with all their lags times a factor."""
+    each = {name: replace(one, lag_s=factor * one.lag_s) for name, one in instruments.each.items()}
+    return replace(instruments, each=each)
 
 
 def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> Sensed:
     """The thermometers of one run."""
-    felt, noise = {}, {}
-    for name, one in instruments.each.items():
-        felt[name] = late(world.nodes[one.place], one.lag_s, world.sample_s)
-        noise[name] = instruments.noise * rng.standard_normal(len(world.time))
-    return Sensed(felt, noise, instruments)
+    noise = {name: instruments.noise * rng.standard_normal(len(world.time)) for name in instruments.each}
+    return Sensed(felt_by(instruments, world), noise, instruments)
+
+
+def felt_by(instruments: Instruments, world: World) -> dict[str, FloatArray]:
+    """What thermometers feel, by recorded name [degC]."""
+    each = instruments.each.items()
+    return {name: late(world.nodes[one.place], one.lag_s, world.sample_s) for name, one in each}
 
 
 def late(x: FloatArray, time_constant_s: float, step_s: float) -> FloatArray:

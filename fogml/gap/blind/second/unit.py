@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
 from fogml.gap.blind.frame import nominal
 from fogml.gap.blind.frame.form import Demands, Form
-from fogml.gap.blind.frame.record import SetUp, World
+from fogml.gap.blind.frame.record import FloatArray, SetUp, World
+from fogml.gap.blind.frame.strength import Scales
 from fogml.gap.blind.frame.unit import Unit, UnitRun
 from fogml.gap.blind.second.chamber import draw_chamber
 from fogml.gap.blind.second.noise import SlopedNoise, draw_noise
 from fogml.gap.blind.second.plant import Plant, draw_plant
 from fogml.gap.blind.second.programme import Programme, draw_programme, static_programme
-from fogml.gap.blind.second.sensors import draw_instruments, sense
+from fogml.gap.blind.second.sensors import Instruments, Sensed, draw_instruments, felt_by, sense, slower
 from fogml.gap.blind.second.world import happen
 
 _ANOTHER_DAY, _FALSE, _FALSE_SHARE = 1.2, 2.0, 0.12
 """Noise of the static run relative to the others': usually, and where that run is not of this set-up."""
+_LAG_D_PRIME = 1.0
+"""Largest d' of what the thermometers' own lags do to a replay: where nothing is missing, nothing shows."""
 
 
 def draw_unit(
@@ -60,7 +64,7 @@ def draw_unit(
         other = noise.of_another_day(rng, _FALSE if rng.random() < _FALSE_SHARE else _ANOTHER_DAY)
         quiet = run("static.csv", static_programme(rng, sample_s), other, len(names))
     stated = datetime(2026, 1, 5, 6, 0, tzinfo=UTC) + timedelta(hours=float(rng.uniform(0.0, 5000.0)))
-    return Unit(
+    unit = Unit(
         plant,
         constants,
         noise,
@@ -73,6 +77,34 @@ def draw_unit(
         quiet,
         shown=tuple(name for name in instruments.others if name in thermal[0].world.drives),
         first_day=stated.replace(microsecond=0) if rng.random() < 0.7 else None,
+    )
+    return _quick_enough(unit, instruments)
+
+
+def _quick_enough(unit: Unit, instruments: Instruments) -> Unit:
+    """The unit with thermometers so quick that what their lag alone does to a replay is lost in the noise."""
+
+    def falsified(run: UnitRun) -> FloatArray:
+        assert isinstance(run.sensed, Sensed)
+        replayed = nominal.output(unit.constants, unit.seen(run, run.sensed.exact()))
+        missed = unit.output(run) - replayed
+        return missed[unit.skipped :]
+
+    length = Scales(unit).projected().length([falsified(run) for run in unit.fit])
+    if length <= _LAG_D_PRIME:
+        return unit
+    quicker = slower(instruments, 0.8 * _LAG_D_PRIME / length)
+
+    def again(run: UnitRun) -> UnitRun:
+        assert isinstance(run.sensed, Sensed)
+        return replace(run, sensed=Sensed(felt_by(quicker, run.world), run.sensed.noise, quicker))
+
+    return replace(
+        unit,
+        instruments=quicker,
+        fit=tuple(again(run) for run in unit.fit),
+        held_out=tuple(again(run) for run in unit.held_out),
+        static=again(unit.static) if unit.static else None,
     )
 
 

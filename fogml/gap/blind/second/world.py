@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from fogml.gap.blind.frame.nominal import WINDOW_S, delta_of_record
 from fogml.gap.blind.frame.record import FloatArray, SetUp, World
 from fogml.gap.blind.second.chamber import air_of, humidity_of
 from fogml.gap.blind.second.plant import NAMES, Plant
@@ -11,7 +12,6 @@ from fogml.gap.blind.second.programme import Programme
 
 _FINE_S = 5.0
 _LONGEST_BEFORE_S = 9000.0
-_WINDOW_S = 64.0
 
 
 def happen(
@@ -28,7 +28,7 @@ def happen(
     """Run a programme."""
     per = max(int(np.ceil(sample_s / _FINE_S)), 1)
     fine = sample_s / per
-    wanted_s = max(min(-programme.powered_on, _LONGEST_BEFORE_S), 2.0 * _WINDOW_S + sample_s)
+    wanted_s = max(min(-programme.powered_on, _LONGEST_BEFORE_S), 2.0 * WINDOW_S + sample_s)
     before = int(np.ceil(wanted_s / sample_s)) * per
     count = round(programme.duration_s / sample_s)
     t: FloatArray = fine * np.arange(-before, count * per, dtype=np.float64)
@@ -36,7 +36,8 @@ def happen(
     air, compressor, heater = air_of(set_point, fine, chamber)
     c = plant.constants
     on = t - programme.powered_on
-    power = np.where(on >= 0.0, c.power_w + c.surge_w * np.exp(-np.maximum(on, 0.0) / c.surge_s), 0.0)
+    surge = c.surge * np.exp(-np.maximum(on, 0.0) / c.surge_s)
+    power = np.where(on >= 0.0, plant.power_w * (1.0 + surge), 0.0)
     supply = rng.choice([5.0, 15.0, 27.0]) - 0.02 * np.exp(-np.maximum(on, 0.0) / 1500.0)
     for start, stop, factor, step in programme.loads:
         inside = (t >= start) & (t < stop)
@@ -73,7 +74,8 @@ def happen(
         nodes={name: values[at] for name, values in full.items()},
         rates={name: per_minute * np.gradient(values)[at] for name, values in full.items()},
         shell_rates=per_minute * np.gradient(winding, axis=0)[at],
-        deltas={name: _delta(full[name], fine, at) for name in ("T_in", "T_out")},
+        # By the samples, as a replay has it: what a coarse interval hides of DeltaT is no effect.
+        deltas={name: delta_of_record(t[at], full[name][at]) for name in ("T_in", "T_out")},
         table_rate=table_rate,
         angle=angle,
         drives=drives,
@@ -84,14 +86,6 @@ def happen(
         since_first=since_first,
         past=past,
     )
-
-
-def _delta(x: FloatArray, step_s: float, at: np.ndarray) -> FloatArray:
-    """Mean of the last 64 s less that of the 64 s before, by trapezes."""
-    total = np.concatenate([[0.0], np.cumsum(0.5 * step_s * (x[1:] + x[:-1]))])
-    t = step_s * np.arange(len(x))
-    ends = [np.interp(t[at] - k * _WINDOW_S, t, total) for k in range(3)]
-    return np.asarray((ends[0] - 2.0 * ends[1] + ends[2]) / _WINDOW_S)
 
 
 def _field(

@@ -7,6 +7,7 @@ import numpy as np
 from fogml.gap.blind.frame.form import Additive, Demands, ScaleFactor, Shape
 from fogml.gap.blind.frame.record import FloatArray, World
 from fogml.gap.blind.second.memory import bouc_wen_general, faded, maxwell_slip, preisach, slab_lag
+from fogml.gap.blind.second.sensors import late
 
 _CLUSTER = 12
 
@@ -79,8 +80,8 @@ class LoopOfBoucWen(Additive):
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """-z over the can's side of the winding."""
-        keys = ("length", "exponent", "asymmetry")
-        return -bouc_wen_general(world.nodes["T_out"], *(shape[key] for key in keys), world.past)
+        length, exponent, asymmetry = shape["length"], shape["exponent"], shape["asymmetry"]
+        return -bouc_wen_general(world.nodes["T_out"], length, exponent, asymmetry, world.past)
 
 
 class ScaleLoopOfGrains(ScaleFactor):
@@ -176,8 +177,7 @@ class AnotherOrder(Additive):
         share = shape["base_share"]
         there = share * world.nodes["T_base"] + (1.0 - share) * world.nodes["T_can"]
         for key in ("first", "second"):
-            tau = shape[key]
-            there = faded(world.time, there, lambda t, tau=tau: 1.0 - np.exp(-t / tau)) + there[0]
+            there = late(there, shape[key], world.sample_s)
         return there - world.nodes["T_coil"]
 
 

@@ -27,8 +27,8 @@ class ThresholdSteps(Additive):
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Sum of the relays."""
         keys = range(int(shape["contacts"]))
-        parts = (np.array([shape[f"{name}_{k}"] for k in keys]) for name in ("at", "gap", "step"))
-        return preisach(world.nodes["T_can"], *parts, world.past)
+        at, gap, step = (np.array([shape[f"{name}_{k}"] for k in keys]) for name in ("at", "gap", "step"))
+        return preisach(world.nodes["T_can"], at, gap, step, world.past)
 
 
 class RandomSteps(Additive):
@@ -118,7 +118,7 @@ class BreathingLine(Additive):
         """sin times a slower sin."""
         turn = 2.0 * np.pi * world.time
         slow = np.sin(turn / shape["beat"] + shape["b"])
-        return slow * np.sin(turn / shape["period"] + shape["a"])
+        return np.asarray(slow * np.sin(turn / shape["period"] + shape["a"]))
 
 
 class Condensation(Additive):
@@ -130,7 +130,7 @@ class Condensation(Additive):
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Dew by the excess of the difference, drying away."""
         falls = np.maximum(world.nodes["T_chamber"] - world.nodes["T_coil"] - shape["below"], 0.0)
-        return late(falls, shape["dries"], world.sample_s) ** 0.7
+        return np.asarray(late(falls, shape["dries"], world.sample_s) ** 0.7)
 
 
 class HeatedTelegraph(Additive):
@@ -143,7 +143,7 @@ class HeatedTelegraph(Additive):
         """-1 or 1."""
         quick = np.exp(shape["per_ten"] * (world.nodes["T_board"] - 25.0) / 10.0)
         met = rng.random(len(world.time)) < np.minimum(world.sample_s * quick / shape["dwell"], 0.5)
-        return 1.0 - 2.0 * ((np.cumsum(met) + int(rng.random() < 0.5)) % 2)
+        return np.asarray(1.0 - 2.0 * ((np.cumsum(met) + int(rng.random() < 0.5)) % 2))
 
 
 class NarrowComb(Additive):
