@@ -53,7 +53,9 @@ def make(
     reality: Annotated[
         str | None,
         typer.Option(
-            "--reality", metavar="NAME", help="first (default), another one, or mix for all of them in turn."
+            "--reality",
+            metavar="NAME",
+            help="first (default), second, mix for all in turn, or same-twin for a shipped twin's own runs.",
         ),
     ] = None,
     leave_one_out: Annotated[

@@ -41,6 +41,8 @@ class CaseFiles:
         Ids that are no candidates.
     seed
         Of what a method draws.
+    twin
+        Name of the shipped twin that the runs are held against.
     """
 
     name: str
@@ -49,6 +51,7 @@ class CaseFiles:
     noise: Path | None
     without: tuple[str, ...]
     seed: int = 0
+    twin: str = "nominal"
 
 
 @dataclass(frozen=True)
@@ -107,7 +110,11 @@ def case_files(folder: Path, seed: int = 0) -> CaseFiles:
     without = options.get("without", [])
     if not isinstance(without, list) or not all(isinstance(id, str) for id in without):
         raise InputError(f"{folder / 'options.json'}: key 'without' must list ids of effects")
-    return CaseFiles(folder.name, fit, held_out, static if static.is_file() else None, tuple(without), seed)
+    twin = options.get("twin", "nominal")
+    if not isinstance(twin, str):
+        raise InputError(f"{folder / 'options.json'}: key 'twin' must be the name of a shipped twin")
+    noise = static if static.is_file() else None
+    return CaseFiles(folder.name, fit, held_out, noise, tuple(without), seed, twin)
 
 
 def read_json(path: Path) -> dict[str, Any]:

@@ -12,7 +12,8 @@ from pathlib import Path
 
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.relatives import Likeness
-from fogml.gap.blind.truth import Truth, read_contributions, read_truth, write_sums, write_truth
+from fogml.gap.blind.sums import write_sums
+from fogml.gap.blind.truth import Truth, read_contributions, read_truth, write_truth
 from fogml.processes import in_processes
 
 

@@ -9,8 +9,9 @@ from pathlib import Path
 from fogml.errors import InputError
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.plan import Plan, Strata, plans
-from fogml.gap.blind.realities import FIRST
-from fogml.gap.blind.truth import read_truth, write_sums
+from fogml.gap.blind.realities import FIRST, SAME_TWIN
+from fogml.gap.blind.sums import write_sums
+from fogml.gap.blind.truth import read_truth
 from fogml.processes import in_processes
 
 
@@ -55,7 +56,7 @@ def make_cases(
     least_d_prime
         Effects are drawn from the strata of d' that begin there or above; from all if 0.
     of
-        A reality's name, or ``mix`` for all of them in turn.
+        A reality's name, ``mix`` for all of them in turn, or ``same-twin`` for a twin's own runs.
     d_prime
         Bounds of d' to draw within, in place of the strata.
 
@@ -96,10 +97,12 @@ def _make(cases: Path, truth: Path, seed: int, sample_s: float, plan: Plan) -> N
     from threadpoolctl import threadpool_limits
 
     from fogml.gap.blind.case import make_case
+    from fogml.gap.blind.same_twin import make_same_twin
 
     # One thread a process; sums then also come out the same on any machine's number of cores.
     with threadpool_limits(limits=1):
-        make_case(cases, truth, plan, seed, sample_s)
+        make = make_same_twin if plan.reality == SAME_TWIN else make_case
+        make(cases, truth, plan, seed, sample_s)
 
 
 def _is_there(folder: BlindFolder, plan: Plan, seed: int, sample_s: float) -> bool:

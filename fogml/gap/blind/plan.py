@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.blind.realities import FIRST, chosen, reality
+from fogml.gap.blind.realities import FIRST, SAME_TWIN, chosen, reality
 from fogml.gap.blind.truth import KINDS, Kind
 
 PER_BLOCK: dict[Kind, int] = {
@@ -105,7 +105,8 @@ def plans(
     least_d_prime
         Only strata of d' that begin there or above.
     of
-        A reality's name, or ``mix`` for all of them in turn, each with the plans that it has alone.
+        A reality's name, ``mix`` for all of them in turn, each with the plans that it has alone, or
+        ``same-twin``.
     d_prime
         Bounds of d' in place of the strata.
 
@@ -128,7 +129,13 @@ def plans(
 
 
 def _of_one(count: int, seed: int, kinds: Sequence[str] | None, strata: Strata, of: str) -> list[Plan]:
-    """Plans of one reality."""
+    """Plans of one reality; a twin's own runs lack nothing."""
+    if of == SAME_TWIN:
+        if kinds not in (None, ["nothing"]):
+            raise InputError(f"{of}: nothing is missing there; leave kinds out")
+        rng = np.random.default_rng([seed, 0x7715])
+        drawn = ((int(rng.integers(1, 3)), bool(rng.random() < 0.6)) for _ in range(count))
+        return [Plan(1, "nothing", None, 0, (), runs, static, strata, False, of) for runs, static in drawn]
     held = reality(of)
     mix = kinds is None and strata == STRATA
     block = [k for k, n in PER_BLOCK.items() if kinds is None or k in kinds for _ in range(n)]

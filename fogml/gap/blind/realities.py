@@ -11,6 +11,8 @@ FIRST = "first"
 """What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
 MIX = "mix"
 """All of them in turn, case by case."""
+SAME_TWIN = "same-twin"
+"""No reality: a shipped twin's own runs, to be diagnosed against it."""
 REALITIES = (FIRST, "second")
 """Their names, each that of a package beside this module."""
 
@@ -31,6 +33,7 @@ def chosen(name: str) -> tuple[str, ...]:
     """
     if name == MIX:
         return REALITIES
-    if name not in REALITIES:
-        raise InputError(f"there is no reality '{name}'; choose one of {', '.join((*REALITIES, MIX))}")
+    if name not in (*REALITIES, SAME_TWIN):
+        choices = ", ".join((*REALITIES, MIX, SAME_TWIN))
+        raise InputError(f"there is no reality '{name}'; choose one of {choices}")
     return (name,)

@@ -18,7 +18,8 @@ from fogml.gap.blind.scoring.marks_file import Marks, part_of
 from fogml.gap.blind.scoring.table import BY_KEY
 from fogml.gap.blind.scoring.values import score_values
 from fogml.gap.blind.seeds import check_use
-from fogml.gap.blind.truth import SUMS, Truth, check_sums, read_truth
+from fogml.gap.blind.sums import SUMS, check_sums
+from fogml.gap.blind.truth import Truth, read_truth
 from fogml.processes import in_processes
 
 

@@ -6,7 +6,6 @@ run, and ``truth/SHA256SUMS`` the hashes of all of them, in the form that ``sha2
 
 from __future__ import annotations
 
-import hashlib
 import math
 import zlib
 from collections.abc import Mapping
@@ -26,7 +25,6 @@ from fogml.signals.noise_model import NoiseModel
 FloatArray = NDArray[np.float64]
 
 SCHEMA = "fogml.blind_truth/1"
-SUMS = "SHA256SUMS"
 Kind = Literal[
     "nothing",
     "one",
@@ -287,37 +285,6 @@ def read_contributions(path: Path) -> dict[tuple[str, int], FloatArray]:
         raise InputError(f"{path}: damaged, or no file of contributions; make the cases anew") from error
 
 
-def write_sums(folder: Path) -> None:
-    """Write ``SHA256SUMS`` over every truth in the folder."""
-    files = sorted(path for path in folder.iterdir() if path.suffix in (".json", ".npz"))
-    with whole_file(folder / SUMS) as partial:
-        lines = [f"{_digest(path)}  {path.name}\n" for path in files]
-        partial.write_text("".join(lines), encoding="ascii")
-
-
-def check_sums(folder: Path) -> int:
-    """How many truths there are, once all of them have the hashes that were written.
-
-    Raises
-    ------
-    InputError
-        If the list is missing, a file changed, is missing, or is not listed.
-    """
-    path = folder / SUMS
-    if not path.is_file():
-        raise InputError(f"{path}: no such file; the truth must be hashed when it is made")
-    lines = [line.partition("  ") for line in path.read_text(encoding="utf-8", errors="replace").splitlines()]
-    stated = {name: digest for digest, _, name in lines}
-    held = {file.name for file in folder.iterdir() if file.suffix in (".json", ".npz")}
-    for name in sorted(held ^ set(stated)):
-        what = "is not listed" if name in held else "is listed, but missing"
-        raise InputError(f"{folder / name}: {what} in {SUMS}; make the cases anew")
-    for name, digest in stated.items():
-        if _digest(folder / name) != digest:
-            raise InputError(f"{folder / name}: changed since it was hashed; make the cases anew")
-    return sum(name.endswith(".json") for name in held)
-
-
 def _key(run: str, place: int) -> str:
     return f"{place}|{run}"
 
@@ -325,8 +292,3 @@ def _key(run: str, place: int) -> str:
 def _parsed(key: str) -> tuple[str, int]:
     place, run = key.split("|", 1)
     return run, int(place)
-
-
-def _digest(path: Path) -> str:
-    with path.open("rb") as file:
-        return hashlib.file_digest(file, "sha256").hexdigest()

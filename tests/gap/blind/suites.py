@@ -9,17 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from fogml.gap.blind.folders import BlindFolder
-from fogml.gap.blind.truth import (
-    Amount,
-    Kind,
-    Runs,
-    Segment,
-    TrueClosed,
-    TrueEffect,
-    Truth,
-    write_sums,
-    write_truth,
-)
+from fogml.gap.blind.sums import write_sums
+from fogml.gap.blind.truth import Amount, Kind, Runs, Segment, TrueClosed, TrueEffect, Truth, write_truth
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
 from fogml.twin.twin_file import load_twin

@@ -15,7 +15,8 @@ from fogml.gap.blind.code_state import code_state
 from fogml.gap.blind.folders import BlindFolder
 from fogml.gap.blind.scoring.marks_file import MARKS
 from fogml.gap.blind.seeds import FINAL_FROM, uses
-from fogml.gap.blind.truth import check_sums, read_truth
+from fogml.gap.blind.sums import check_sums
+from fogml.gap.blind.truth import read_truth
 from tests.gap.blind.suites import HandMade, make_suite
 from tests.gap.blind.test_parts import WHOLE, marks_of, written
 

@@ -15,7 +15,8 @@ from fogml.gap.blind.first.catalogue import INVENTED, REALITY
 from fogml.gap.blind.folders import BlindFolder, case_files
 from fogml.gap.blind.make import make_cases
 from fogml.gap.blind.plan import plans
-from fogml.gap.blind.truth import check_sums, read_contributions, read_truth
+from fogml.gap.blind.sums import check_sums
+from fogml.gap.blind.truth import read_contributions, read_truth
 from fogml.runs.reading import read_run
 
 SEED, COUNT, SAMPLE_S = 11, 8, 30.0

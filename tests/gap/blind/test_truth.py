@@ -11,16 +11,14 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.blind.seeds import FINAL_FROM, check_use, record_use, uses
+from fogml.gap.blind.sums import SUMS, check_sums, write_sums
 from fogml.gap.blind.truth import (
-    SUMS,
     Runs,
     TrueEffect,
     Truth,
-    check_sums,
     read_contributions,
     read_truth,
     stratum,
-    write_sums,
     write_truth,
 )
 
