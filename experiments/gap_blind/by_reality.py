@@ -1,8 +1,8 @@
 """The diagnosis on a small suite of each reality: every wanted figure by reality, and by distance of form.
 
-``python -m experiments.gap_blind.by_reality DIR`` makes, answers and scores the parts of ``by_reality.yaml`` in
-DIR and writes ``by_reality.json`` and ``by_reality.md`` of all that are there; an interrupted call goes on where it
-was. Each reality alone: ``--reality NAME``; what is left out then stands as it was found before.
+``python -m experiments.gap_blind.by_reality DIR`` makes, answers and scores the parts of ``by_reality.yaml``
+in DIR and writes ``by_reality.json`` and ``by_reality.md`` of all that are there; an interrupted call goes on
+where it was. Each reality alone: ``--reality NAME``; the others then stand as they were found before.
 """
 
 from __future__ import annotations
@@ -105,13 +105,14 @@ def _same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
 
 def _page(values: Mapping[str, Any]) -> str:
     names = list(values["by_reality"])
+    places = range(len(values["by_reality"][names[0]]))
     counted = ", ".join(f"{name} {count}" for name, count in values["cases"].items())
     return "\n".join(
         [
             "# The diagnosis by reality",
             "",
-            f"Synthetic cases at 10 s sampling, method {values['method']}, seed {values['seed']}, which is one to "
-            f"develop on: no final figures. Cases: {counted}. Each figure with its 95 % interval (Wilson for "
+            f"Synthetic cases at 10 s sampling, method {values['method']}, seed {values['seed']}, which is one "
+            f"to develop on: no final figures. Cases: {counted}. Each figure with its 95 % interval (Wilson for "
             "shares) and what it rests on; wanted figures ask for 400 cases each, and none rests on as many"
             " here. Forms of the first reality lie near the catalogue's, those of the others were drawn "
             "without asking how near. A far form that is called by its name is right; called unknown it is "
