@@ -111,19 +111,16 @@ def _page(values: Mapping[str, Any]) -> str:
         [
             "# The diagnosis by reality",
             "",
-            f"Synthetic cases at 10 s sampling, method {values['method']}, seed {values['seed']}, which is one "
-            f"to develop on: no final figures. Cases: {counted}. Each figure with its 95 % interval (Wilson for "
-            "shares) and what it rests on; wanted figures ask for 400 cases each, and none rests on as many"
-            " here. Forms of the first reality lie near the catalogue's, those of the others were drawn "
-            "without asking how near. A far form that is called by its name is right; called unknown it is "
-            "a miss.",
+            f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is one to "
+            f"develop on: no final figures. Cases: {counted}. Each figure with its 95 % interval "
+            "(Wilson's for shares) and what it rests on; wanted figures ask for 400 cases each, and none "
+            "rests on as many here. Forms of the first reality lie near the catalogue's, those of the others "
+            "were drawn without asking how near. A far form that is called by its name is right; called "
+            "unknown it is a miss.",
             "",
             f"| figure | wanted | {' | '.join(names)} |",
             f"|---|---:|{'---:|' * len(names)}",
-            *(
-                _line(values["by_reality"], place, names)
-                for place in range(len(values["by_reality"][names[0]]))
-            ),
+            *(_line(values["by_reality"], place, names) for place in places),
             "",
             "## Single effects by distance of form",
             "",
