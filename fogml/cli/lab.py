@@ -1,4 +1,4 @@
-"""``fogml lab``: procedures of a laboratory, misalignment and north seeking."""
+"""``fogml lab``: procedures of a laboratory: misalignment, tests on a rate table, north seeking."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ app = typer.Typer(**options.APP_SETTINGS, no_args_is_help=True)
 
 @app.callback()
 def lab() -> None:
-    """Procedures of a laboratory: misalignment on a rate table, north seeking."""
+    """Procedures of a laboratory: misalignment, tests on a rate table, north seeking."""
 
 
 @app.command()
@@ -67,6 +67,78 @@ def misalignment(
         },
     )
     misalignment_and_write(settings, Terminal(as_json, quiet))
+
+
+@app.command()
+def rate(
+    runs: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="RUN...", help="Runs on a rate table, with the column rate as commanded."),
+    ] = None,
+    twin: Annotated[
+        str | None, typer.Option("--twin", metavar="NAME|FILE", help="Test a twin in place of recorded runs.")
+    ] = None,
+    greatest: Annotated[
+        float | None,
+        typer.Option("--greatest", metavar="DEG/S", help="With --twin: greatest rate tested (500)."),
+    ] = None,
+    noise: Annotated[
+        bool | None,
+        typer.Option("--noise/--no-noise", help="With --twin: its noise too; else its effects alone."),
+    ] = None,
+    settle: Annotated[
+        float | None,
+        typer.Option("--settle", metavar="S", help="Left out at the begin of each rate (2 samples)."),
+    ] = None,
+    answers: Annotated[
+        float | None,
+        typer.Option("--answers", metavar="SHARE", help="Share of the expected output that counts (0.5)."),
+    ] = None,
+    dead: Annotated[
+        float | None,
+        typer.Option("--dead", metavar="SHARE", help="Share of the expected change that is dead (0.1)."),
+    ] = None,
+    range_error: Annotated[
+        float | None,
+        typer.Option("--range-error", metavar="SHARE", help="Deviation that ends the range (0.01)."),
+    ] = None,
+    small: Annotated[
+        float | None,
+        typer.Option("--small", metavar="SHARE", help="Of the greatest rate: rates about zero (0.02)."),
+    ] = None,
+    repair: options.Repair = None,
+    repair_anyway: options.RepairAnyway = None,
+    out: options.Out = None,
+    seed: options.Seed = None,
+    config: options.Config = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Scale factor, range, threshold, dead zone, resolution, bandwidth, slew, temperature sensitivity.
+
+    From runs that hold any of the tests, or of a twin (--twin; synthetic). With --out, writes rate.json,
+    rate.html and lab-rate.config.yaml.
+    """
+    from fogml.cli.lab_rate_job import RateSettings, rate_and_write
+
+    settings = RateSettings.gather(
+        config,
+        {
+            "runs": runs,
+            "twin": twin,
+            "greatest": greatest,
+            "noise": noise,
+            "settle": settle,
+            "answers": answers,
+            "dead": dead,
+            "range_error": range_error,
+            "small": small,
+            "repair": options.repairing(repair, repair_anyway),
+            "out": str(out) if out else None,
+            "seed": seed,
+        },
+    )
+    rate_and_write(settings, Terminal(as_json, quiet))
 
 
 @app.command()

@@ -74,6 +74,8 @@ class TwinOnMeans:
             powered_on_s=inputs.powered_on_s,
             power_ons_s=inputs.power_ons_s,
             coil=inputs.coil,
+            light=inputs.light,
+            epoch_s=inputs.epoch_s,
             drives={name: mean(drive) for name, drive in inputs.drives.items()},
             rate_window_s=inputs.rate_window_s,
             hindsight=inputs.hindsight,

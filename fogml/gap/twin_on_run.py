@@ -76,7 +76,7 @@ class TwinOnRun:
             )
         self._twin, self._run = twin, run
         self._replayer = Replayer(run)
-        self._recorded = replace(self._replayer.recorded, coil=twin.coil)
+        self._recorded = replace(self._replayer.recorded, coil=twin.coil, light=twin.light)
         self._windows = self._replayer.windows
         self._missing = set(STAND_INS) - set(self._recorded.temperatures) - {"T"}
         nodes = self._nodes(twin.network)

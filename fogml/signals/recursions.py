@@ -68,6 +68,31 @@ def play_kernel(x: FloatArray, half_width: float, state: float) -> tuple[FloatAr
 
 
 @kernel()
+def slew_kernel(
+    time: FloatArray, x: FloatArray, fastest: float, last_time: float, state: float
+) -> FloatArray:
+    """What follows x no faster than `fastest` [per s]; a NaN `last_time` starts with x."""
+    n = len(x)
+    out = np.empty(n)
+    y, before = state, last_time
+    for i in range(n):
+        # In differences, so that what keeps up is x exactly.
+        if math.isnan(before):
+            y = x[i]
+        else:
+            most = fastest * (time[i] - before)
+            if x[i] - y > most:
+                y = y + most
+            elif y - x[i] > most:
+                y = y - most
+            else:
+                y = x[i]
+        out[i] = y
+        before = time[i]
+    return out
+
+
+@kernel()
 def window_steps_kernel(
     time: FloatArray, x: FloatArray, window: float, first: int
 ) -> tuple[FloatArray, FloatArray]:

@@ -16,6 +16,8 @@ from fogml.twin.memory import Memory
 from fogml.twin.plant.standard import standard_network
 
 SAMPLE_S = 10.0
+QUICKER = 1e-4
+"""Of the programme's clock: samples of 1 ms."""
 BLOCK_EDGES = (0.001, 0.13, 0.1305, 0.5, 0.77)
 """Where the blocks of a blockwise check begin, as shares of the run."""
 SCRAMBLED = (*STAND_INS, *REST, *SET_UP)
@@ -28,7 +30,8 @@ def standard_inputs() -> dict[str, Inputs]:
     ``programme`` has every node and drive, turns, a thermal shock, power-on at the start and a
     power cycle; ``horizontal`` is the same with the input axis to the east; ``only T`` is a
     recording with one sensor and no facts; ``two faces`` one with ``T_in`` and ``T_out``;
-    ``irregular`` has uneven steps and gaps; ``still`` never moves.
+    ``irregular`` has uneven steps and gaps; ``still`` never moves; ``quick`` is the programme in ten
+    thousandth of its time, for what only fast changes show.
     """
     programme = _programme()
     bare = replace(programme, drives={}, facts=Facts(), powered_on_s=-np.inf, power_ons_s=(), earth_deg_h=0.0)
@@ -44,6 +47,7 @@ def standard_inputs() -> dict[str, Inputs]:
         "only T": replace(bare, temperatures={"T": nodes["T"]}, slopes={"T": programme.slopes["T"]}),
         "two faces": replace(bare, temperatures={name: nodes[name] for name in ("T_in", "T_out")}),
         "irregular": rows(programme, keep),
+        "quick": replace(programme, time=QUICKER * programme.time, power_ons_s=(QUICKER * 27000.0,)),
         "still": replace(bare, temperatures=still, table_rate=np.zeros(len(programme))),
     }
 
@@ -58,8 +62,10 @@ def _programme() -> Inputs:
     nodes = {name: np.ascontiguousarray(values) for name, values in _nodes(time, chamber).items()}
     nodes["T"] = nodes["T_in"]
     nodes["T_leads"] = 0.5 * (nodes["T_hub"] + nodes["T_electronics"])
+    nodes["T_top"] = 0.5 * (nodes["T_case"] + nodes["T_out"])
+    nodes["T_bottom"] = 0.5 * (nodes["T_plate"] + nodes["T_out"])
     table_rate = np.zeros(n)
-    for start, rate in ((60, 10.0), (900, -10.0), (906, 10.0), (2300, 2e-3), (2310, -2e-3), (2400, -100.0)):
+    for start, rate in ((60, 10.0), (900, -10.0), (906, 10.0), (2300, 2e-3), (2310, -2e-3), (2400, -600.0)):
         table_rate[start : start + 6] = rate
     wave = np.sin(2.0 * np.pi * time / 1800.0)
     drives = {

@@ -116,7 +116,7 @@ def _check_needs(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
                 signature(effect, base, shape),
                 signature(effect, scrambled(base, keep=others, value=3.0), shape),
             )
-            for base in (given, bare)
+            for base in (given, bare, inputs["quick"])
         )
         assert touched, f"{effect.id} states that it needs '{need}', which makes no difference to it"
 
@@ -165,9 +165,9 @@ def _check_shape(effect: Effect, inputs: Mapping[str, Inputs]) -> None:
         least, most = quantity.limits
         shape[quantity.name] = float(np.clip(shape[quantity.name], least + step, most - step))
         matters = False
-        for name in ("programme", "horizontal", "only T"):
-            if matters and name == "only T":
-                # A poorer recording counts where others leave a parameter no say.
+        for name in ("programme", "horizontal", "only T", "quick"):
+            if matters and name in ("only T", "quick"):
+                # A poorer recording, or a faster one, counts where others leave a parameter no say.
                 continue
             coarse = _slope(effect, inputs[name], shape, quantity.name, step)
             fine = _slope(effect, inputs[name], shape, quantity.name, 0.5 * step)

@@ -19,18 +19,15 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
-from fogml.twin.optics import DEG_H, REFERENCE_COIL, Coil
-from fogml.twin.plant.network import ThermalNetwork
+from fogml.twin.optics import DEG_H, REFERENCE_COIL, WINDINGS, Coil, Winding
+from fogml.twin.plant.network import PlantState, ThermalNetwork
 
-Winding = Literal["cylinder", "dipole", "quadrupole", "octupole"]
-WINDINGS: tuple[Winding, ...] = get_args(Winding)
 _PER_MINUTE = 1.0 / 60.0
 # Which half of the fibre each layer belongs to, from the innermost outwards, over and over.
 _HALVES = {"dipole": "AB", "quadrupole": "ABBA", "octupole": "ABBABAAB"}
@@ -143,6 +140,11 @@ class LayeredCoil:
         if self.layers < 3 or not (self.pitch > 0.0 and self.diffusivity > 0.0):
             raise InputError("a layered coil has at least 3 layers, a pitch and a diffusivity above 0")
 
+    @classmethod
+    def of(cls, coil: Coil) -> LayeredCoil:
+        """A unit's coil, wound as its facts say."""
+        return cls(coil.winding, coil.layers, coil.pitch, coil.diffusivity, coil)
+
     @property
     def settling_s(self) -> float:
         """Time constant of the slowest change of the profile h**2 / (pi**2 kappa) [s]."""
@@ -157,7 +159,9 @@ class LayeredCoil:
         conductance = self.diffusivity / self.pitch**2
         return ThermalNetwork(dict.fromkeys(inner, 1.0), dict.fromkeys(pairwise(chain), conductance))
 
-    def temperatures(self, time: FloatArray, inner: FloatArray, outer: FloatArray) -> FloatArray:
+    def temperatures(
+        self, time: FloatArray, inner: FloatArray, outer: FloatArray, state: PlantState | None = None
+    ) -> FloatArray:
         """Temperature of each layer [degC], innermost first, shape (n, layers).
 
         Parameters
@@ -166,17 +170,29 @@ class LayeredCoil:
             Time [s], shape (n,).
         inner, outer
             Temperatures of the two faces [degC], shape (n,); linear between the samples.
+        state
+            Left by the block before, and taken along; at rest where fresh.
         """
-        nodes = self.network.temperatures(time, {"T_in": inner, "T_out": outer})
+        nodes = self.network.temperatures(time, {"T_in": inner, "T_out": outer}, state=state)
         between = [nodes[name] for name in self.network.nodes]
         return np.column_stack([inner, *between, outer])
+
+    def travelled(
+        self, time: FloatArray, inner: FloatArray, outer: FloatArray, state: PlantState | None = None
+    ) -> FloatArray:
+        """The rate error's integral over time [deg/h min], shape (n,); parameters as in `temperatures`.
+
+        Its rate per minute is the error: the layers' temperatures with the winding's weights.
+        """
+        weights = layer_weights(self.winding, self.layers, self.coil)
+        return np.asarray(self.temperatures(time, inner, outer, state) @ weights)
 
     def drift(self, time: FloatArray, inner: FloatArray, outer: FloatArray) -> FloatArray:
         """Rate error of the winding [deg/h], shape (n,); parameters as in `temperatures`.
 
         The mean over each step, 0 at the first sample.
         """
-        weighted = self.temperatures(time, inner, outer) @ layer_weights(self.winding, self.layers, self.coil)
+        weighted = self.travelled(time, inner, outer)
         drift = np.zeros(len(time))
         drift[1:] = 60.0 * np.diff(weighted) / np.diff(time)
         return drift

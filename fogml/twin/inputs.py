@@ -15,6 +15,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
+from fogml.twin.light import Light
 from fogml.twin.memory import Memory
 from fogml.twin.optics import REFERENCE_COIL, Coil
 
@@ -45,6 +46,8 @@ STAND_INS = {
     "T_hub": ("T_in", "T"),
     "T_chamber": ("T_case", "T_out", "T"),
     "T_plate": ("T_chamber", "T_case", "T_out", "T"),
+    "T_top": ("T_out", "T"),
+    "T_bottom": ("T_out", "T"),
     "T_leads": (),
 }
 """The nearest places, nearest first, for one that neither recording nor plant gives.
@@ -92,8 +95,10 @@ class Inputs:
         Whether the recorded angle may begin anew after a turn.
     hindsight
         Whether these are all samples of a recording, so that a rate may look ahead as far as back.
-    coil
-        The unit's coil, for what follows from its optics.
+    coil, light
+        The unit's coil, for what follows from its optics, and its light at the receiver.
+    epoch_s
+        Where `time` begins, after the unit's first run began [s].
     output
         The output that the effect meets [deg/h], shape (n,); for loop, sensor and logger effects.
     slopes
@@ -119,6 +124,8 @@ class Inputs:
     angle_begins_anew: bool = False
     hindsight: bool = False
     coil: Coil = REFERENCE_COIL
+    light: Light = field(default_factory=Light)
+    epoch_s: float = 0.0
     output: FloatArray | None = None
     slopes: Mapping[str, FloatArray] = field(default_factory=dict)
     memory: Memory = field(default_factory=Memory)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, TypeVar
+
 import numpy as np
 
 from fogml.runs.run import FloatArray
 
+Kept = TypeVar("Kept")
 _NAN = float("nan")
 
 
@@ -17,7 +21,7 @@ class Memory:
 
     def __init__(self) -> None:
         self._states: dict[str, tuple[float, ...]] = {}
-        self._generators: dict[str, np.random.Generator] = {}
+        self._kept: dict[str, Any] = {}
         self._histories: dict[str, tuple[FloatArray, FloatArray]] = {}
 
     def lag(self, key: str, time: FloatArray, x: FloatArray, time_constant: float | FloatArray) -> FloatArray:
@@ -88,11 +92,11 @@ class Memory:
         self._states[key] = (float(out[-1]) if len(out) else before,)
         return np.asarray(out)
 
-    def previous(self, key: str, x: FloatArray) -> FloatArray:
-        """x one sample earlier; the first sample stands in for the one before it; shape (n,)."""
+    def previous(self, key: str, x: FloatArray, first: float | None = None) -> FloatArray:
+        """x one sample earlier, shape (n,); before the first one it was `first`, or that sample if None."""
         if len(x) == 0:
             return np.empty(0)
-        (before,) = self._states.get(key, (float(x[0]),))
+        (before,) = self._states.get(key, (float(x[0]) if first is None else first,))
         self._states[key] = (float(x[-1]),)
         return np.concatenate([[before], x[:-1]])
 
@@ -116,11 +120,27 @@ class Memory:
 
     def generator(self, key: str, seed: int) -> np.random.Generator:
         """A generator of this name out of a seed's, which goes on from block to block."""
-        if key not in self._generators:
-            from fogml.twin.noise import stream
+        from fogml.twin.noise import stream
 
-            self._generators[key] = stream(seed, key)
-        return self._generators[key]
+        return self.kept(key, lambda: stream(seed, key))
+
+    def kept(self, key: str, make: Callable[[], Kept]) -> Kept:
+        """What `make` gave when this was first asked for, which goes on from block to block."""
+        if key not in self._kept:
+            self._kept[key] = make()
+        found: Kept = self._kept[key]
+        return found
+
+    def slew(self, key: str, time: FloatArray, x: FloatArray, fastest: float) -> FloatArray:
+        """What follows x no faster than `fastest` [per s], at the first sample with it; shape (n,)."""
+        from fogml.signals.recursions import slew_kernel
+
+        last_time, state = self._states.get(key, (_NAN, _NAN))
+        if len(x) == 0:
+            return np.empty(0)
+        out = slew_kernel(time, np.asarray(x, dtype=np.float64), fastest, last_time, state)
+        self._states[key] = (float(time[-1]), float(out[-1]))
+        return np.asarray(out)
 
     def first(self, key: str, x: FloatArray) -> float:
         """The very first sample of x, of all blocks; NaN before there is one."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
-from typing import Literal, TypeVar
+from typing import Literal, TypeVar, get_args
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
@@ -22,6 +22,8 @@ LIGHT_M_S = 299_792_458.0
 ELECTRON_C = 1.602176634e-19
 BOLTZMANN_J_K = 1.380649e-23
 Spectrum = Literal["gaussian", "flat"]
+Winding = Literal["cylinder", "dipole", "quadrupole", "octupole"]
+WINDINGS: tuple[Winding, ...] = get_args(Winding)
 _COHERENCE: dict[Spectrum, float] = {"gaussian": 2.0 * math.sqrt(2.0 * math.log(2.0) / math.pi), "flat": 2.0}
 DEG_H = math.pi / 180.0 / 3600.0
 """One deg/h in rad/s."""
@@ -39,6 +41,10 @@ class Coil:
         Mean wavelength in vacuum [m].
     index, index_slope, expansion
         Refractive index n, dn/dT [1/K] and expansion alpha of the fibre [1/K].
+    winding, layers
+        How it is wound, and in how many layers.
+    pitch, diffusivity
+        Distance of neighbouring layers [m], and how heat goes across them [m**2/s].
     """
 
     length: float = 1000.0
@@ -47,10 +53,16 @@ class Coil:
     index: float = 1.4525
     index_slope: float = 0.97e-5
     expansion: float = 0.55e-6
+    winding: Winding = "quadrupole"
+    layers: int = 32
+    pitch: float = 0.25e-3
+    diffusivity: float = 2e-7
 
     def __post_init__(self) -> None:
         for entry in fields(self):
             value = getattr(self, entry.name)
+            if entry.name == "winding":
+                continue
             lowest = -math.inf if entry.name in ("index_slope", "expansion") else 0.0
             if not (math.isfinite(value) and value > lowest):
                 raise InputError(f"coil: {entry.name} is {value:g}; it must be a number above {lowest:g}")
@@ -153,6 +165,12 @@ class Receiver:
     responsivity: float = 0.9
     resistance: float = 100e3
     temperature_k: float = 300.0
+
+    def __post_init__(self) -> None:
+        for entry in fields(self):
+            value = getattr(self, entry.name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise InputError(f"receiver: {entry.name} is {value:g}; it must be a number above 0")
 
     def angle_random_walk(self, coil: Coil, power: float, modulation_depth: float) -> float:
         """Angle random walk [deg/sqrt(h)] from shot, thermal and excess noise.

@@ -241,7 +241,7 @@ class Replayer:
                 self._given[around] = _Given(around, given, given)
             return self._given[around]
         changes = tuple((d, s.amplitude, s.key) for d, s in twin.thermal)
-        key = (twin.plant, changes, around)
+        key = (twin.plant, changes, around, twin.network.names)
         if key not in self._given:
             nodes = estimate_nodes(
                 twin.network,
@@ -260,17 +260,18 @@ class Replayer:
         return self._given[key]
 
     def _around(self, twin: Twin) -> tuple[Hashable, ...]:
-        """What of a twin is an input: its coil, and the field about it where none is recorded."""
+        """What of a twin is an input: coil and light, and the field about it where none is recorded."""
         outside, fields = twin.surroundings, {"B_x", "B_y", "B_z"}
         asked = any(fields & set(declared.needs) for declared, _ in twin.on)
+        unit = (twin.coil, twin.light)
         if not asked or fields & set(self.recorded.drives):
-            return (twin.coil,)
-        return twin.coil, outside.horizontal_field, outside.vertical_field
+            return unit
+        return *unit, outside.horizontal_field, outside.vertical_field
 
     def surrounded(self, twin: Twin, recorded: Inputs) -> Inputs:
         """The recorded inputs with what `_around` tells."""
-        given, outside = replace(recorded, coil=twin.coil), twin.surroundings
-        if len(self._around(twin)) == 1:
+        given, outside = replace(recorded, coil=twin.coil, light=twin.light), twin.surroundings
+        if len(self._around(twin)) == 2:
             return given
         angle = given.afresh().angle_deg
         field = earth_field(given.facts, angle, outside.horizontal_field, outside.vertical_field)

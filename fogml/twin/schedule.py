@@ -11,6 +11,7 @@ from fogml.twin.steps import (
     SWITCHED,
     Action,
     Hold,
+    Oscillate,
     Ramp,
     Repeat,
     Setting,
@@ -22,7 +23,7 @@ from fogml.twin.steps import (
     duration_text,
     number_text,
 )
-from fogml.twin.table import Table
+from fogml.twin.table import Table, Wave
 
 _REST: dict[Switched, float] = {"power": 1.0, "fan": 1.0, "yaw": 0.0, "radiation": 0.0}
 _SLACK_S = 1e-6
@@ -56,6 +57,8 @@ class Schedule:
         Table rate [deg/s], linear in between, and 0 after the last.
     table_angle
         Table angle [deg] at the same times.
+    waves
+        Oscillations of the table about rest, on top, in time order.
     settings
         Switches and settings, each held until the next; NaN is left to the chamber. The first
         value holds from the beginning, or from long before.
@@ -68,6 +71,7 @@ class Schedule:
     set_point: Track
     table_rate: Track
     table_angle: Track
+    waves: tuple[Wave, ...]
     settings: dict[Switched, Track]
     step_starts: tuple[float, ...]
     step_names: tuple[str, ...]
@@ -139,7 +143,7 @@ def schedule(
     settings = {what: _track(what, moments[what], powered) for what in SWITCHED}
     times, rates, angles = table.knots()
     turning = Track(times, rates), Track(times, angles)
-    return Schedule(set_point, *turning, settings, tuple(starts), tuple(names), now)
+    return Schedule(set_point, *turning, tuple(table.waves), settings, tuple(starts), tuple(names), now)
 
 
 def _flat(steps: Sequence[Step], above: str = "step ") -> Iterator[tuple[str, Soak | Hold | Ramp]]:
@@ -166,6 +170,9 @@ def _act(
         _check_within(turn.start_s, end - begin, place)
         if isinstance(turn, TurnTo):
             stop = table.move(begin + turn.start_s, turn.angle_deg, turn.rate_deg_s, turn.relative, place)
+        elif isinstance(turn, Oscillate):
+            stop = begin + turn.start_s + turn.duration_s
+            table.oscillate(Wave(begin + turn.start_s, stop, turn.rate_deg_s, turn.frequency_hz), place)
         else:
             stop = _turn(turn, begin, end, table, place)
         _check_within(stop - begin, end - begin, place)

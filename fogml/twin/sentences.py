@@ -9,6 +9,7 @@ Actions within a step, at times counted from its beginning::
 
     turn at RATE [for TIME] [, then RATE for TIME]... [, from minute M]
     turn to ANGLE at RATE [from minute M]         turn by ANGLE at RATE [from minute M]
+    oscillate at RATE and FREQUENCY for TIME [from minute M]
     power | fan | compressor | heater   on | off | at N % | automatic   [for TIME] [from minute M]
     humidity N % | automatic [for TIME] [from minute M]
     radiation at N Gy/h | off [for TIME] [from minute M]
@@ -20,12 +21,14 @@ A moment is "minute 20", "hour 1", "second 30" or a time such as "1 h 30 min"; "
 
 from __future__ import annotations
 
+from fogml.errors import InputError
 from fogml.twin.sentence_reader import SentenceReader
 from fogml.twin.steps import (
     AUTOMATIC,
     SWITCHED,
     Action,
     Hold,
+    Oscillate,
     Ramp,
     Repeat,
     Setting,
@@ -37,6 +40,7 @@ from fogml.twin.steps import (
 )
 
 _STEP_WORDS = ("soak", "hold", "ramp", "repeat")
+_MOTIONS = ("turn", "oscillate")
 
 
 def parse_step(text: str) -> Soak | Hold | Ramp | Repeat:
@@ -49,7 +53,7 @@ def parse_step(text: str) -> Soak | Hold | Ramp | Repeat:
     """
     reader = SentenceReader(text)
     misplaced = None
-    if reader.peek() in ("turn", *SWITCHED):
+    if reader.peek() in (*_MOTIONS, *SWITCHED):
         misplaced = f"'{reader.peek()}' is an action: list it under the step in which it happens"
     word = reader.one_of(_STEP_WORDS, misplaced)
     step: Step
@@ -89,10 +93,12 @@ def parse_action(text: str) -> Action:
     misplaced = None
     if reader.peek() in _STEP_WORDS:
         misplaced = f"'{reader.peek()}' is a step: it can't stand under another one"
-    word = reader.one_of(("turn", *SWITCHED), misplaced)
+    word = reader.one_of((*_MOTIONS, *SWITCHED), misplaced)
     action: Action
     if word == "turn":
         action = _turn(reader)
+    elif word == "oscillate":
+        action = _oscillate(reader)
     else:
         (what,) = (name for name in SWITCHED if name == word)
         action = _setting(reader, what)
@@ -135,6 +141,21 @@ def _turn(reader: SentenceReader) -> Turn | TurnTo:
             reader.fail("only the last rate may do without 'for TIME'")
         reader.take("at")
     return Turn(tuple(segments), reader.moment())
+
+
+def _oscillate(reader: SentenceReader) -> Oscillate:
+    reader.expect("at")
+    place = reader.place
+    rate = reader.quantity("table rate")
+    reader.expect("and")
+    frequency = reader.quantity("frequency")
+    reader.expect("for")
+    lasting = reader.duration()
+    start = reader.moment()
+    try:
+        return Oscillate(rate, frequency, lasting, start)
+    except InputError as error:
+        reader.fail(str(error), place)
 
 
 def _setting(reader: SentenceReader, what: Switched) -> Setting:

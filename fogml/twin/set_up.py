@@ -9,6 +9,7 @@ from functools import cached_property
 from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number
 from fogml.twin.plant.air import Airflow
+from fogml.twin.plant.ends import CoilEnds, with_ends
 from fogml.twin.plant.line import RadialLine, with_line
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.plant.power import SelfHeating
@@ -32,6 +33,8 @@ class Plant:
         How the air's conductance follows fan and table rate.
     line
         A radial conduction line in place of the coil's nodes, if there is to be one.
+    ends
+        Nodes at the coil's top and bottom; if None, usual ones where an effect asks for them.
     """
 
     constants: ThermalConstants = field(default_factory=ThermalConstants)
@@ -39,6 +42,7 @@ class Plant:
     heating: SelfHeating = field(default_factory=SelfHeating)
     airflow: Airflow = field(default_factory=Airflow)
     line: RadialLine | None = None
+    ends: CoilEnds | None = None
 
     @cached_property
     def network(self) -> ThermalNetwork:
@@ -46,7 +50,8 @@ class Plant:
         network = replace(
             standard_network(self.constants, self.order), heating=self.heating, airflow=self.airflow
         )
-        return network if self.line is None else with_line(network, self.line)
+        network = network if self.line is None else with_line(network, self.line)
+        return network if self.ends is None else with_ends(network, self.ends)
 
 
 SENSOR_QUANTITIES: tuple[Quantity, ...] = (

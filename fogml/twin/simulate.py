@@ -13,7 +13,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import KNOWN, coil_sensor_number, header, is_temperature
-from fogml.runs.facts import Facts
+from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.between_runs import Storage
 from fogml.twin.chain import ChainOutput
@@ -41,6 +41,8 @@ DEFAULT_COLUMNS = (
 """What is recorded beside time and gyro unless told otherwise."""
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
 BLOCK_ROWS = 1 << 14
+_ROUNDED = 1e-6
+"""Of a count: what a rate's digits leave of it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,7 +119,8 @@ def simulate(
         rows += count
     if not rows:
         raise _never_on(world)
-    run = Run(world.twin.name, {name: values[:rows] for name, values in kept.items()}, world.facts)
+    columns_kept = {name: values[:rows] for name, values in kept.items()}
+    run = Run(world.twin.name, columns_kept, world.facts, world.gyro_unit)
     if not truth:
         return Simulation(run, None, world)
     from fogml.twin.truth import truth_from_columns
@@ -184,7 +187,7 @@ def write_world(
             if pending is not None:
                 pending.result()
             if len(recorded["time"]):
-                pending = beside.submit(_write, writer, truth_writer, recorded, true)
+                pending = beside.submit(_write, writer, truth_writer, recorded, true, world.gyro_unit)
                 rows += len(recorded["time"])
             if progress is not None:
                 progress(min(BLOCK_ROWS, len(world.timeline)))
@@ -195,8 +198,12 @@ def write_world(
     return rows
 
 
-def _write(writer: Any, truth_writer: Any, recorded: Mapping[str, FloatArray], true: Truth | None) -> None:
+def _write(
+    writer: Any, truth_writer: Any, recorded: Mapping[str, FloatArray], true: Truth | None, unit: str
+) -> None:
     cells = {TIME_ON if name == "time_on" else header(name): values for name, values in recorded.items()}
+    if unit == "count":
+        cells = {header("gyro", unit) if cell == header("gyro") else cell: v for cell, v in cells.items()}
     if TIME_ON in cells:
         cells[TIME_ON] = written_time_on(cells[TIME_ON])
     writer.write(cells, (TIME_ON,))
@@ -227,6 +234,14 @@ def world_of(
     facts = DEFAULT_FACTS if facts is None else facts
     notes = f"synthetic: programme {programme.name}, twin {unit.name}, seed {seed}"
     stated = facts.model_copy(update={"unit": facts.unit or unit.name, "notes": facts.notes or notes})
+    counts = unit.counts_per_deg_h(sample_s)
+    if counts is not None:
+        if stated.scale_factor is not None:
+            raise InputError(
+                "facts: 'scale_factor' follows from the effect 'output_counts' and the sample interval; "
+                "leave it out"
+            )
+        stated = stated.model_copy(update={"scale_factor": ScaleFactor(value=counts)})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
         if name in ("time", "gyro") or (name not in KNOWN and coil_sensor_number(name) is None):
@@ -258,13 +273,22 @@ def _ahead(blocks: Iterator[Samples]) -> Iterator[Samples]:
             yield samples
 
 
+def _whole(counts: FloatArray) -> FloatArray:
+    """Counts without the rounding of their way through a rate; a logger's means of them stay."""
+    whole = np.rint(counts)
+    return np.where(np.abs(counts - whole) < _ROUNDED, whole, counts)
+
+
 def _recorded(
     world: World, samples: Samples, chain: ChainOutput
 ) -> tuple[dict[str, FloatArray], Truth | None]:
     inputs = samples.inputs
     # On the run's own clock.
     time = inputs.time - world.clock_s if world.clock_s else inputs.time
-    recorded = {"time": time, "gyro": world.logged(samples, chain.output + samples.noise)}
+    gyro = world.logged(samples, chain.output + samples.noise)
+    if world.counts_per_deg_h is not None:
+        gyro = _whole(gyro * world.counts_per_deg_h)
+    recorded = {"time": time, "gyro": gyro}
     for name in world.columns:
         if is_temperature(name):
             recorded[name] = world.sensed(name, samples)

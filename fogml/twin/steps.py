@@ -18,6 +18,7 @@ FASTEST_DEG_S = 10_000.0
 """No table turns faster."""
 _LONGEST_S = 1e9
 _SHORTEST_S = 1e-6
+_CYCLE_SLACK = 1e-6
 _COLDEST, _HOTTEST = -100.0, 150.0
 AUTOMATIC: tuple[Switched, ...] = ("compressor", "heater", "humidity")
 """What the chamber sees to by itself unless told otherwise."""
@@ -99,6 +100,42 @@ class TurnTo:
 
 
 @dataclass(frozen=True)
+class Oscillate:
+    """Turn to and fro about rest: rate ``rate_deg_s sin(2 pi frequency_hz t)`` for a whole number of cycles.
+
+    Attributes
+    ----------
+    rate_deg_s, frequency_hz
+        Greatest rate [deg/s] and frequency [Hz].
+    duration_s, start_s
+        For how long, and when from the beginning of the step [s].
+    """
+
+    rate_deg_s: float
+    frequency_hz: float
+    duration_s: float
+    start_s: float = 0.0
+
+    def __post_init__(self) -> None:
+        _need(self.rate_deg_s, 1e-9, FASTEST_DEG_S, "oscillate: rate [deg/s]")
+        _need(self.frequency_hz, 1e-6, 1e6, "oscillate: frequency [Hz]")
+        _need(self.duration_s, _SHORTEST_S, _LONGEST_S, "oscillate: time [s]")
+        _need(self.start_s, 0.0, _LONGEST_S, "oscillate: start [s]")
+        cycles = self.frequency_hz * self.duration_s
+        if abs(cycles - round(cycles)) > _CYCLE_SLACK or round(cycles) < 1:
+            raise InputError(
+                f"oscillate: {number_text(self.frequency_hz)} Hz for {duration_text(self.duration_s)} are "
+                f"{cycles:g} cycles; a whole number is needed, so that the table ends at rest where it began"
+            )
+
+    def __str__(self) -> str:
+        return (
+            f"oscillate at {number_text(self.rate_deg_s)} deg/s and {number_text(self.frequency_hz)} Hz "
+            f"for {duration_text(self.duration_s)}" + _from_text(self.start_s)
+        )
+
+
+@dataclass(frozen=True)
 class Setting:
     """Switch or set something, for a time [s] or until it is set again.
 
@@ -152,7 +189,7 @@ class Setting:
         return f"at {number_text(100.0 * self.value)} %"
 
 
-Action = Turn | TurnTo | Setting
+Action = Turn | TurnTo | Oscillate | Setting
 
 
 @dataclass(frozen=True)

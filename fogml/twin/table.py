@@ -3,10 +3,20 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from fogml.errors import InputError
 
 _SLACK_S = 1e-6
+
+
+class Wave(NamedTuple):
+    """An oscillation about rest: from and to [s], greatest rate [deg/s], frequency [Hz]."""
+
+    start: float
+    stop: float
+    rate: float
+    frequency: float
 
 
 class Table:
@@ -26,6 +36,7 @@ class Table:
         self._rates: list[float] = []
         self._angles: list[float] = []
         self._busy_until = -math.inf
+        self.waves: list[Wave] = []
 
     def knots(self) -> tuple[list[float], list[float], list[float]]:
         """Times [s], rates [deg/s] and angles [deg] of the knots."""
@@ -61,9 +72,7 @@ class Table:
         InputError
             If the table is not at rest at `start`.
         """
-        self._check_free(start, owner)
-        if self._times and self._times[-1] > start + _SLACK_S and self._rate(start) != 0.0:
-            raise InputError(f"{owner}: the table still slows down from the turn before; begin later")
+        self._check_at_rest(start, owner)
         way = angle if relative else math.remainder(angle - (self._angles or [0.0])[-1], 360.0)
         # Half a turn goes the positive way.
         way = way + 360.0 if not relative and way < -180.0 + 1e-6 else way
@@ -79,6 +88,29 @@ class Table:
         self._add(start + total, 0.0)
         self._busy_until = start + total
         return start + total
+
+    def oscillate(self, wave: Wave, owner: str) -> None:
+        """Turn to and fro from rest and back to it.
+
+        Raises
+        ------
+        InputError
+            If the table is not at rest at its start, or can't be accelerated so fast.
+        """
+        self._check_at_rest(wave.start, owner)
+        needed = 2.0 * math.pi * wave.frequency * wave.rate
+        if needed > self._acceleration:
+            raise InputError(
+                f"{owner}: the table would have to reach {needed:.3g} deg/s2 and has "
+                f"{self._acceleration:g} deg/s2; state a higher 'table_acceleration'"
+            )
+        self.waves.append(wave)
+        self._busy_until = wave.stop
+
+    def _check_at_rest(self, start: float, owner: str) -> None:
+        self._check_free(start, owner)
+        if self._times and self._times[-1] > start + _SLACK_S and self._rate(start) != 0.0:
+            raise InputError(f"{owner}: the table still slows down from the turn before; begin later")
 
     def _check_free(self, start: float, owner: str) -> None:
         if start < self._busy_until - _SLACK_S:

@@ -17,6 +17,7 @@ from fogml.twin.plant.power import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.schedule import Schedule, Track
 from fogml.twin.steps import Switched
+from fogml.twin.table import Wave
 
 IndexArray = NDArray[np.intp]
 
@@ -67,6 +68,13 @@ class Timeline:
                 f"{self.programme.name}: 'sample_s' is {self.sample_s:g}; the programme's "
                 f"{self.programme.total_s:g} s hold more such samples than times can be told apart"
             )
+
+        for wave in self.schedule.waves:
+            if 2.0 * wave.frequency * self.sample_s >= 1.0:
+                raise InputError(
+                    f"{self.programme.name}: 'sample_s' is {self.sample_s:g}; an oscillation of "
+                    f"{wave.frequency:g} Hz needs samples closer than {0.5 / wave.frequency:g} s"
+                )
 
     def __len__(self) -> int:
         return math.ceil(self.programme.total_s / self.sample_s - _CLOCK_SLACK)
@@ -159,13 +167,28 @@ class TimelineBlock:
     def table_rate(self) -> FloatArray:
         """Table rate [deg/s], with the table's acceleration."""
         times, rates, slopes, _ = self._table_knots
-        return self._linear(times, rates, slopes)
+        turning = self._linear(times, rates, slopes)
+        for rows, phase, wave in self._waves:
+            turning[rows] += wave.rate * np.sin(phase)
+        return turning
 
     @cached_property
     def angle(self) -> FloatArray:
         """Table angle [deg], not wrapped; 0 at the beginning."""
         times, rates, slopes, angles = self._table_knots
-        return self._linear(times, angles, rates, 0.5 * slopes)
+        turned = self._linear(times, angles, rates, 0.5 * slopes)
+        for rows, phase, wave in self._waves:
+            turned[rows] += wave.rate / (2.0 * math.pi * wave.frequency) * (1.0 - np.cos(phase))
+        return turned
+
+    @property
+    def _waves(self) -> Iterator[tuple[slice, FloatArray, Wave]]:
+        """Samples of each oscillation that reaches into the block, with its phase [rad] there."""
+        for wave in self.timeline.schedule.waves:
+            first, last = np.searchsorted(self.time, [wave.start, wave.stop])
+            if last > first:
+                since = self.time[first:last] - wave.start
+                yield slice(first, last), 2.0 * math.pi * wave.frequency * since, wave
 
     @cached_property
     def _table_knots(self) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:

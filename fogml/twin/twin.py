@@ -9,10 +9,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from fogml.errors import InputError
+from fogml.twin.coil import LayeredCoil
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
+from fogml.twin.light import Light
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
-from fogml.twin.optics import REFERENCE_COIL, Coil
+from fogml.twin.optics import REFERENCE_COIL, Coil, Receiver
+from fogml.twin.plant.ends import END_NODES, CoilEnds, with_ends
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.quantities import Grade
 from fogml.twin.registry import catalogue_order, effect
@@ -66,7 +69,9 @@ class Twin:
     noise_factor
         Factor of each coefficient's log-normal prior; 1 for one that is known.
     coil
-        Its fibre coil, from which leads, fringes, photon noise and proper frequency follow.
+        Its fibre coil, from which winding, leads, fringes, photon noise and proper frequency follow.
+    receiver
+        What detects its light.
     plant, sensors, surroundings
         The rest of the set-up.
     settings
@@ -87,12 +92,15 @@ class Twin:
     noise: NoiseConstants = field(default_factory=NoiseConstants)
     noise_factor: Mapping[str, float] = field(default_factory=dict)
     coil: Coil = REFERENCE_COIL
+    receiver: Receiver = field(default_factory=Receiver)
     plant: Plant = field(default_factory=Plant)
     sensors: Sensors = field(default_factory=Sensors)
     surroundings: Surroundings = field(default_factory=Surroundings)
     settings: Mapping[str, EffectSetting] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        # Raises where layers and winding don't fit together.
+        LayeredCoil.of(self.coil)
         settings = {}
         for id, setting in self.settings.items():
             declared = effect(id)
@@ -135,12 +143,27 @@ class Twin:
         return tuple((d, s) for d, s in self.on if isinstance(d, NoiseEffect) and not d.steady)
 
     @cached_property
+    def light(self) -> Light:
+        """The light at its receiver, with the course that the effect ``light_power`` gives it."""
+        course = self.settings.get("light_power")
+        return Light(self.receiver) if course is None else Light(self.receiver, **course.shape)
+
+    @cached_property
     def network(self) -> ThermalNetwork:
-        """The thermal plant with the effects that change it."""
+        """The thermal plant with the effects that change it, and with the coil's ends if they are needed."""
         network = self.plant.network
+        asked = any(END_NODES & set(declared.needs) for declared, _ in self.on)
+        if asked and self.plant.ends is None:
+            network = with_ends(network, CoilEnds())
         for declared, setting in self.thermal:
             network = declared.change_plant(network, setting.amplitude, **setting.shape)
         return network
+
+    def counts_per_deg_h(self, sample_s: float) -> float | None:
+        """Scale factor of an output in counts a sample of this length [s]; None for one in deg/h."""
+        counting = self.settings.get("output_counts")
+        # One deg/h is one arcsec per second.
+        return sample_s / counting.amplitude if counting is not None and counting.amplitude else None
 
     def with_effect(self, id: str, amplitude: float | None = None, /, **shape: float) -> Twin:
         """The twin with an effect on, or changed.

@@ -15,8 +15,10 @@ from fogml.runs.columns import KNOWN, is_temperature
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
-from fogml.twin.optics import Coil
+from fogml.twin.optics import Coil, Receiver
 from fogml.twin.plant.air import Airflow
+from fogml.twin.plant.ends import QUANTITIES as ENDS
+from fogml.twin.plant.ends import CoilEnds
 from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.power import SelfHeating
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
@@ -32,7 +34,18 @@ from fogml.twin.set_up import (
     Surroundings,
 )
 from fogml.twin.twin import EffectSetting, Twin
-from fogml.twin.twin_schema import AIRFLOW, COIL, HEATING, LINE, NOMINAL, TWIN_FILE, Stated, message, near
+from fogml.twin.twin_schema import (
+    AIRFLOW,
+    COIL,
+    HEATING,
+    LINE,
+    NOMINAL,
+    RECEIVER,
+    TWIN_FILE,
+    Stated,
+    message,
+    near,
+)
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
@@ -99,7 +112,12 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
             ),
             noise=NoiseConstants(**noise),
             noise_factor={name: held.factor for name, held in factors.items() if held and held.factor},
-            coil=Coil(**_values(source, "coil", stated.coil, COIL)),
+            coil=Coil(
+                **_values(source, "coil", stated.coil, COIL),
+                winding=stated.coil.winding,
+                layers=stated.coil.layers,
+            ),
+            receiver=Receiver(**_values(source, "receiver", stated.receiver, RECEIVER)),
             plant=_plant(source, stated.plant),
             sensors=_sensors(source, stated.sensors),
             surroundings=Surroundings(
@@ -134,6 +152,8 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
     plant["airflow"] = section(AIRFLOW, twin.plant.airflow)
     if twin.plant.line is not None:
         plant["line"] = section(LINE, twin.plant.line) | {"layers": twin.plant.line.layers}
+    if twin.plant.ends is not None:
+        plant["ends"] = section(ENDS, twin.plant.ends)
     single = {
         name: section(SENSOR_QUANTITIES, errors) | ({"reads": dict(errors.reads)} if errors.reads else {})
         for name, errors in twin.sensors.single.items()
@@ -141,7 +161,9 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
     values: dict[str, Any] = {"schema": SCHEMA, "name": twin.name}
     if twin.description:
         values["description"] = twin.description
-    values |= {"grade": twin.grade, "nominal": nominal, "noise": noise, "coil": section(COIL, twin.coil)}
+    coil = section(COIL, twin.coil) | {"winding": twin.coil.winding, "layers": twin.coil.layers}
+    values |= {"grade": twin.grade, "nominal": nominal, "noise": noise, "coil": coil}
+    values["receiver"] = section(RECEIVER, twin.receiver)
     values["plant"] = plant
     values["sensors"] = section(SENSOR_QUANTITIES, twin.sensors.common) | (
         {"single": single} if single else {}
@@ -159,7 +181,7 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
 def _plant(source: str, stated: Any) -> Plant:
     heating = _values(source, "plant.heating", stated.heating, HEATING)
     steady = heating.get("steady", 0.0)
-    line = stated.line
+    line, ends = stated.line, stated.ends
     return Plant(
         constants=ThermalConstants(**_values(source, "plant", stated, THERMAL)),
         order=stated.order,
@@ -168,6 +190,7 @@ def _plant(source: str, stated: Any) -> Plant:
         line=None
         if line is None
         else RadialLine(**_values(source, "plant.line", line, LINE), layers=line.layers),
+        ends=None if ends is None else CoilEnds(**_values(source, "plant.ends", ends, ENDS)),
     )
 
 

@@ -11,6 +11,8 @@ from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationEr
 from fogml.errors import quoted
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
+from fogml.twin.optics import Winding
+from fogml.twin.plant.ends import QUANTITIES as ENDS
 from fogml.twin.plant.standard import LARGEST_ORDER
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.quantities import Grade, Quantity
@@ -38,6 +40,14 @@ COIL = (
     _quantity("index", "1", 1.0, 4.0),
     _quantity("index_slope", "1/degC", -1e-3, 1e-3),
     _quantity("expansion", "1/degC", -1e-3, 1e-3),
+    _quantity("pitch", "m", 1e-6, 1e-2),
+    _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
+)
+RECEIVER = (
+    _quantity("line_width", "m", 1e-12, 1e-6),
+    _quantity("responsivity", "A/W", 1e-3, 10.0),
+    _quantity("resistance", "ohm", 1.0, 1e9),
+    _quantity("temperature_k", "K", 1.0, 1e3),
 )
 LINE = (
     _quantity("inner_radius", "m", 1e-4, 10.0),
@@ -87,6 +97,7 @@ def _optional(kind: type[_Strict]) -> tuple[Any, Any]:
 _Sensor: Any = _section("_Sensor", SENSOR_QUANTITIES, reads=(dict[str, float], {}))
 _SENSOR_TABLE: Any = dict[str, _Sensor]
 _LINE_SECTION: Any = _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None
+_ENDS_SECTION: Any = _section("_Ends", ENDS) | None
 TWIN_FILE: Any = create_model(
     "_File",
     __base__=_Strict,
@@ -96,7 +107,12 @@ TWIN_FILE: Any = create_model(
     grade=(Grade, "tactical"),
     nominal=_optional(_section("_Nominal", NOMINAL, _WithDeviation)),
     noise=_optional(_section("_Noise", NOISE, _WithFactor)),
-    coil=_optional(_section("_Coil", COIL)),
+    coil=_optional(
+        _section(
+            "_Coil", COIL, winding=(Winding, "quadrupole"), layers=(Annotated[int, Field(ge=3, le=1000)], 32)
+        )
+    ),
+    receiver=_optional(_section("_Receiver", RECEIVER)),
     plant=_optional(
         _section(
             "_Plant",
@@ -105,6 +121,7 @@ TWIN_FILE: Any = create_model(
             heating=_optional(_section("_Heating", HEATING)),
             airflow=_optional(_section("_Airflow", AIRFLOW)),
             line=(_LINE_SECTION, None),
+            ends=(_ENDS_SECTION, None),
         )
     ),
     sensors=_optional(_section("_Sensors", SENSOR_QUANTITIES, single=(_SENSOR_TABLE, {}))),

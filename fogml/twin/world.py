@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
@@ -147,6 +148,7 @@ class World:
         own = self._windows[len(self._windows) - self._own_cycles :]
         first = own[0][0] - self.clock_s if own else math.inf
         self.facts = facts.model_copy(update={"powered_on": first if math.isfinite(first) else None})
+        self.counts_per_deg_h = twin.counts_per_deg_h(sample_s)
         self._main = _Branch(twin)
         self._without = {}
         if truth:
@@ -160,6 +162,11 @@ class World:
         self._sensor_memory, self._share_memory = Memory(), Memory()
         self._log_memory, self._free_memory = Memory(), Memory()
         self._check_sensors()
+
+    @property
+    def gyro_unit(self) -> Literal["deg/h", "count"]:
+        """Unit in which the output is recorded."""
+        return "deg/h" if self.counts_per_deg_h is None else "count"
 
     @property
     def power_cycles(self) -> bool:
@@ -271,6 +278,7 @@ class World:
             power_offs_s=tuple(off for _, off in self._windows[:-1]),
             drives=drives,
             coil=branch.twin.coil,
+            light=branch.twin.light,
             seed=self._seed,
             rate_window_s=0.0,
             memory=branch.memory,

@@ -106,6 +106,27 @@ def test_north_simulated(tmp_path: Path, invoke, invoke_json) -> None:
     assert invoke_json("lab", "north", "--config", config) == first
 
 
+def test_rate_of_a_twin_and_of_its_recorded_test(tmp_path: Path, invoke, invoke_json) -> None:
+    twin = tmp_path / "unit.yaml"
+    twin.write_text("schema: fogml.twin/1\neffects: {deadband: {amplitude: 0.3}}\n")
+    out = tmp_path / "rate"
+    assert "threshold" in invoke("lab", "rate", "--twin", twin, "-o", out).stdout
+    assert sorted(p.name for p in out.iterdir()) == ["lab-rate.config.yaml", "rate.html", "rate.json"]
+    told = json.loads((out / "rate.json").read_text())
+    assert told["schema"] == "fogml.rate/1" and told["kind"] == "simulated"
+    assert told["threshold"] == {"above_deg_h": pytest.approx(0.2), "below_deg_h": pytest.approx(0.5)}
+    turn = (
+        "turn at 10 deg/s for 60 s, then -10 deg/s for 60 s, then 20 deg/s for 60 s, then -20 deg/s for 60 s"
+    )
+    config = {"schema": "fogml.simulate/1", "programme": [{"hold for 6 min": [f"{turn}, from minute 1"]}]}
+    config |= {"twin": "nominal", "out": str(tmp_path / "run.csv")}
+    (tmp_path / "simulate.yaml").write_text(yaml.safe_dump(config))
+    invoke("simulate", tmp_path / "simulate.yaml")
+    told = invoke_json("lab", "rate", tmp_path / "run.csv")
+    assert told["scale_factor"]["scale_factor"] == pytest.approx(1.0, abs=1e-6)
+    assert told["bandwidth"] is None and told["unit"] is None
+
+
 def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
     told = invoke_json("lab", "north", "--azimuth", 10, "--latitude", 30, "--order", "0,120,240")
     assert told["drift_deg_h_per_h"] is None
@@ -117,6 +138,10 @@ def test_three_positions_tell_no_drift_and_say_so(invoke_json) -> None:
     [
         (("misalignment",), "no file is given"),
         (("misalignment", "nowhere.csv"), "no such file"),
+        (("rate",), "give recorded runs, or --twin"),
+        (("rate", "--twin", "nowhere.yaml"), "no such twin"),
+        (("rate", "--twin", "nominal", "--greatest", -5), "'greatest'"),
+        (("rate", "--twin", "nominal", "run.csv"), "one of the two"),
         (("north",), "--positions, or --azimuth and --latitude"),
         (("north", "--azimuth", 10), "--azimuth and --latitude"),
         (("north", "--azimuth", 10, "--latitude", 95), "latitude 95"),

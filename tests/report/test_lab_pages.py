@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 
+import numpy as np
 import pytest
 
 from fogml.json_files import finite_json
@@ -35,6 +36,17 @@ def simulated() -> str:
     return north_page(finite_json(values))
 
 
+def rates() -> str:
+    from fogml.lab.rate_json import rate_json
+    from fogml.lab.rate_programmes import rate_runs
+    from fogml.report.rate_page import rate_page
+    from fogml.twin.twin import Twin
+
+    twin = Twin().with_effect("loop_gain", 1e-3)
+    values = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0, 100.0, 300.0])), source="T", twin=twin)
+    return rate_page(finite_json(values))
+
+
 def trained() -> str:
     judged = judgement()
     return train_page(judged, finite_json(navigation_costs(judged, 39.9)))
@@ -54,6 +66,14 @@ def test_a_page_is_whole(make) -> None:
         axes = [v for k, v in figure["layout"].items() if re.fullmatch(r"[xy]axis\d*", k)]
         titles = [axis["title"]["text"] for axis in axes if axis.get("title", {}).get("text")]
         assert titles and all("[" in title for title in titles)
+
+
+def test_page_of_a_rate_table_has_its_figures_and_the_units_facts() -> None:
+    read = Page(html := rates())
+    figures = [a for a in read.of("svg") if a.get("role") == "img"]
+    assert len(figures) == 4 and all(len(a["aria-label"] or "") > 20 for a in figures)
+    assert "gain 0.707" in html and "Sagnac constant" in html and "synthetic" in html
+    assert not read.of("link") and len(read.of("h1")) == 1
 
 
 def test_figures_in_the_text() -> None:

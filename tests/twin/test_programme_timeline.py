@@ -182,3 +182,33 @@ def test_samples_end_before_the_programme_does() -> None:
     for bad in (0.0, -1.0, math.nan, 3601.0):
         with pytest.raises(InputError, match="'sample_s'"):
             timeline(programme, bad)
+
+
+def test_an_oscillation_is_a_sine_about_rest_and_comes_back() -> None:
+    said = "oscillate at 3 deg/s and 2 Hz for 10 s from 5 s"
+    line = on_clock([{"hold for 30 s": [said, "turn at 4 deg/s for 5 s from second 20"]}], 0.01)
+    assert str(load_programme([{"hold for 30 s": [said]}]).steps[0].actions[0]) == said
+    block, time = line.whole, line.whole.time
+    waving = (time >= 5.0) & (time < 15.0)
+    omega = 4.0 * math.pi
+    assert block.table_rate[waving] == pytest.approx(3.0 * np.sin(omega * (time[waving] - 5.0)), abs=1e-9)
+    wanted = 3.0 / omega * (1.0 - np.cos(omega * (time[waving] - 5.0)))
+    assert block.angle[waving] == pytest.approx(wanted, abs=1e-9)
+    assert not block.table_rate[(time >= 15.0) & (time < 20.0)].any()
+    assert block.angle[-1] == pytest.approx(20.0)
+    pieces = np.concatenate([part.table_rate for part in line.blocks(333)])
+    assert pieces == pytest.approx(block.table_rate, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ("oscillate at 3 deg/s and 2 Hz for 10.3 s", "20.6 cycles; a whole number is needed"),
+        ("oscillate at 3 deg/s and 2 m for 10 s", r"needs a unit \(Hz, mHz, kHz\)"),
+        ("oscillate at 3 deg/s and 20 Hz for 10 s", "state a higher 'table_acceleration'"),
+        ("oscillate at 1 deg/s and 5 Hz for 10 s", "needs samples closer than 0.1 s"),
+    ],
+)
+def test_what_an_oscillation_can_not_be_is_said(said: str, message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        on_clock([{"hold for 30 s": [said]}], 0.5)

@@ -89,7 +89,7 @@ def test_bias_effects_offered_to_a_diagnosis_are_those_of_the_catalogues_head() 
     bias = {id for id, held in registry.effects().items() if held.code[0] in "BC" and held.code[1:].isdigit()}
     offered = {id for id in bias if registry.effect(id).candidate}
     assert offered == bias & set(CANDIDATES)
-    assert len(bias) == 24
+    assert len(bias) == 28
 
 
 def test_codes_name_one_effect_each() -> None:

@@ -42,4 +42,4 @@ class Ageing(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h of b_1 [deg/h], shape (n,)."""
-        return np.log1p(np.maximum(inputs.time, 0.0) / shape["time_constant"])
+        return np.log1p(np.maximum(inputs.time + inputs.epoch_s, 0.0) / shape["time_constant"])

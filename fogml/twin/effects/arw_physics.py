@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import WhiteNoiseEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.optics import Receiver, phase_noise_to_walk
+from fogml.twin.optics import phase_noise_to_walk
 from fogml.twin.quantities import Quantity
 
 
@@ -19,11 +17,12 @@ class ArwPhysics(WhiteNoiseEffect):
         S = (2 e I + 4 k T / R_f + I**2 RIN) / (R P_0 sin(phi_m) / 2)**2,      I = R P_0 (1 + cos phi_m) / 2
         RIN = 1.33 lambda**2 / (c dlambda),      N = A sqrt(S / 2) / K_S
 
-    with P_0 = power 10**(-power_loss |T_electronics - 25| / 10), for the unit's coil and the receiver of
-    `fogml.twin.optics`, whose source is polarised and Gaussian (2 in place of 1.33 for a flat spectrum);
-    ``modulation_depth`` is phi_m and the amplitude A the noise over that of physics. At 20 uW N is 1.89e-3,
-    8.2e-4 and 4.9e-4 deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8 with the reference coil. Light that falls off
-    room temperature raises N where shot or thermal noise leads, and not where excess noise does.
+    with P_0 = power 10**(-power_loss |T_electronics - 25| / 10), or by the course of ``light_power`` where
+    that is on, for the unit's coil and receiver as the twin states them; the source is polarised and Gaussian
+    (2 in place of 1.33 for a flat spectrum); ``modulation_depth`` is phi_m and the amplitude A the noise over
+    that of physics. At 20 uW N is 1.89e-3, 8.2e-4 and 4.9e-4 deg/sqrt(h) for pi/2, 3 pi/4 and 7 pi/8 with the
+    reference coil. Light that falls off room temperature raises N where shot or thermal noise leads, and not
+    where excess noise does.
 
     Source: Lefevre (literature); numbers derived; ranges are engineering ones.
     """
@@ -52,5 +51,6 @@ class ArwPhysics(WhiteNoiseEffect):
     def strength(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Angle random walk of the unit's coil [deg/sqrt(h)], shape (n,)."""
         depth, power = shape["modulation_depth"], 1e-6 * shape["power"]
-        dimmed = power * np.power(10.0, -0.1 * shape["power_loss"] * np.abs(inputs.u("T_electronics")))
-        return phase_noise_to_walk(Receiver().phase_density(inputs.coil, dimmed, depth), inputs.coil)
+        dimmed = power * inputs.light.level(inputs.u("T_electronics"), power_loss=shape["power_loss"])
+        receiver = inputs.light.receiver
+        return phase_noise_to_walk(receiver.phase_density(inputs.coil, dimmed, depth), inputs.coil)

@@ -15,7 +15,8 @@ class ElectronicCrosstalk(BiasEffect):
 
         b = e_1 (T_electronics - 25) + e_2 (V - V_0)
 
-    The amplitude is e_1; ``supply_ratio`` is e_2 / e_1. V_0 is the supply at the first sample. The
+    The amplitude is e_1; ``supply_ratio`` is e_2 / e_1. V_0 is the supply at the first sample. What leaks
+    weighs the more the less light there is: where ``light_power`` is on, b is over the light left. The
     constant part e_0 is one of the bias itself. Where no supply is recorded to change, nothing tells it from
     whatever else follows the electronics, and where their temperature is not, from `supply_ripple`: a
     diagnosis does not offer it.
@@ -47,4 +48,5 @@ class ElectronicCrosstalk(BiasEffect):
         """Response per deg/h/degC [deg/h], shape (n,)."""
         supply = inputs.drive("supply")
         change = supply - inputs.memory.first(f"{self.id} supply", supply)
-        return inputs.u("T_electronics") + shape["supply_ratio"] * change
+        u = inputs.u("T_electronics")
+        return (u + shape["supply_ratio"] * change) / inputs.light.level(u)

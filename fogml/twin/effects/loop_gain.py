@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import LoopEffect
 from fogml.twin.inputs import Inputs
@@ -19,7 +17,8 @@ class LoopGain(LoopEffect):
         tau(T) dy/dt = w - y (1 + tau(T) / leak_time),      tau(T) = tau 10**(-power_slope u / 1000)
 
     w is the rate that the loop meets, y what it gives, u = T_electronics - 25; tau = 1 / (G P_0) = 1 / (2 pi
-    bandwidth) is the amplitude and ``power_slope`` the change of the light P_0 [dB per 100 degC].
+    bandwidth) is the amplitude and ``power_slope`` the change of the light P_0 [dB per 100 degC], in whose
+    place that of ``light_power`` counts where it is on.
     The integrator's ``leak_time`` makes the finite gain at rest: an error of 1 / (1 + leak_time / tau) of
     the rate, none for a perfect one. An open loop has an error of -phi_s**2 / 6 and one like P_0 instead.
 
@@ -64,4 +63,4 @@ class LoopGain(LoopEffect):
 
     def _dimming(self, inputs: Inputs, power_slope: float) -> FloatArray:
         """Light at 25 degC over light now, shape (n,)."""
-        return np.power(10.0, -1e-3 * power_slope * inputs.u("T_electronics"))
+        return 1.0 / inputs.light.level(inputs.u("T_electronics"), power_slope=power_slope)

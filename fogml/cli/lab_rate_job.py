@@ -1,0 +1,91 @@
+"""The job of ``fogml lab rate``."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from pydantic import Field
+
+from fogml.cli.lab_outputs import say_where, tell
+from fogml.cli.runs import open_run
+from fogml.cli.settings import Repairing, Settings
+from fogml.cli.terminal import Terminal, number
+from fogml.errors import InputError
+from fogml.json_files import finite_json
+from fogml.lab.rate_json import rate_json
+from fogml.lab.rate_tests import Criteria
+from fogml.lab.rate_words import result_rows
+
+
+class RateSettings(Settings):
+    """Settings of ``fogml lab rate``."""
+
+    path_keys: ClassVar[tuple[str, ...]] = ("runs", "twin")
+    runs: list[str] = []
+    twin: str | None = None
+    greatest: float = Field(500.0, gt=0.0, le=1e4)
+    noise: bool = False
+    settle: float | None = Field(None, ge=0.0)
+    answers: float = Field(0.5, gt=0.0, lt=1.0)
+    dead: float = Field(0.1, gt=0.0, lt=1.0)
+    range_error: float = Field(0.01, gt=0.0, lt=1.0)
+    small: float = Field(0.02, gt=0.0, lt=1.0)
+    repair: Repairing = False
+    out: str | None = None
+
+    def _ships(self, key: str, value: str) -> bool:
+        from fogml.twin.twin_file import twin_names
+
+        return super()._ships(key, value) or (key == "twin" and value in twin_names())
+
+
+def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:
+    """Read the tests on a rate table, write them where a folder is named, and print them."""
+    if bool(settings.runs) == bool(settings.twin):
+        raise InputError("give recorded runs, or --twin to test a twin; one of the two")
+
+    def make() -> dict[str, Any]:
+        return finite_json(_values(settings, terminal))
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report.rate_page import rate_page
+
+        return rate_page(values)
+
+    values = tell("rate", make, page, settings.in_full(), settings.out, terminal)
+    _print(values, terminal)
+    terminal.result(values)
+    say_where("rate", settings.out, terminal)
+
+
+def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
+    criteria = Criteria(
+        answers=settings.answers,
+        dead=settings.dead,
+        range_error=settings.range_error,
+        small=settings.small,
+    )
+    if settings.twin is None:
+        with terminal.work("reading"):
+            runs = [open_run(path, repair=settings.repair) for path in settings.runs]
+        source = ", ".join(run.name for run in runs)
+        return rate_json(runs, source=source, settle_s=settings.settle, criteria=criteria)
+    from fogml.lab.rate_programmes import rate_runs
+    from fogml.twin.twin_file import load_twin
+
+    twin = load_twin(settings.twin)
+    with terminal.work(f"testing {twin.name}"):
+        runs = rate_runs(twin, greatest_deg_s=settings.greatest, noise=settings.noise, seed=settings.seed)
+        return rate_json(
+            runs, source=f"Twin {twin.name}", settle_s=settings.settle, criteria=criteria, twin=twin
+        )
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    rows = [[row.quantity, row.value, row.se, row.unit, row.remark] for row in result_rows(values, number)]
+    title = f"{values['source']}: tests on a rate table" + (
+        " (synthetic)" if values["kind"] == "simulated" else ""
+    )
+    terminal.table(title, ["quantity", "value", "standard error", "unit", ""], rows)
+    for note in values["notes"]:
+        terminal.say(note)

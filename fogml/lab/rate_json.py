@@ -1,0 +1,233 @@
+"""What ``fogml lab rate`` tells: the values of ``rate.json``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus
+from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
+from fogml.lab.rate_temperature import temperature_sensitivity
+from fogml.lab.rate_tests import (
+    Answer,
+    Bracket,
+    Criteria,
+    Line,
+    Range,
+    dead_zone,
+    least_seen,
+    near_zero,
+    scale_line,
+    step_answers,
+    zero_answers,
+)
+from fogml.runs.run import Run
+from fogml.twin.coil import LayeredCoil, lead_sensitivity, midpoint_sensitivity, radial_sensitivity
+from fogml.twin.twin import Twin
+
+SCHEMA = "fogml.rate/1"
+
+
+@dataclass(frozen=True)
+class _Read:
+    """What the runs hold, by kind."""
+
+    ladders: list[tuple[Run, Plateaus]]
+    gains: list[Gain]
+    slews: list[tuple[float, Slew]]
+
+
+def rate_json(
+    runs: Sequence[Run],
+    *,
+    source: str,
+    settle_s: float | None = None,
+    criteria: Criteria | None = None,
+    twin: Twin | None = None,
+) -> dict[str, Any]:
+    """Scale factor, range, threshold, dead zone, resolution, bandwidth, slew and temperature sensitivity.
+
+    Parameters
+    ----------
+    runs
+        Recorded runs with the table's rate; each may hold any of the tests.
+    source
+        What they are, for the page.
+    settle_s
+        Left out at the begin of each plateau [s]; the first rows if None.
+    criteria
+        What counts as following; those of IEEE Std 952 if None.
+    twin
+        The twin that was tested, where it was one, for what follows from its facts.
+
+    Returns
+    -------
+    dict
+        Schema ``fogml.rate/1``; what the runs do not tell is null, and a note says what it needs.
+
+    Raises
+    ------
+    InputError
+        If no run holds a turn of the table.
+    """
+    criteria = Criteria() if criteria is None else criteria
+    read = _read(runs, settle_s)
+    main = _main_ladder(read, criteria)
+    line, held = (None, None) if main is None else main
+    scale = 1.0 if line is None else line.scale_factor
+    greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
+    zero, steps = _small(read, greatest, scale, criteria)
+    band = bandwidth(read.gains, scale)
+    limit = min(read.slews, key=lambda one: one[0], default=(0.0, None))[1]
+    followed = greatest if held is None else held.followed
+    sensed = temperature_sensitivity([run for run, _ in read.ladders], criteria.small * greatest, followed)
+    values: dict[str, Any] = {
+        "schema": SCHEMA,
+        "kind": "recorded" if twin is None else "simulated",
+        "source": source,
+        "runs": [run.name for run in runs],
+        "criteria": asdict(criteria),
+        "scale_factor": None if line is None else asdict(line),
+        "range": _range(held),
+        "threshold": _bracket(least_seen(zero, criteria)),
+        "dead_zone": _bracket(dead_zone(zero, criteria)),
+        "resolution": _bracket(least_seen(steps, criteria)),
+        "bandwidth": None if band is None else asdict(band),
+        "slew": None if limit is None else asdict(limit),
+        "temperature_sensitivity": None
+        if sensed is None
+        else {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(sensed).items()},
+        "count_arcsec": _count(runs),
+        "zero_answers": [asdict(one) for one in zero],
+        "step_answers": [asdict(one) for one in steps],
+        "gains": [asdict(one) for one in read.gains],
+        "ladder": _ladder(read),
+        "unit": None if twin is None else unit_facts(twin),
+    }
+    return values | {"notes": _notes(values)}
+
+
+def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
+    ladders, gains, slews = [], [], []
+    for run in runs:
+        if "rate" not in run.columns or not run.rate.any():
+            continue
+        waves = find_oscillations(run)
+        gains += [gain_of(run, wave) for wave in waves]
+        plateaus = find_plateaus(run, waves, settle_s)
+        if len(plateaus) > 1:
+            ladders.append((run, plateaus))
+            found = slew(run, plateaus)
+            # The run with the closest samples tells it best.
+            slews += [] if found is None else [(float(np.median(np.diff(run.time))), found)]
+    if not ladders and not gains:
+        raise InputError(
+            "no run holds a turn of the table: the column 'rate [deg/s]' is missing or 0 throughout"
+        )
+    return _Read(ladders, gains, slews)
+
+
+def _main_ladder(read: _Read, criteria: Criteria) -> tuple[Line, Range] | None:
+    """Of the run with the most different large rates, as temperatures and small rates tell less."""
+    best: tuple[Line, Range] | None = None
+    most = 1
+    for _, plateaus in read.ladders:
+        found = scale_line(plateaus, criteria)
+        large = np.abs(plateaus.rate) >= criteria.small * np.abs(plateaus.rate).max(initial=0.0)
+        levels = len(np.unique(np.round(plateaus.rate[large], 6)))
+        if found is not None and levels > most:
+            best, most = found, levels
+    return best
+
+
+def _small(
+    read: _Read, greatest: float, scale: float, criteria: Criteria
+) -> tuple[list[Answer], list[Answer]]:
+    """Answers to rates about zero, and to small steps away from it, of all runs."""
+    zero, steps = [], []
+    for _, plateaus in read.ladders:
+        zero += zero_answers(near_zero(plateaus, greatest, criteria), scale, criteria)
+        steps += step_answers(plateaus, greatest, scale, criteria)
+    by_size = [sorted(answers, key=lambda one: one.size) for answers in (zero, steps)]
+    return by_size[0], by_size[1]
+
+
+def _range(held: Range | None) -> dict[str, Any] | None:
+    if held is None:
+        return None
+    return {f"{key}_deg_s": None if value is None else value / 3600.0 for key, value in asdict(held).items()}
+
+
+def _bracket(found: Bracket | None) -> dict[str, Any] | None:
+    return None if found is None else {"above_deg_h": found.above, "below_deg_h": found.below}
+
+
+def _count(runs: Sequence[Run]) -> float | None:
+    """Angle of a count [arcsec], where an output is in counts."""
+    for run in runs:
+        if run.gyro_unit == "count" and run.facts.scale_factor is not None and len(run) > 1:
+            step = float(np.median(np.diff(run.time)))
+            return step / abs(run.facts.scale_factor.count_per_deg_h)
+    return None
+
+
+def _ladder(read: _Read) -> list[dict[str, Any]]:
+    return [
+        {
+            "run": run.name,
+            "rate_deg_h": plateaus.rate.tolist(),
+            "output_deg_h": plateaus.output.tolist(),
+            "se_deg_h": plateaus.error.tolist(),
+        }
+        for run, plateaus in read.ladders
+    ]
+
+
+def unit_facts(twin: Twin) -> dict[str, Any]:
+    """What follows from a twin's coil and receiver.
+
+    Returns
+    -------
+    dict
+        Sagnac constant [s], phase of 1 deg/h [urad], transit time [us], proper frequency [kHz], rate of a
+        fringe [deg/s], Shupe sensitivity of the winding to a linear gradient [deg/h per degC/min] and of
+        mid-point and leads [the same per metre], settling of a profile across it [s], and the angle random
+        walk of its photon noise at 20 uW and a depth of pi / 2 [deg/sqrt(h)].
+    """
+    coil = twin.coil
+    return {
+        "twin": twin.name,
+        "length_m": coil.length,
+        "diameter_m": coil.diameter,
+        "wavelength_nm": 1e9 * coil.wavelength,
+        "winding": coil.winding,
+        "layers": coil.layers,
+        "sagnac_s": coil.sagnac_s,
+        "phase_urad_per_deg_h": 1e6 * coil.phase_per_deg_h,
+        "transit_us": 1e6 * coil.transit_s,
+        "proper_frequency_khz": 1e-3 * coil.proper_frequency_hz,
+        "fringe_deg_s": coil.fringe_offset_deg_s,
+        "half_fringe_deg_s": 0.5 * coil.fringe_offset_deg_s,
+        "winding_deg_h_per_degC_min": radial_sensitivity(coil.winding, coil.layers, coil),
+        "winding_settling_s": LayeredCoil.of(coil).settling_s,
+        "midpoint_deg_h_per_degC_min_m": midpoint_sensitivity(coil),
+        "lead_deg_h_per_degC_min_m": lead_sensitivity(coil),
+        "photon_walk_deg_sqrt_h": twin.receiver.angle_random_walk(coil, 20e-6, 0.5 * np.pi),
+    }
+
+
+def _notes(values: dict[str, Any]) -> list[str]:
+    """What each test that is missing needs."""
+    needs = {
+        "scale_factor": "scale factor: several rates of both senses",
+        "threshold": "threshold and dead zone: rates of both senses about zero, Earth rate turned away",
+        "resolution": "resolution: small steps of the rate on top of a larger one",
+        "bandwidth": "bandwidth: the table turning to and fro at two frequencies or more",
+        "temperature_sensitivity": "temperature sensitivity: turns in soaks at several temperatures",
+    }
+    missing = [text for key, text in needs.items() if values[key] is None]
+    return [f"Not tested here; {text}." for text in missing]

@@ -1,0 +1,147 @@
+"""Pieces of a rate table's test: plateaus of the table's rate, oscillations, and flanks between plateaus."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.turning import white_noise
+
+LEAST_ROWS = 4
+"""Rows that a plateau needs: fewer tell no noise."""
+SETTLING_ROWS = 2
+"""Rows left out at the begin of a plateau unless told otherwise: what a sample's edge and the loop make."""
+LEAST_CYCLES = 3
+"""Cycles that make an oscillation."""
+SINE_SHARE = 0.95
+"""Share of the rate's square that a sine explains of an oscillation; of turns to and fro it is 8 / pi**2."""
+_BAND = 0.05
+_SAME_CYCLE = 0.2
+_NOISES = 6.0
+"""Steps of the recorded rate beyond so many of its own noise are steps of the table."""
+
+
+@dataclass(frozen=True, eq=False)
+class Plateaus:
+    """Stretches of constant table rate, in time order; k of them.
+
+    Attributes
+    ----------
+    start, stop
+        Row ranges [start, stop), shape (k,).
+    time
+        Middle of each [s], shape (k,).
+    rate
+        Rate that acts on the input axis, table and Earth [deg/h], shape (k,).
+    output
+        Mean output [deg/h], shape (k,).
+    error
+        Standard error of that mean from the white noise of its samples [deg/h], shape (k,).
+    """
+
+    start: FloatArray
+    stop: FloatArray
+    time: FloatArray
+    rate: FloatArray
+    output: FloatArray
+    error: FloatArray
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __getitem__(self, which: BoolArray) -> Plateaus:
+        """Some of them."""
+        kept = (self.start, self.stop, self.time, self.rate, self.output, self.error)
+        return Plateaus(*(values[which] for values in kept))
+
+
+@dataclass(frozen=True, eq=False)
+class Oscillation:
+    """Rows [start, stop) in which the table turns to and fro at one frequency [Hz]."""
+
+    start: int
+    stop: int
+    frequency_hz: float
+
+
+def earth_deg_h(run: Run) -> float:
+    """Earth rate on the input axis [deg/h]; 0 where the facts do not tell it."""
+    return run.facts.earth_rate_deg_h or 0.0
+
+
+def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float | None = None) -> Plateaus:
+    """The plateaus of a run's table rate.
+
+    Parameters
+    ----------
+    run
+        With the table's rate, best as it was commanded.
+    waves
+        Its oscillations, which hold none.
+    settle_s
+        Left out at the begin of each but the first [s]; `SETTLING_ROWS` rows if None.
+    """
+    time, rate, output = run.time, run.rate, run.gyro_deg_h
+    turning = np.zeros(len(rate), dtype=np.bool_)
+    for wave in waves:
+        turning[wave.start : wave.stop] = True
+    changes = (np.abs(np.diff(rate)) > _NOISES * white_noise(rate[~turning])) | turning[1:] | turning[:-1]
+    edges = np.concatenate([[0], np.flatnonzero(changes) + 1, [len(rate)]])
+    edges = np.union1d(edges, run.gap_starts).astype(np.intp)
+    rows = []
+    for first, last in zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True):
+        begin = first
+        if first:
+            late = (
+                first + SETTLING_ROWS if settle_s is None else np.searchsorted(time, time[first] + settle_s)
+            )
+            begin = int(late)
+        if last - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
+            rows.append((begin, last))
+    told = [_told(run, output, *pair) for pair in rows]
+    columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 6)
+    start, stop = columns[:, :2].astype(np.intp).T
+    return Plateaus(start, stop, *columns[:, 2:].T)
+
+
+def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, float, float, float]:
+    part = output[start:stop]
+    # From differences of neighbours, so that a drifting bias is no noise.
+    white = float(np.sqrt(0.5 * np.mean(np.diff(part) ** 2)))
+    middle = 0.5 * (run.time[start] + run.time[stop - 1])
+    acting = 3600.0 * float(run.rate[start:stop].mean()) + earth_deg_h(run)
+    return float(middle), acting, float(part.mean()), white / np.sqrt(stop - start)
+
+
+def find_oscillations(run: Run) -> list[Oscillation]:
+    """Stretches in which the table's rate is a sine about rest, each at one frequency."""
+    time, rate = run.time, run.rate
+    # A wave passes zero at a good pace; noise about rest does so within a band.
+    band = _BAND * float(np.abs(rate).max(initial=0.0))
+    outside = np.flatnonzero(np.abs(rate) > band)
+    rising = np.flatnonzero((rate[outside[:-1]] < 0.0) & (rate[outside[1:]] > 0.0))
+    below, above = outside[rising], outside[rising + 1]
+    # Linear between the samples on both sides.
+    at = time[below] + (time[above] - time[below]) * -rate[below] / (rate[above] - rate[below])
+    cycle = np.diff(at)
+    cuts = np.flatnonzero(np.abs(np.diff(np.log(cycle))) > _SAME_CYCLE) + 1
+    found = []
+    for piece in np.split(np.arange(len(cycle)), cuts):
+        if len(piece) < LEAST_CYCLES:
+            continue
+        first, last = float(at[piece[0]]), float(at[piece[-1] + 1])
+        start, stop = np.searchsorted(time, [first, last]).tolist()
+        wave = Oscillation(start, stop, len(piece) / (last - first))
+        if _is_sine(time[start:stop], rate[start:stop], wave.frequency_hz):
+            found.append(wave)
+    return found
+
+
+def _is_sine(time: FloatArray, rate: FloatArray, frequency_hz: float) -> bool:
+    omega = 2.0 * np.pi * frequency_hz * (time - time[0])
+    basis = np.column_stack([np.cos(omega), np.sin(omega)])
+    left = rate - basis @ np.linalg.lstsq(basis, rate, rcond=None)[0]
+    return bool(left @ left <= (1.0 - SINE_SHARE) * float(rate @ rate))

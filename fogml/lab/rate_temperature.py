@@ -1,0 +1,97 @@
+"""Temperature sensitivity of the scale factor, from turns at several temperatures (eps_T of IEEE Std 952)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.runs.run import FloatArray, Run
+from fogml.validation.scale_factor import find_steps
+
+LEAST_SPAN_DEGC = 5.0
+"""Temperatures closer together tell no sensitivity."""
+LEAST_FOR_CURVE = 4
+"""Temperatures that a curvature needs: three would leave nothing to judge it by."""
+SAME_DEGC = 2.0
+"""Turns this close in temperature are one point: a soak."""
+LEAST_PIECE_S = 5.0
+"""Shortest piece beside a step [s]: loop, slew and logger have settled long before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """The scale factor over temperature.
+
+    Attributes
+    ----------
+    ppm_per_degC, se
+        eps_T, the slope at the mean of the temperatures, and its standard error; None for two temperatures.
+    curvature_ppm_per_degC2
+        Of a parabola; None for fewer than `LEAST_FOR_CURVE` temperatures.
+    temperature, scale_factor
+        One point a soak: temperature [degC] and output over input; shape (s,).
+    """
+
+    ppm_per_degC: float
+    se: float | None
+    curvature_ppm_per_degC2: float | None
+    temperature: FloatArray
+    scale_factor: FloatArray
+
+
+def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h: float) -> Sensitivity | None:
+    """From the steps of the table's rate in all runs; None where the temperatures span too little.
+
+    A step is taken between pieces just beside it, so that a drifting bias drops out, and the two senses of a
+    rate may differ in their scale factors.
+
+    Parameters
+    ----------
+    runs
+        The runs.
+    least_deg_h
+        Steps smaller than that tell little [deg/h].
+    most_deg_h
+        The greatest rate that the output follows [deg/h].
+    """
+    parts = [_steps(run, least_deg_h, most_deg_h) for run in runs if run.temperature_columns]
+    steps = np.concatenate([np.empty((0, 4)), *parts])
+    if len(steps) == 0 or np.ptp(steps[:, 0]) < LEAST_SPAN_DEGC:
+        return None
+    x, y = _soaks(steps)
+    columns = 3 if len(x) >= LEAST_FOR_CURVE else 2
+    off = x - x.mean()
+    matrix = np.column_stack([np.ones(len(x)), off, off**2 - np.mean(off**2)])[:, :columns]
+    solved = np.linalg.lstsq(matrix, y, rcond=None)[0]
+    se = None
+    if len(x) > columns:
+        left = y - matrix @ solved
+        deviation = float(np.sqrt(left @ left / (len(x) - columns)))
+        se = float(1e6 * deviation * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]) / solved[0])
+    curve = 1e6 * float(solved[2] / solved[0]) if columns == 3 else None
+    return Sensitivity(1e6 * float(solved[1] / solved[0]), se, curve, x, y)
+
+
+def _steps(run: Run, least: float, most: float) -> FloatArray:
+    """Temperature [degC], and steps of rate, its size and output [deg/h], as columns, shape (k, 4)."""
+    steps = find_steps(run, np.ones(len(run), dtype=np.bool_))
+    if steps is None:
+        return np.empty((0, 4))
+    time = run.time[steps.usable]
+    lasting = [time[rows[:, 1] - 1] - time[rows[:, 0]] for rows in (steps.before, steps.after)]
+    told = (np.abs(steps.levels).max(axis=1) <= most * (1.0 + 1e-9)) & (np.abs(steps.height) >= least)
+    told &= np.minimum(*lasting) >= LEAST_PIECE_S
+    temperature = run.temperature("T")[steps.usable[steps.after[:, 0]]]
+    sizes = np.diff(np.abs(steps.levels), axis=1)[:, 0]
+    return np.column_stack([temperature, steps.height, sizes, steps.of(run.gyro_deg_h)])[told]
+
+
+def _soaks(steps: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean temperature and scale factor of the steps of each temperature, shape (s,)."""
+    steps = steps[np.argsort(steps[:, 0])]
+    edges = np.flatnonzero(np.diff(steps[:, 0]) > SAME_DEGC) + 1
+    groups = np.split(steps, edges)
+    scale = [float(np.linalg.lstsq(group[:, 1:3], group[:, 3], rcond=None)[0][0]) for group in groups]
+    return np.array([float(group[:, 0].mean()) for group in groups]), np.array(scale)

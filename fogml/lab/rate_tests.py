@@ -1,0 +1,250 @@
+"""Tests on a rate table: scale factor, range, threshold, dead zone and resolution (IEEE Std 952).
+
+Every plateau of the table's rate is one point of output over input. The line through them, with a bias
+that drifts steadily, is the scale factor; small rates against that line tell the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.lab.rate_pieces import Plateaus
+from fogml.runs.run import FloatArray
+
+LEAST_FOR_DRIFT = 3
+"""Plateaus that a straight drift needs: two would leave nothing over."""
+
+
+@dataclass(frozen=True)
+class Criteria:
+    """What counts as following.
+
+    Attributes
+    ----------
+    answers
+        Share of the expected output from which on a rate counts as seen: 50 % by IEEE Std 952.
+    dead
+        Share of the expected change of output below which a zone is dead: 10 % by IEEE Std 952.
+    range_error
+        Share by which a rate within the range may miss the line of the rates below it.
+    small
+        Share of the greatest rate below which rates tell threshold, dead zone and steps of resolution: they
+        add little to the scale factor.
+    doubt
+        Standard error of a share beyond which noise, not the gyro, answers, and the rate is left out.
+    """
+
+    answers: float = 0.5
+    dead: float = 0.1
+    range_error: float = 0.01
+    small: float = 0.02
+    doubt: float = 0.2
+
+
+@dataclass(frozen=True)
+class Line:
+    """Output over rate: scale factor, its standard error, and what the rates leave [ppm of the greatest].
+
+    Attributes
+    ----------
+    scale_factor, se
+        Output over input.
+    nonlinearity_ppm
+        Greatest deviation from the line over the greatest rate; None for fewer than four rates.
+    asymmetry_ppm
+        Scale factor of the positive rates less that of the negative ones; None where one sense lacks.
+    """
+
+    scale_factor: float
+    se: float
+    nonlinearity_ppm: float | None
+    asymmetry_ppm: float | None
+
+
+@dataclass(frozen=True)
+class Bracket:
+    """A size [deg/h] known to lie from `above` to `below`; None where no test was on that side."""
+
+    above: float | None
+    below: float | None
+
+
+@dataclass(frozen=True)
+class Range:
+    """Rates that the output follows [deg/h].
+
+    Attributes
+    ----------
+    followed
+        The greatest rate that it follows.
+    exceeded
+        The smallest rate that it does not; None where it follows all.
+    output
+        Size of the output beyond, mean of all such rates; None likewise.
+    """
+
+    followed: float
+    exceeded: float | None
+    output: float | None
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A small rate or a small step: its size [deg/h], the share of it that shows, and the error of that."""
+
+    size: float
+    share: float
+    se: float
+
+
+def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | None:
+    """Scale factor and range of a ladder of rates; None where fewer than two rates differ.
+
+    Rates are taken in by their size as long as the next one stays within `range_error` of the line through
+    those below it.
+    """
+    size = np.abs(plateaus.rate)
+    large = size >= criteria.small * size.max(initial=0.0)
+    sizes = np.unique(np.round(size[large], 6))
+    if len(plateaus) < 3 or np.ptp(plateaus.rate) == 0.0:
+        return None
+    within = np.ones(len(plateaus), dtype=np.bool_)
+    for place in range(len(sizes) - 1, 0, -1):
+        below = size < 0.5 * (sizes[place - 1] + sizes[place])
+        if np.ptp(plateaus.rate[below]) == 0.0:
+            break
+        solved = _fit(plateaus[below])
+        expected = _design(plateaus) @ solved
+        top = (size >= 0.5 * (sizes[place - 1] + sizes[place])) & within
+        missed = np.abs(plateaus.output - expected)[top].max(initial=0.0)
+        if missed <= criteria.range_error * sizes[place]:
+            break
+        within = below
+    kept, beyond = plateaus[within], plateaus[~within]
+    exceeded = output = None
+    if len(beyond):
+        exceeded = float(np.abs(beyond.rate).min())
+        output = float(np.abs(beyond.output).mean())
+    return _line(kept), Range(float(np.abs(kept.rate).max()), exceeded, output)
+
+
+def _design(plateaus: Plateaus) -> FloatArray:
+    since = plateaus.time - plateaus.time.mean() if len(plateaus) else plateaus.time
+    return np.column_stack([plateaus.rate, np.ones(len(plateaus)), since / max(np.ptp(since), 1.0)])
+
+
+def _fit(plateaus: Plateaus) -> FloatArray:
+    matrix = _design(plateaus)
+    # With few plateaus a drift would fit anything.
+    columns = 3 if len(plateaus) > 4 else 2
+    solved = np.zeros(3)
+    solved[:columns] = np.linalg.lstsq(matrix[:, :columns], plateaus.output, rcond=None)[0]
+    return solved
+
+
+def _line(plateaus: Plateaus) -> Line:
+    solved, matrix = _fit(plateaus), _design(plateaus)
+    columns = 3 if len(plateaus) > 4 else 2
+    left = plateaus.output - matrix @ solved
+    freedom = max(len(plateaus) - columns, 1)
+    # What the plateaus' own noise makes, or what they scatter by, whichever is more.
+    deviation = max(float(np.sqrt(left @ left / freedom)), float(np.sqrt(np.mean(plateaus.error**2))))
+    inverse = np.linalg.pinv(matrix[:, :columns].T @ matrix[:, :columns])
+    greatest = float(np.abs(plateaus.rate).max())
+    levels = len(np.unique(np.round(plateaus.rate, 6)))
+    asymmetry = None
+    senses = [plateaus.rate > 0.0, plateaus.rate < 0.0]
+    if levels >= 4 and all(sense.any() for sense in senses):
+        # The gain of |rate| beside that of the rate is half of the difference of the two senses.
+        both = np.column_stack([matrix[:, :columns], np.abs(plateaus.rate)])
+        asymmetry = 2e6 * float(np.linalg.lstsq(both, plateaus.output, rcond=None)[0][-1]) / float(solved[0])
+    return Line(
+        float(solved[0]),
+        deviation * float(np.sqrt(inverse[0, 0])),
+        1e6 * float(np.abs(left).max()) / greatest if levels >= 4 else None,
+        asymmetry,
+    )
+
+
+def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Plateaus:
+    """The plateaus whose rate is small against the greatest of all [deg/h]."""
+    return plateaus[np.abs(plateaus.rate) < criteria.small * greatest]
+
+
+def zero_answers(small: Plateaus, scale_factor: float, criteria: Criteria) -> list[Answer]:
+    """Which share of each small rate shows, by size, in both senses together.
+
+    Rates count from the middle of the ladder: where the output is zero, if the table is set so, which for a
+    gyro with a bias is not where the rate is. The output there, over time, is what they come on top of; where
+    the ladder has no middle, the means of both senses are.
+    """
+    if len(small) < 3:
+        return []
+    rate = small.rate - 0.5 * (small.rate.min() + small.rate.max())
+    sizes = np.round(np.abs(rate), 6)
+    tested = np.unique(sizes[sizes > 0.0])
+    of_size = np.sign(rate)[:, None] * (sizes[:, None] == tested)
+    steady = _design(small)[:, 1:]
+    middle = sizes == 0.0
+    if middle.sum() >= LEAST_FOR_DRIFT:
+        bias = np.linalg.lstsq(steady[middle], small.output[middle], rcond=None)[0]
+    else:
+        matrix = np.column_stack([steady, of_size])
+        bias = np.linalg.lstsq(matrix, small.output, rcond=None)[0][:2]
+    above = np.sign(rate) * (small.output - steady @ bias)
+    answers = []
+    for size in tested.tolist():
+        here, expected = sizes == size, abs(scale_factor) * size
+        senses = [above[here & (np.sign(rate) == sense)] for sense in (1.0, -1.0)]
+        shown = float(np.mean([part.mean() for part in senses if len(part)])) / expected
+        se = float(np.sqrt(np.mean(small.error[here] ** 2) / here.sum())) / expected
+        if se <= criteria.doubt:
+            answers.append(Answer(size, shown * float(np.sign(scale_factor)), se))
+    return answers
+
+
+def step_answers(
+    plateaus: Plateaus, greatest: float, scale_factor: float, criteria: Criteria
+) -> list[Answer]:
+    """Which share of each small step between neighbouring plateaus away from zero shows, by size."""
+    step, low = np.diff(plateaus.rate), criteria.small * greatest
+    far = np.minimum(np.abs(plateaus.rate[:-1]), np.abs(plateaus.rate[1:])) >= low
+    here = far & (np.abs(step) < low) & (step != 0.0)
+    sizes = np.where(here, np.round(np.abs(step), 6), 0.0)
+    answers = []
+    for size in np.unique(sizes[sizes > 0.0]):
+        which = sizes == size
+        share = np.diff(plateaus.output)[which] / (scale_factor * step[which])
+        noise = plateaus.error[:-1][which] ** 2 + plateaus.error[1:][which] ** 2
+        se = float(np.sqrt(noise.mean() / which.sum())) / (abs(scale_factor) * float(size))
+        if se <= criteria.doubt:
+            answers.append(Answer(float(size), float(share.mean()), se))
+    return answers
+
+
+def least_seen(answers: Sequence[Answer], criteria: Criteria) -> Bracket | None:
+    """The size from which on all are seen: threshold of rates, resolution of steps; None without a test."""
+    if not answers:
+        return None
+    unseen = [one.size for one in answers if one.share < criteria.answers]
+    last = max(unseen, default=None)
+    seen = [one.size for one in answers if last is None or one.size > last]
+    return Bracket(last, min(seen, default=None))
+
+
+def dead_zone(answers: Sequence[Answer], criteria: Criteria) -> Bracket | None:
+    """Width of the zone about zero in which the output does not change with the rate; None without a test.
+
+    Between neighbouring sizes the output changes by less than `dead` of what is expected.
+    """
+    if not answers:
+        return None
+    size = np.array([0.0, *(one.size for one in answers)])
+    output = size * np.array([0.0, *(one.share for one in answers)])
+    changes = np.diff(output) >= criteria.dead * np.diff(size)
+    first = int(np.argmax(changes)) if changes.any() else len(changes)
+    outside = 2.0 * float(size[first + 1]) if changes.any() else None
+    return Bracket(2.0 * float(size[first]), outside)

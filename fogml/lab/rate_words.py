@@ -1,0 +1,84 @@
+"""The results of ``fogml lab rate`` as rows, for terminal and page alike."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+Number = Callable[[float | None], str]
+
+
+class ResultRow(NamedTuple):
+    """A quantity as it is shown."""
+
+    quantity: str
+    value: str
+    se: str
+    unit: str
+    remark: str
+
+
+def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
+    """What a ``rate.json`` tells, quantity by quantity; what was not tested is left out."""
+    rows = []
+    line = values["scale_factor"]
+    if line is not None:
+        ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm"
+        rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
+        for key, name in (("nonlinearity_ppm", "nonlinearity"), ("asymmetry_ppm", "asymmetry")):
+            if line[key] is not None:
+                rows.append(ResultRow(name, number(line[key]), "", "ppm", ""))
+    held = values["range"]
+    if held is not None:
+        remark = "all that was tested"
+        if held["exceeded_deg_s"] is not None:
+            beyond, output = number(held["exceeded_deg_s"]), number(held["output_deg_s"])
+            remark = f"not {beyond} deg/s; the output is {output} deg/s beyond"
+        rows.append(ResultRow("range, followed up to", number(held["followed_deg_s"]), "", "deg/s", remark))
+    for key, name in (
+        ("threshold", "threshold"),
+        ("dead_zone", "dead zone, its width"),
+        ("resolution", "resolution"),
+    ):
+        if values[key] is not None:
+            rows.append(ResultRow(name, bracketed(values[key], number), "", "deg/h", ""))
+    rows += _response(values, number)
+    sensed = values["temperature_sensitivity"]
+    if sensed is not None:
+        slope = number(sensed["ppm_per_degC"])
+        remark = f"over {len(sensed['temperature'])} temperatures"
+        rows.append(ResultRow("temperature sensitivity", slope, number(sensed["se"]), "ppm/degC", remark))
+        if sensed["curvature_ppm_per_degC2"] is not None:
+            curve = number(sensed["curvature_ppm_per_degC2"])
+            rows.append(ResultRow("its curvature", curve, "", "ppm/degC2", ""))
+    if values["count_arcsec"] is not None:
+        rows.append(ResultRow("one count", number(values["count_arcsec"]), "", "arcsec", "of angle"))
+    return rows
+
+
+def _response(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
+    rows = []
+    band = values["bandwidth"]
+    if band is not None:
+        between = number(band["half_power_hz"])
+        remark = "gain 0.707, between the frequencies tested"
+        if band["half_power_hz"] is None:
+            between, remark = "–", "the gain does not fall to 0.707, or is below from the first frequency on"
+        rows.append(ResultRow("bandwidth", between, "", "Hz", remark))
+        if band["first_order_hz"] is not None:
+            first = number(band["first_order_hz"])
+            rows.append(ResultRow("of a first-order loop", first, number(band["se"]), "Hz", "all gains"))
+    limit = values["slew"]
+    if limit is not None:
+        remark = f"the table has {number(limit['table_deg_s2'])} deg/s2"
+        name = "slew" if limit["limited"] else "slew, at least"
+        rows.append(ResultRow(name, number(limit["output_deg_s2"]), "", "deg/s2", remark))
+    return rows
+
+
+def bracketed(found: Mapping[str, float | None], number: Number) -> str:
+    """``0.2 to 0.5``, ``at most 0.001``, ``above 50``."""
+    above, below = found["above_deg_h"], found["below_deg_h"]
+    if below is None:
+        return f"above {number(above)}"
+    return f"at most {number(below)}" if not above else f"{number(above)} to {number(below)}"

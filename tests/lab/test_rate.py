@@ -1,0 +1,153 @@
+"""Tests on a rate table against closed forms: of twins, and of a table written by hand."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.lab.rate_json import rate_json, unit_facts
+from fogml.lab.rate_pieces import find_oscillations, find_plateaus
+from fogml.lab.rate_programmes import rate_runs
+from fogml.lab.rate_response import bandwidth, gain_of
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.optics import Coil
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin
+
+TAU_S = 5e-4
+FREQUENCIES = np.array([10.0, 100.0, 200.0, 300.0, 400.0, 600.0])
+
+
+@lru_cache(maxsize=1)
+def of_a_twin() -> dict[str, Any]:
+    """A twin with one of each, noise-free."""
+    twin = load_twin("nominal").with_nominal(k1=20.0, b0=1.0)
+    twin = twin.with_effect("deadband", 0.3).with_effect("rate_range", 1.0, range=330.0)
+    twin = twin.with_effect("loop_gain", TAU_S, power_slope=0.0, leak_time=1e9)
+    twin = twin.with_effect("sf_asymmetry", 100.0).with_effect("sf_temperature", 15.0)
+    twin = twin.with_effect("slew_limit", 1.0, slew=8000.0)
+    return rate_json(rate_runs(twin, frequencies_hz=FREQUENCIES), source="twin", twin=twin)
+
+
+def test_threshold_and_dead_zone_of_a_locked_oscillator() -> None:
+    """out = sqrt(w**2 - w_d**2) is half of w at 2 w_d / sqrt(3), and dead from -w_d to w_d."""
+    told = of_a_twin()
+    threshold, zone = told["threshold"], told["dead_zone"]
+    assert threshold["above_deg_h"] < 2.0 / math.sqrt(3.0) * 0.3 <= threshold["below_deg_h"]
+    assert zone["above_deg_h"] <= 0.6 <= zone["below_deg_h"]
+    shares = {one["size"]: one["share"] for one in told["zero_answers"]}
+    assert shares[1.0] == pytest.approx(math.sqrt(1.0 - 0.3**2), abs=2e-3)
+    # Away from zero there is none of it.
+    assert told["resolution"] == {"above_deg_h": None, "below_deg_h": pytest.approx(0.001)}
+
+
+def test_range_slew_asymmetry_and_bandwidth_are_those_of_the_effects() -> None:
+    told = of_a_twin()
+    assert told["range"]["followed_deg_s"] == pytest.approx(300.0)
+    assert told["range"]["exceeded_deg_s"] == pytest.approx(350.0)
+    assert told["range"]["output_deg_s"] == pytest.approx(330.0)
+    # Both senses have their own scale factor, k_a above and below the mean.
+    assert told["scale_factor"]["asymmetry_ppm"] == pytest.approx(200.0, rel=1e-3)
+    assert told["slew"]["limited"] and told["slew"]["output_deg_s2"] == pytest.approx(8000.0, rel=0.02)
+    wanted = 1.0 / (2.0 * math.pi * TAU_S)
+    assert told["bandwidth"]["half_power_hz"] == pytest.approx(wanted, rel=5e-3)
+    assert told["bandwidth"]["first_order_hz"] == pytest.approx(wanted, rel=5e-3)
+
+
+def test_temperature_sensitivity_is_the_sum_of_its_causes() -> None:
+    sensed = of_a_twin()["temperature_sensitivity"]
+    # In ppm of the scale factor at the mean of the temperatures.
+    assert sensed["ppm_per_degC"] == pytest.approx(35.0, rel=1e-3)
+    assert abs(sensed["curvature_ppm_per_degC2"]) < 1e-3
+    assert of_a_twin()["notes"] == []
+
+
+def test_a_lag_is_no_slew_limit() -> None:
+    twin = Twin().with_effect("loop_gain", 5e-3, power_slope=0.0, leak_time=1e9)
+    told = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0, 20.0])), source="twin", twin=twin)
+    assert not told["slew"]["limited"]
+    # From 10 to 90 % an exponential takes ln 9 time constants.
+    assert told["bandwidth"]["first_order_hz"] == pytest.approx(1.0 / (2.0 * math.pi * 5e-3), rel=0.01)
+
+
+def test_noise_hides_small_rates_and_the_answer_says_so() -> None:
+    twin = Twin().with_noise(N=0.05)
+    told = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0]), noise=True, seed=2), source="twin")
+    # 0.05 deg/sqrt(h) over a minute is 0.39 deg/h, and a share is told to 0.2.
+    smallest = min(one["size"] for one in told["zero_answers"])
+    assert 0.4 < smallest <= 5.0
+    assert told["threshold"]["above_deg_h"] is None and told["threshold"]["below_deg_h"] == smallest
+
+
+def by_hand(rates: FloatArray, stay: int = 40, seed: int = 1, **facts: Any) -> Run:
+    """A table's rates in turn, a gyro of 1.0002 with a drifting bias and noise, Earth rate on the axis."""
+    rng = np.random.default_rng(seed)
+    rate = np.repeat(rates, stay)
+    time = 0.5 * np.arange(len(rate))
+    stated = Facts(**facts)
+    acting = 3600.0 * rate + (stated.earth_rate_deg_h or 0.0)
+    gyro = 1.0002 * acting + 2.0 + 1e-3 * time + 0.5 * rng.standard_normal(len(rate))
+    return Run("table", {"time": time, "gyro": gyro, "rate": rate}, stated)
+
+
+def test_scale_factor_of_a_table_by_hand_within_its_standard_error() -> None:
+    ladder = np.array([0.0, 5.0, -5.0, 10.0, -10.0, 20.0, -20.0, 40.0, -40.0, 0.0])
+    off = []
+    for seed in range(20):
+        run = by_hand(ladder, seed=seed, latitude=50.0, input_axis="up")
+        line = rate_json([run], source="table")["scale_factor"]
+        off.append((line["scale_factor"] - 1.0002) / line["se"])
+    assert 0.6 < np.sqrt(np.mean(np.square(off))) < 1.5
+
+
+def test_earth_rate_counts_where_zero_is() -> None:
+    """With the axis up a table that turns against the Earth has zero rate on the gyro."""
+    earth = Facts(latitude=50.0, input_axis="up").earth_rate_deg_h
+    assert earth is not None
+    small = np.array([0.0, 1.0, -1.0, 5.0, -5.0, 20.0, -20.0])
+    rates = np.concatenate([(small - earth) / 3600.0, [10.0, -10.0]])
+    run = by_hand(rates, stay=400, latitude=50.0, input_axis="up")
+    assert find_plateaus(run).rate[:3] == pytest.approx([0.0, 1.0, -1.0], abs=1e-9)
+    told = rate_json([run], source="table")
+    assert told["threshold"]["below_deg_h"] == pytest.approx(1.0)
+
+
+def test_gain_of_a_delayed_wave_by_hand() -> None:
+    time = 1e-3 * np.arange(4000.0)
+    omega = 2.0 * math.pi * 5.0
+    rate = np.where(time < 3.0, 2.0 * np.sin(omega * time), 0.0)
+    gyro = np.where(time < 3.0, 0.8 * 7200.0 * np.sin(omega * time - 0.3), 0.0) + 4.0
+    run = Run("wave", {"time": time, "gyro": gyro, "rate": rate}, Facts())
+    (wave,) = find_oscillations(run)
+    found = gain_of(run, wave)
+    assert wave.frequency_hz == pytest.approx(5.0, rel=1e-6)
+    assert found.gain == pytest.approx(0.8, rel=1e-3)
+    assert found.phase_deg == pytest.approx(-math.degrees(0.3), abs=0.05)
+    assert bandwidth([found]) is None
+
+
+def test_turns_to_and_fro_are_no_oscillation() -> None:
+    run = by_hand(np.tile([10.0, -10.0], 6))
+    assert find_oscillations(run) == [] and len(find_plateaus(run)) == 12
+
+
+def test_what_is_not_tested_is_said_and_a_still_table_refused() -> None:
+    told = rate_json([by_hand(np.array([0.0, 10.0, -10.0, 0.0]))], source="table")
+    assert told["bandwidth"] is None and any("bandwidth" in note for note in told["notes"])
+    with pytest.raises(InputError, match="no run holds a turn"):
+        rate_json([by_hand(np.zeros(4))], source="table")
+
+
+def test_facts_of_the_unit_follow_from_its_coil() -> None:
+    facts = unit_facts(Twin(coil=Coil(length=2000.0, diameter=0.05, wavelength=1310e-9)))
+    sagnac = 2.0 * math.pi * 2000.0 * 0.05 / (1310e-9 * 299_792_458.0)
+    assert facts["sagnac_s"] == pytest.approx(sagnac)
+    assert facts["fringe_deg_s"] == pytest.approx(math.degrees(2.0 * math.pi / sagnac))
+    assert facts["transit_us"] == pytest.approx(1e6 * 1.4525 * 2000.0 / 299_792_458.0)
+    assert facts["proper_frequency_khz"] == pytest.approx(500.0 / facts["transit_us"])
