@@ -15,6 +15,7 @@ from fogml.gap.model import GyroModel
 from fogml.gap.noise import FROM_RUNS_ALONE, Noise, noise_of, prior_of
 from fogml.gap.observation import Observation, Unusable, observe
 from fogml.gap.run_whitener import RunWhitener
+from fogml.runs.epochs import with_epoch
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_fit import NoisePrior
 
@@ -50,6 +51,8 @@ def prepare(
 ) -> Prepared:
     """Runs made ready, noise fitted, constants recalibrated."""
     _check_runs(fit, held_out, noise)
+    # The unit ages from its first run on, whichever it is.
+    fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     part = not held_out
     if part:
         fit, held_out = _keep_back(fit)

@@ -22,6 +22,7 @@ _EXAMPLES = {
     "scale_factor": '{value: 1.0, unit: "count per deg/h"}',
     "powered_on": "0.0",
     "started": "2026-03-02T08:00:00Z",
+    "in_use_since": "2026-01-15T08:00:00Z",
 }
 NAMES = ("unit", "axis", "notes")
 """Facts that are names, as text however they are written."""
@@ -75,6 +76,7 @@ class Facts(BaseModel):
 
     Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
     turns about, counter-clockwise; up where it is not stated. `compensated` says that the output is.
+    `in_use_since` is when the unit's first run began, from which it ages.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
@@ -86,6 +88,7 @@ class Facts(BaseModel):
     scale_factor: ScaleFactor | None = None
     powered_on: float | None = Field(default=None, allow_inf_nan=False)
     started: Annotated[datetime | None, BeforeValidator(_moment)] = None
+    in_use_since: Annotated[datetime | None, BeforeValidator(_moment)] = None
     compensated: bool | None = None
     notes: str | None = None
 
@@ -111,9 +114,39 @@ class Facts(BaseModel):
         }
         return EARTH_RATE_DEG_H * projection[self.input_axis]
 
+    @property
+    def epoch_s(self) -> float:
+        """How long after the unit's first run began this one did [s]; 0 where the facts don't tell.
+
+        Raises
+        ------
+        InputError
+            If only one of the two moments has a time zone, or the run began first.
+        """
+        if self.started is None or self.in_use_since is None:
+            return 0.0
+        return seconds_between(self.in_use_since, self.started, "in_use_since")
+
     def as_dict(self) -> dict[str, Any]:
         """The stated facts as YAML- and JSON-ready values."""
         return self.model_dump(mode="json", exclude_none=True)
+
+
+def seconds_between(earlier: datetime, later: datetime, what: str) -> float:
+    """Time from one moment to another [s].
+
+    Raises
+    ------
+    InputError
+        If only one of them has a time zone, or the later one is the earlier.
+    """
+    try:
+        found = (later - earlier).total_seconds()
+    except TypeError:
+        raise InputError(f"'{what}' and 'started': one has a time zone, the other none; add it") from None
+    if found < 0.0:
+        raise InputError(f"'started' is {later.isoformat()}, before '{what}', {earlier.isoformat()}")
+    return found
 
 
 def facts_from(values: Any, source: str) -> Facts:

@@ -304,6 +304,10 @@ class Run:
         check_columns(self.name, added)
         return self._with({**self.columns, **added})
 
+    def with_facts(self, facts: Facts) -> Run:
+        """The run with other set-up facts."""
+        return Run.derived(self.name, self.columns, facts, self.gyro_unit, self.findings)
+
     def _with(self, columns: Mapping[str, FloatArray]) -> Run:
         return Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
 

@@ -95,6 +95,7 @@ def inputs_of_run(run: Run) -> tuple[Inputs, PowerWindows]:
         drives=drives,
         sensors=sensors,
         rate_window_s=RATE_WINDOW_S if noisy else 0.0,
+        epoch_s=run.facts.epoch_s,
         angle_begins_anew="angle" in drives and float(np.ptp(drives["angle"])) <= 360.0,
         hindsight=noisy,
     )
@@ -127,6 +128,7 @@ def inputs_of_truth(truth: Truth, run: Run) -> Inputs:
         power_offs_s=tuple(off for _, off in windows[:-1]),
         drives=truth.drives,
         rate_window_s=0.0,
+        epoch_s=run.facts.epoch_s,
     )
 
 

@@ -129,6 +129,7 @@ def _joined(twin: Twin, run: Run, after: Sequence[Run], storage: Storage) -> tup
         table_rate=np.concatenate([part[2] for part in parts]),
         drives={name: np.concatenate([_drive(part, name) for part in parts]) for name in given.drives},
         sensors={},
+        epoch_s=runs[0].facts.epoch_s,
         powered_on_s=windows[0][0],
         power_ons_s=tuple(on for on, _ in windows[1:]),
         power_offs_s=tuple(off for _, off in windows[:-1]),

@@ -147,7 +147,9 @@ class World:
             )
         own = self._windows[len(self._windows) - self._own_cycles :]
         first = own[0][0] - self.clock_s if own else math.inf
-        self.facts = facts.model_copy(update={"powered_on": first if math.isfinite(first) else None})
+        since = self._first_facts.in_use_since or (self._first_facts.started if before else None)
+        power_on = first if math.isfinite(first) else None
+        self.facts = facts.model_copy(update={"powered_on": power_on, "in_use_since": since})
         self.counts_per_deg_h = twin.counts_per_deg_h(sample_s)
         self._main = _Branch(twin)
         self._without = {}
@@ -279,6 +281,7 @@ class World:
             drives=drives,
             coil=branch.twin.coil,
             light=branch.twin.light,
+            epoch_s=self._first_facts.epoch_s,
             seed=self._seed,
             rate_window_s=0.0,
             memory=branch.memory,

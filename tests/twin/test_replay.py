@@ -41,10 +41,15 @@ NOISE = NoiseConstants(N=0.01, B=0.05, K=0.01)
 
 
 def everything(stop: type | tuple[type, ...] = (), seeded: bool = True, **more) -> Twin:
-    """All effects on but damage, those of some kinds, and where not wanted those that a simulation draws."""
+    """All effects on but damage, those of some kinds, and where not wanted those that a simulation draws.
+
+    Without sensors' errors columns replay to rounding, but for nodes that none holds: they start at rest.
+    """
     twin = Twin("all", nominal=CONSTANTS, noise=NOISE, **more)
     for id, declared in effects().items():
         wanted = not isinstance(declared, stop) and (seeded or not declared.seeded)
+        if id == "axial_gradient" and stop is SensorEffect:
+            continue
         if id not in DAMAGE and not declared.conflicts and wanted:
             twin = twin.with_effect(id)
     return twin

@@ -17,9 +17,10 @@ class Ageing(BiasEffect):
 
         b = b_1 ln(1 + t / tau)
 
-    t is the time since the unit's first run began, from the facts ``started`` of its runs where several are
-    told, else the recording's time [s]; tau the shape's ``time_constant``; well before tau it is a straight
-    line. That of the scale factor is too small for a recording to show.
+    t is the time since the unit's first run began [s]: by the facts ``in_use_since`` and ``started``, or by
+    ``started`` alone where several runs are told together; else it is the recording's time. tau is the
+    shape's ``time_constant``; well before tau it is a straight line. That of the scale factor is too small
+    for a recording to show.
 
     Source: logarithmic ageing (engineering); ranges of b_1 give 0.1 to 1 deg/h (tactical) and 0.002 to
     0.02 deg/h (navigation) in the first year for tau = 100 h.
