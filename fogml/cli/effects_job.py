@@ -36,7 +36,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
     found = effects()
     if out is not None:
         from fogml.report.catalogue_page import catalogue_page
-        from fogml.twin.card import card_values, pictures
+        from fogml.twin.card import card_values, pictures, rate_curves
 
         cards = []
         with whole_folder(out, shared=True) as folder:
@@ -44,7 +44,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
                 for declared in found.values():
                     work.doing(declared.id)
                     (picture,) = pictures(declared, (_CATALOGUE_PROGRAMME,))
-                    cards.append((card_values(declared), picture))
+                    cards.append((card_values(declared), picture, rate_curves(declared)))
                     work.advance()
             (folder / "catalogue.html").write_text(catalogue_page(cards), encoding="utf-8")
     terminal.say(f"{len(found)} effects: letter code, id, stage, title\n")
@@ -74,7 +74,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
 
 
 def _card(id: str, out: str | None, terminal: Terminal) -> None:
-    from fogml.twin.card import STANDARD_PROGRAMMES, card_values, pictures
+    from fogml.twin.card import STANDARD_PROGRAMMES, card_values, pictures, rate_curves
 
     declared = effect(id)
     values = card_values(declared)
@@ -83,7 +83,8 @@ def _card(id: str, out: str | None, terminal: Terminal) -> None:
             from fogml.report.effect_card import effect_page
 
             drawn = pictures(declared, STANDARD_PROGRAMMES)
-            (folder / f"{id}.html").write_text(effect_page(values, drawn), encoding="utf-8")
+            page = effect_page(values, drawn, rate_curves(declared))
+            (folder / f"{id}.html").write_text(page, encoding="utf-8")
     if not (terminal.quiet or terminal.as_json):
         _print_card(values, terminal)
         _print_pictures(id, terminal)

@@ -80,7 +80,7 @@ def rate_runs(
     zero = -float(_run(twin, "at rest", (Hold(STAY_S),), SAMPLE_S, seed).gyro_deg_h.mean()) / 3600.0
     carrier = CARRIER_SHARE * greatest_deg_s
     carried = [rate for step in small for rate in (carrier, carrier + step)]
-    programmes = [
+    programmes: list[tuple[str, tuple[Hold | Soak, ...], float]] = [
         ("rates", _turns([rate for r in ladder for rate in (r, -r)]), SAMPLE_S),
         ("about zero", _turns([zero + rate for r in small for rate in (0.0, r, 0.0, -r)]), SAMPLE_S),
         ("steps on a carrier", _turns(carried), SAMPLE_S),

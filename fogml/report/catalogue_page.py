@@ -8,10 +8,10 @@ from typing import Any
 
 from markupsafe import Markup
 
-from fogml.report.effect_card import about, panel, quantities_table
+from fogml.report.effect_card import about, panel, quantities_table, rate_figure
 from fogml.report.page import render
 from fogml.report.tables import Table
-from fogml.twin.card import Picture
+from fogml.twin.card import RATE_DEGC, Picture, RateCurve
 
 STAGE_WORDS = {
     "thermal": "Thermal plant",
@@ -24,6 +24,8 @@ STAGE_WORDS = {
     "logger": "Logger",
     "noise": "Random errors",
 }
+
+OVER_RATE = f"Above, what it changes at steady rates, at {RATE_DEGC:g} degC."
 
 
 @dataclass(frozen=True)
@@ -38,21 +40,23 @@ class Entry:
     about: list[tuple[str, str]]
 
 
-def catalogue_page(cards: Sequence[tuple[Mapping[str, Any], Picture]]) -> str:
+def catalogue_page(cards: Sequence[tuple[Mapping[str, Any], Picture, Sequence[RateCurve]]]) -> str:
     """The self-contained HTML page of all effects.
 
     Parameters
     ----------
     cards
-        Card of schema ``fogml.effect/1`` and its signature on one programme, of each effect in the
-        order of the catalogue.
+        Card of schema ``fogml.effect/1``, its signature on one programme and its curves over the rate, of
+        each effect in the order of the catalogue. A curve is shown of what the programme does not.
     """
     stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
-    for card, picture in cards:
+    for card, picture, curves in cards:
         drawn = panel(card, picture)
-        entry = Entry(
-            card, quantities_table(card), drawn.signature, picture.programme, drawn.words, about(card)
-        )
+        figure, where, said = drawn.signature, picture.programme, drawn.words
+        if not drawn.shows:
+            figure = rate_figure(curves[0]) if curves else Markup("")
+            said = f"{said} {OVER_RATE if curves else ''}".strip()
+        entry = Entry(card, quantities_table(card), figure, where, said, about(card))
         stages[card["stage"]].append(entry)
     shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
     return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown)

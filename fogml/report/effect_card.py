@@ -14,22 +14,25 @@ from fogml.report.reduce import min_max_indices
 from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table
 from fogml.report.words import number
-from fogml.twin.card import Picture
+from fogml.twin.card import RATE_DEGC, Picture, RateCurve
 
 _POINTS = 600
 
 
 @dataclass(frozen=True)
 class Panel:
-    """A signature on one programme: figures of the chamber and of the effect, and what they show."""
+    """A signature on one programme: figures of the chamber and of the effect, what they show, and if any."""
 
     programme: str
     chamber: Markup
     signature: Markup
     words: str
+    shows: bool = True
 
 
-def effect_page(card: Mapping[str, Any], pictures: Sequence[Picture]) -> str:
+def effect_page(
+    card: Mapping[str, Any], pictures: Sequence[Picture], curves: Sequence[RateCurve] = ()
+) -> str:
     """The self-contained HTML page of an effect.
 
     Parameters
@@ -38,6 +41,8 @@ def effect_page(card: Mapping[str, Any], pictures: Sequence[Picture]) -> str:
         Schema ``fogml.effect/1``, as `fogml.twin.card.card_values` gives it.
     pictures
         Its signature on programmes.
+    curves
+        What it changes over the rate, if that is its place.
     """
     return render(
         "effect.html",
@@ -46,6 +51,19 @@ def effect_page(card: Mapping[str, Any], pictures: Sequence[Picture]) -> str:
         quantities=quantities_table(card),
         panels=[panel(card, picture) for picture in pictures],
         about=about(card),
+        curves=[rate_figure(curve) for curve in curves],
+        warm=f"{RATE_DEGC:g} degC",
+    )
+
+
+def rate_figure(curve: RateCurve) -> Markup:
+    """What an effect changes in the output over the rate."""
+    return line_figure(
+        [Curve(curve.rate, curve.change, style.MODEL)],
+        f"rate [{curve.unit}]",
+        "effect [deg/h]",
+        f"Change of the output over rates of up to {curve.rate[-1]:g} {curve.unit}",
+        height=170,
     )
 
 
@@ -88,6 +106,7 @@ def panel(card: Mapping[str, Any], picture: Picture) -> Panel:
         _figure(picture, chamber=True, height=120),
         _figure(picture, chamber=False, height=170),
         words(card, picture),
+        bool(picture.values.any()),
     )
 
 

@@ -10,9 +10,12 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+import numpy as np
+
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
-from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.effect import Effect, LoopEffect, NoiseEffect, ScaleFactorEffect
+from fogml.twin.inputs import Inputs
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.programme import load_programme
 from fogml.twin.quantities import GRADES, Quantity
@@ -28,6 +31,10 @@ STANDARD_PROGRAMMES = (
     "separating",
 )
 """What an effect's signature is shown on."""
+RATE_DEGC = 45.0
+"""Temperature at which an effect is shown over the rate: away from 25 degC, where many have their zero."""
+FAST_DEG_S, SLOW_DEG_H = 600.0, 1.0
+_RATES = 401
 _POINTS = 2000
 _HORIZONTAL = Facts(axis="x", latitude=39.9, input_axis="north")
 _UPRIGHT = Facts(axis="x", latitude=39.9, input_axis="up")
@@ -75,6 +82,47 @@ class Picture:
     hours: FloatArray
     chamber: FloatArray
     values: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class RateCurve:
+    """What an effect changes in the output at steady rates, at its usual amplitude, warm, at `RATE_DEGC`.
+
+    Attributes
+    ----------
+    unit
+        Of the rates, ``deg/s`` or ``deg/h``.
+    rate, change
+        Rate in that unit, and change of the output [deg/h], shape (n,).
+    """
+
+    unit: str
+    rate: FloatArray
+    change: FloatArray
+
+
+def rate_curves(declared: Effect) -> tuple[RateCurve, ...]:
+    """Of an effect of scale factor, loop or read-out: up to fast rates, and about zero; where any shows."""
+    if not isinstance(declared, ScaleFactorEffect | LoopEffect):
+        return ()
+    curves = []
+    for unit, size, most in (("deg/s", 3600.0, FAST_DEG_S), ("deg/h", 1.0, SLOW_DEG_H)):
+        rate = np.linspace(-most, most, _RATES)
+        change = np.array([_steady_change(declared, size * one) for one in rate.tolist()])
+        if change.any():
+            curves.append(RateCurve(unit, rate, change))
+    return tuple(curves)
+
+
+def _steady_change(declared: ScaleFactorEffect | LoopEffect, rate_deg_h: float) -> float:
+    rows = 8
+    warm = dict.fromkeys(("T", "T_in", "T_out", "T_case", "T_electronics"), np.full(rows, RATE_DEGC))
+    given = Inputs(1e4 * np.arange(float(rows)), warm, np.full(rows, rate_deg_h / 3600.0))
+    amplitude, shape = declared.amplitude.typical(), declared.default_shape()
+    if isinstance(declared, ScaleFactorEffect):
+        return amplitude * float(declared.response(given, **shape)[-1])
+    output = np.full(rows, rate_deg_h)
+    return float(declared.apply(output, given.with_output(output), amplitude, **shape)[-1]) - rate_deg_h
 
 
 def prose(declared: Effect) -> Prose:

@@ -100,7 +100,12 @@ class Quantity:
         low, high = self.limits
         if not low <= value <= high:
             raise InputError(
-                f"{owner}: '{self.name}' is {value:g} {self.unit}, which is not physical; "
-                f"it lies between {low:g} and {high:g} {self.unit}"
+                f"{owner}: '{self.name}' is {with_unit(value, self.unit)}, which is not physical; "
+                f"it lies between {low:g} and {with_unit(high, self.unit)}"
             )
         return float(value)
+
+
+def with_unit(value: float, unit: str) -> str:
+    """A number and its unit; the number alone where it is a pure one."""
+    return f"{value:g}" if unit == "1" else f"{value:g} {unit}"

@@ -23,7 +23,7 @@ from fogml.twin.plant.line import RadialLine
 from fogml.twin.plant.power import SelfHeating
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.plant.standard import ThermalConstants
-from fogml.twin.quantities import Quantity
+from fogml.twin.quantities import Quantity, with_unit
 from fogml.twin.registry import effect
 from fogml.twin.set_up import (
     SENSOR_QUANTITIES,
@@ -101,7 +101,7 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
     noise = _values(source, "noise", stated.noise, NOISE)
     factors = {q.name: getattr(stated.noise, q.name) for q in NOISE}
     try:
-        return Twin(
+        twin = Twin(
             name=stated.name or Path(source).stem,
             description=stated.description,
             grade=stated.grade,
@@ -125,6 +125,9 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
             ),
             settings={id: _setting(source, id, entry) for id, entry in stated.effects.items()},
         )
+        # Raises where plant and effects don't fit together.
+        _ = twin.network
+        return twin
     except InputError as error:
         raise InputError(_prefixed(source, str(error))) from None
 
@@ -242,8 +245,8 @@ def _value(source: str, key: str, held: Stated, quantity: Quantity) -> float:
     value = factor * held.value
     if not low <= value <= high:
         raise InputError(
-            f"{source}: key '{key}' is {held.value:g} {unit}, which is not physical; it lies between "
-            f"{low:g} and {high:g} {quantity.unit}"
+            f"{source}: key '{key}' is {with_unit(held.value, unit)}, which is not physical; it lies between "
+            f"{low:g} and {with_unit(high, quantity.unit)}"
         )
     return value
 
