@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
+from scipy.stats import t
 
 from experiments.real_files.section import Section
 from fogml.features.parse import parse_features
@@ -22,7 +22,8 @@ SPREAD = np.array([0.1, 1e-3, 1e-5, 1e-7, 0.03, 4e-4])
 """Of the units' constants: of 1, u, u^2, u^3, dT, u dT with u = T - 25 degC [deg/h, degC, degC/min]."""
 SAMPLE_S, WHITE, FLICKER = 30.0, 0.12, 0.02
 """Sample interval [s]; white noise of a sample [deg/h]; amplitude of the flicker's spectrum [deg/h]."""
-UNITS, TESTED, ODD_WIDTH, SHORT_HOURS = 24, 500, 3.0, 2.0
+FLEETS, UNITS, TESTED, ODD_WIDTH, SHORT_HOURS = 25, 24, 20, 3.0, 2.0
+"""Fleets; units of each; units tested against each; width of odd ones; hours of a short run."""
 
 
 def temperatures(rate: float, hours: float | None) -> FloatArray:
@@ -76,24 +77,30 @@ def case(prior: dict[str, Any], seed: int, far: float, coloured: bool, hours: fl
 
 def section(quick: bool) -> Section:
     """Shares called odd, and errors from the truth with and without the fleet."""
-    tested = 6 if quick else TESTED
+    fleets, tested = (2, 3) if quick else (FLEETS, TESTED)
     rows = []
     for coloured in (True, False):
-        units = [UnitConstants.of([recorded(seed, 1.0, coloured)[0]]) for seed in range(UNITS)]
-        prior = fleet_constants(units).prior.as_dict()
+        priors = []
+        for fleet in range(fleets):
+            units = [UnitConstants.of([recorded(1000 * fleet + k, 1.0, coloured)[0]]) for k in range(UNITS)]
+            priors.append(fleet_constants(units).prior.as_dict())
         for hours in (SHORT_HOURS, None):
             for far, count in ((1.0, tested), (ODD_WIDTH, max(tested // 5, 1))):
-                found = [case(prior, 9000 + k, far, coloured, hours) for k in range(count)]
+                found = [
+                    [case(prior, 1000 * fleet + 500 + k, far, coloured, hours) for k in range(count)]
+                    for fleet, prior in enumerate(priors)
+                ]
                 rows.append(_row(found, coloured, hours, far))
     lines = [
         "## The fleet's test of agreement",
         "",
-        f"**Synthetic**: a fleet of {UNITS} units with a full cycle each; then {tested} ordinary units, and "
-        f"units whose constants lie {ODD_WIDTH:g} times as far out, with the first {SHORT_HOURS:g} h of a "
+        f"**Synthetic**: {fleets} fleets of {UNITS} units with a full cycle each; to each fleet {tested} "
+        f"ordinary units more, and units whose constants lie {ODD_WIDTH:g} times as far out, with the first "
+        f"{SHORT_HOURS:g} h of a "
         f"cycle or all of it. White noise of {WHITE:g} deg/h a sample of {SAMPLE_S:g} s, coloured with "
         "flicker noise beside. The errors are rms from the true drift over another cycle at 0.8 degC/min, "
         f"over that of the unit's own fit alone (median). A unit is called odd below {ODD:.0%}; intervals of "
-        "95 % (Clopper & Pearson).",
+        "95 % from the scatter of the fleets, which differ by more than their units' chance alone.",
         "",
         "| noise | run | units | number | called odd | 95 % | error, as shipped | error, none rejected |",
         "|---|---|---|---:|---:|---|---:|---:|",
@@ -106,24 +113,28 @@ def section(quick: bool) -> Section:
     lines += [
         "",
         "The noise of a unit's rows is told from the rows themselves, white, flicker and random walk "
-        "together, and averaged over (`fogml.models.coloured_noise`).",
+        "together, and averaged over (`fogml.models.row_noise`).",
     ]
     return Section("\n".join(lines), {"rows": rows})
 
 
-def _row(found: list[dict[str, Any]], coloured: bool, hours: float | None, far: float) -> dict[str, Any]:
-    odd = np.array([one["agreement"] < ODD for one in found])
-    alone, drawn = (np.array([one[key] for one in found]) for key in ("alone", "drawn"))
-    count, hits = len(found), int(odd.sum())
-    low = float(beta.ppf(0.025, hits, count - hits + 1)) if hits else 0.0
-    high = float(beta.ppf(0.975, hits + 1, count - hits)) if hits < count else 1.0
+def _row(
+    found: list[list[dict[str, Any]]], coloured: bool, hours: float | None, far: float
+) -> dict[str, Any]:
+    by_fleet = np.array([np.mean([one["agreement"] < ODD for one in fleet]) for fleet in found])
+    every = [one for fleet in found for one in fleet]
+    odd = np.array([one["agreement"] < ODD for one in every])
+    alone, drawn = (np.array([one[key] for one in every]) for key in ("alone", "drawn"))
+    share = float(by_fleet.mean())
+    reach = float(t.ppf(0.975, len(found) - 1) * by_fleet.std(ddof=1) / np.sqrt(len(found)))
     return {
         "noise": "coloured" if coloured else "white",
         "run": "full" if hours is None else f"{hours:g} h",
         "units": "ordinary" if far == 1.0 else f"odd, {far:g} times",
-        "count": count,
-        "odd": float(odd.mean()),
-        "odd_ci": [low, high],
+        "fleets": len(found),
+        "count": len(every),
+        "odd": share,
+        "odd_ci": [max(share - reach, 0.0), min(share + reach, 1.0)],
         "shipped": float(np.median(np.where(odd, alone, drawn) / alone)),
         "drawn": float(np.median(drawn / alone)),
     }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,6 +13,7 @@ from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.noise_of_run import noise_report
+from fogml.runs.run import Run
 
 
 class NoiseSettings(Settings):
@@ -55,7 +57,28 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
             work.doing(f"reading {path}")
             runs.append(open_run(path, repair=settings.repair))
         work.doing("averaging")
-        return finite_json(noise_report(runs, overlapping=settings.overlapping))
+        values = noise_report(runs, overlapping=settings.overlapping)
+        if len(runs) == 1:
+            values["floor"] = _floor(runs[0], values["taus_s"])
+        return finite_json(values)
+
+
+def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
+    """The noise floor as drift models are held against, from their usual averaging time on."""
+    from fogml.validation.floors import floors_over
+    from fogml.validation.judge import DEFAULT_AVERAGING_S
+
+    longest = 0.5 * run.span_s
+    times = [DEFAULT_AVERAGING_S, *(tau for tau in taus_s if DEFAULT_AVERAGING_S < tau <= longest)]
+    found = floors_over(run, DEFAULT_AVERAGING_S, times)
+    if not found:
+        return None
+    return {
+        "averaging_s": times,
+        "value": [floor.value for floor in found],
+        "ci": [[floor.lower, floor.upper] for floor in found],
+        "unit": "deg/h",
+    }
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
@@ -85,6 +108,13 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
             for one in values["runs"]
         ]
         terminal.table("N of each run alone [deg/sqrt(h)]", ["run", "N", f"{level} from", "to"], rows)
+    floor = values.get("floor")
+    if floor:
+        low, high = floor["ci"][0]
+        terminal.say(
+            f"noise floor of averages over {floor['averaging_s'][0]:g} s: {number(floor['value'][0])} deg/h "
+            f"({level} from {number(low)} to {number(high)})"
+        )
     minimum = values["minimum"]
     terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s")
     for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):

@@ -7,7 +7,7 @@ that tells all of them, so a fleet's constants can be put together without its r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.models.box import learn_box
-from fogml.models.coloured_noise import whitened_rows
+from fogml.models.coefficient_errors import told_by_rows
 from fogml.models.prior import Prior
 from fogml.models.table import run_rows, table_of_rows
 from fogml.runs.run import FloatArray, Run
@@ -42,7 +42,8 @@ class UnitConstants:
     features
         The form.
     triangle
-        Factor R of the rows ``[1, features, y]``, their noise whitened, shape (k + 2, k + 2).
+        Equations ``[1, features, y]`` that tell of the constants what the rows do, their noise of unit
+        covariance, shape (k + 1, k + 2).
     precision
         One over the variance of a row of the triangle's; 1 as it is whitened.
     rows
@@ -78,8 +79,8 @@ class UnitConstants:
             raise InputError(f"{runs[0].name}: {len(table)} rows are too few for the constants of {features}")
         columns = np.column_stack([np.ones(len(table)), table.X])
         scale = np.where(table.X.std(axis=0) > 0.0, table.X.std(axis=0), 1.0)
-        rows_white, _ = whitened_rows(columns / np.append(1.0, scale), table.y, table.run_index, table.time_s)
-        triangle = np.linalg.qr(rows_white, mode="r") * np.concatenate([[1.0], scale, [1.0]])
+        told = told_by_rows(replace(table, X=columns / np.append(1.0, scale)))
+        triangle = np.column_stack([told.columns * np.append(1.0, scale), told.target])
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
         return cls(form.text, np.asarray(triangle), 1.0, len(table), table.X.mean(axis=0), scale, box)
 

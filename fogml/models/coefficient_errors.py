@@ -1,25 +1,77 @@
-"""Covariance of least-squares coefficients under the noise that a gyro has, which is not white."""
+"""What least squares tells of coefficients under the noise that a gyro has, which is not white."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from fogml.models.linear import LinearRegressor
-from fogml.models.table import Compose, RunRows, averaged_table, recorded_s
+from fogml.models.row_noise import noise_of_rows, shape_models
+from fogml.models.table import Compose, RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.runs.run import FloatArray
-from fogml.signals.noise_spectrum import spectrum_of
-from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms, term_shapes
+from fogml.signals.flicker import LONGEST_S
+from fogml.signals.noise_model import flicker_ladder
+from fogml.signals.whitening import Whitener
 
 ROWS = 8192
-"""Rows of all runs that the noise is told from and the columns are transformed at: slow ones are all that the
-coefficients of temperatures feel."""
-_FEWEST = 32
-_GAP = 1.5
-"""Steps longer than this many usual ones part a run."""
-_OWN = SpectrumTerms(("N", "B", "K"))
+"""Rows of all runs that the noise is told from and the columns are looked at."""
+
+
+@dataclass(frozen=True)
+class Told:
+    """What rows tell of coefficients: as many equations as there are, their noise of unit covariance.
+
+    Attributes
+    ----------
+    columns, target
+        The equations ``columns @ coefficients = target + noise``, shapes (k, k) and (k,).
+    noise
+        Covariance of their noise under each noise model that the rows speak for, shape (m, k, k); on average
+        the identity.
+    weights
+        Probabilities of those models, shape (m,).
+    freedom
+        Degrees of freedom behind the variances.
+    """
+
+    columns: FloatArray
+    target: FloatArray
+    noise: FloatArray
+    weights: FloatArray
+    freedom: float
+
+    @property
+    def information(self) -> FloatArray:
+        """Inverse covariance of the coefficients, shape (k, k)."""
+        return self.columns.T @ self.columns
+
+    @property
+    def image(self) -> FloatArray:
+        """Information times the coefficients' estimate, shape (k,)."""
+        return self.columns.T @ self.target
+
+
+def told_by_rows(table: TrainingTable) -> Told:
+    """What a table's values tell of the coefficients of its columns ``X``, by least squares.
+
+    The noise is that of :func:`fogml.models.row_noise.noise_of_rows`; where rows are too few to tell it, all
+    that moves is noise, and white.
+    """
+    basis, root = np.linalg.qr(table.X)
+    noise = noise_of_rows(replace(table, X=_moving(table.X)))
+    if noise is None:
+        spread = max(float(np.std(table.y)), 1e-12)
+        width = len(root)
+        return Told(root / spread, basis.T @ table.y / spread, np.eye(width)[None], np.ones(1), 1.0)
+    shapes = _shapes(basis, table, noise.step_s)
+    half = np.linalg.cholesky(np.einsum("s,sij->ij", noise.weights @ noise.squares, shapes))
+    rows = np.linalg.solve(half, np.column_stack((root, basis.T @ table.y)))
+    whitened = np.array([np.linalg.solve(half, np.linalg.solve(half, shape).T) for shape in shapes])
+    models = np.einsum("ms,sij->mij", noise.squares, whitened)
+    return Told(rows[:, :-1], rows[:, -1], models, noise.weights, noise.freedom)
 
 
 def noise_covariance(
@@ -27,9 +79,8 @@ def noise_covariance(
 ) -> FloatArray | None:
     """Covariance of (intercept, coefficients), shape (k + 1, k + 1), for noise of the residuals' spectrum.
 
-    The sandwich ``G X'CX G'`` of least squares, with C the covariance of white noise, flicker and random walk
-    that are fitted to what the columns leave, their constants integrated out. In the cosine transform of each
-    stretch C is diagonal: the density at its frequencies.
+    The sandwich ``G X'CX G'`` of least squares, with C the covariance of the rows' noise at their true times,
+    the mean over the noise models that what the columns leave speaks for.
 
     Parameters
     ----------
@@ -47,55 +98,49 @@ def noise_covariance(
 
     Notes
     -----
-    What moves a run as a whole from one to the next is no part of it. A form that is wrong leaves residuals
-    that count as slow noise.
+    What else moves a run as a whole from one to the next is no part of it. Flicker slower than the run moves
+    its constant in one piece, which no run shows: it is taken to go on to `fogml.signals.flicker.LONGEST_S`.
     """
     averaging_s = 0.0 if sum(len(part.y) for part in rows) <= ROWS else recorded_s(rows) / ROWS
     table = averaged_table(rows, compose, averaging_s)
-    steps = np.diff(table.time_s)
-    inside = np.diff(table.run_index) == 0
-    if len(table) < _FEWEST + 2 * table.X.shape[1] or not np.any(inside):
-        return None
-    step_s = float(np.median(steps[inside]))
-    edges = np.concatenate(([0], np.flatnonzero(~inside | (steps > _GAP * step_s)) + 1, [len(table)]))
-    parts = [slice(int(a), int(b)) for a, b in pairwise(edges) if b - a >= 3]
-    if not parts:
+    noise = noise_of_rows(table)
+    if noise is None:
         return None
     scale = np.std(table.X, axis=0)
     scale[scale == 0.0] = 1.0
-    columns = (table.X - table.X.mean(axis=0)) / scale
-    spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
-    if not np.any(spectrum.power > 0.0):
-        return None
-    fit = SpectrumModel(spectrum, _OWN).fit()
+    shift = table.X.mean(axis=0) if regressor.fit_intercept else np.zeros(len(scale))
+    columns = (table.X - shift) / scale
     if regressor.fit_intercept:
         columns = np.column_stack((np.ones(len(columns)), columns))
-    else:
-        columns = table.X / scale
-    middle = sum(_filling(columns[p], fit, step_s) for p in parts)
-    information = columns.T @ columns
-    penalty = np.full(len(scale), regressor.ridge_ * len(columns))
-    information += np.diag(np.concatenate(([0.0], penalty)) if regressor.fit_intercept else penalty)
-    gain = np.linalg.pinv(information, rcond=1e-12, hermitian=True)
-    covariance = gain @ middle @ gain
-    # Back to raw columns: (x - mean) / scale.
-    width = len(scale)
-    back = np.zeros((width + 1, covariance.shape[0]))
+    basis, root = np.linalg.qr(columns)
+    middle = np.einsum("s,sij->ij", noise.weights @ noise.squares, _shapes(basis, table, noise.step_s))
+    penalty = np.full(columns.shape[1], np.sqrt(regressor.ridge_ * len(columns)))
+    penalty[: columns.shape[1] - len(scale)] = 0.0
+    gain = np.linalg.pinv(np.vstack((root, np.diag(penalty))), rcond=1e-12)[:, : len(root)]
+    # Back to raw columns: (x - shift) / scale.
+    back = np.zeros((len(scale) + 1, columns.shape[1]))
     if regressor.fit_intercept:
         back[0, 0] = 1.0
-        back[0, 1:] = -table.X.mean(axis=0) / scale
-    back[1:, -width:] = np.diag(1.0 / scale)
-    return np.asarray(back @ covariance @ back.T)
+        back[0, 1:] = -shift / scale
+    back[1:, -len(scale) :] = np.diag(1.0 / scale)
+    gain = back @ gain
+    return np.asarray(gain @ middle @ gain.T)
 
 
-def _filling(columns: FloatArray, fit: SpectrumFit, step_s: float) -> FloatArray:
-    """``X'CX`` of one stretch."""
-    from scipy.fft import dct
+def _moving(columns: FloatArray) -> FloatArray:
+    """Columns without the constant one, of which a stretch has its own."""
+    return columns[:, np.ptp(columns, axis=0) > 0.0]
 
-    n = len(columns)
-    transformed = dct(columns, axis=0, norm="ortho")
-    # The mean of a stretch moves by noise slower than it: as at half the lowest frequency.
-    order = np.concatenate(([0.5], np.arange(1, n)))
-    frequency = order / (2.0 * n * step_s)
-    density = term_shapes(frequency, step_s, fit.terms) @ fit.coefficients
-    return np.asarray((transformed * (density / (2.0 * step_s))[:, None]).T @ transformed)
+
+def _shapes(basis: FloatArray, table: TrainingTable, step_s: float) -> FloatArray:
+    """``Q'CQ`` of white noise, flicker and a random walk of unit squares, runs apart, shape (3, k, k)."""
+    found = np.zeros((3, basis.shape[1], basis.shape[1]))
+    edges = np.flatnonzero(np.diff(table.run_index)) + 1
+    for low, high in pairwise([0, *edges.tolist(), len(table)]):
+        ladder = flicker_ladder(step_s, LONGEST_S)
+        for place, model in enumerate(shape_models()):
+            whitener = Whitener(model, table.time_s[low:high], step_s, ladder)
+            half = whitener.colour_adjoint(basis[low:high])
+            found[place] += half.T @ half
+    found[1:] -= found[0]
+    return found

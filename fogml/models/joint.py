@@ -33,11 +33,12 @@ from fogml.features.signal import number_text
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
+from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, row_count
-from fogml.models.tall_least_squares import Part
+from fogml.models.tall_least_squares import PIECE_ROWS, Part
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.transitions import transition_mask
 from fogml.strict import Strict, strictly
@@ -125,6 +126,11 @@ class JointModel(DriftModel):
         learn_box(self.features_, [part.atoms[:, 1:] for part in rows])
         parts = [self._part(part) for part in rows]
         self.regressor_ = LinearRegressor(fit_intercept=not self.patent).fit_parts(parts)
+        covariance = noise_covariance(
+            [self._without_noise(part) for part in rows], self._columns, self.regressor_
+        )
+        if covariance is not None:
+            self.regressor_.covariance_ = covariance
         notes += [note for part in rows for note in part.notes]
         self.card_ = training_card(
             group, hashes=hashes, rows=row_count(rows), box=self.features_.box, notes=notes
@@ -242,6 +248,21 @@ class JointModel(DriftModel):
 
     def _part(self, rows: RunRows) -> Part:
         return Part(rows.y, lambda piece: self._columns(rows.atoms[piece]), dealt_folds(len(rows.y)))
+
+    def _without_noise(self, rows: RunRows) -> RunRows:
+        """Rows whose output is the one that the model expects, and what the noise adds to the rate as y.
+
+        The noisy output is a column: within a stretch of one rate it would explain the noise by itself.
+        """
+        atoms, off = rows.atoms.copy(), np.empty(len(rows.y))
+        bend = self.regressor_.coef_[:3]
+        for start in range(0, len(off), PIECE_ROWS):
+            piece = slice(start, start + PIECE_ROWS)
+            columns = self._columns(atoms[piece])
+            off[piece] = self.regressor_.predict_unchecked(columns) - rows.y[piece]
+            temperature = columns[:, 3]
+            atoms[piece, 0] -= off[piece] / (bend[0] + bend[1] * temperature + bend[2] * temperature**2)
+        return RunRows(atoms, off, rows.time_s)
 
     def _columns(self, rows: FloatArray) -> FloatArray:
         """The model's columns from rows of [output, atoms...]."""

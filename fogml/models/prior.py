@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, ClassVar, Self
 
 import numpy as np
@@ -12,8 +13,9 @@ from pydantic import Field
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
-from fogml.models.coloured_noise import whitened_rows
+from fogml.models.coefficient_errors import Told, told_by_rows
 from fogml.models.linear import LinearRegressor, SavedLinear
+from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
@@ -103,7 +105,7 @@ class PriorRegressor(LinearRegressor):
     little even an odd unit is drawn far.
 
     The rows' noise is coloured, in a way that is averaged over
-    (:func:`fogml.models.coloured_noise.whitened_rows`).
+    (:func:`fogml.models.coefficient_errors.told_by_rows`).
 
     Parameters
     ----------
@@ -149,10 +151,10 @@ class PriorRegressor(LinearRegressor):
                 f"the fleet's prior is for {len(prior.shift)} columns, {inputs.shape[1]} are given"
             )
         columns = prior.columns(inputs)
-        rows, freedom = whitened_rows(columns, target, groups, time)
-        seen = rows[:, :-1].T @ rows[:, :-1], rows[:, :-1].T @ rows[:, -1]
-        solution, covariance, self.spread_ = posterior(*seen, prior)
-        self.agreement_ = agreement(*seen, prior, freedom)
+        told = told_by_rows(_table(columns, target, groups, time))
+        solution, covariance, self.spread_ = posterior(told.information, told.image, prior)
+        self._told = told
+        self.__dict__.pop("agreement_", None)
         left = target - columns @ solution
         variance = float(left @ left) / max(1.0, len(target) - columns.shape[1])
         to_raw = _to_raw(prior)
@@ -162,6 +164,12 @@ class PriorRegressor(LinearRegressor):
         self.residual_std_ = float(np.sqrt(variance))
         self.ridge_, self.rank_ = 0.0, inputs.shape[1]
         return self
+
+    @cached_property
+    def agreement_(self) -> float:
+        """Probability of a unit of the fleet lying at least as far out, see `agreement`."""
+        check_is_fitted(self)
+        return agreement(self._told, Prior.from_dict(self.prior or {}))
 
     def refitted(self, X: ArrayLike, y: ArrayLike) -> PriorRegressor:
         """A new regressor with the same prior fitted to other rows."""
@@ -217,25 +225,24 @@ def posterior(
         Factors to average over.
     """
     root, values, seen = _directions(information, image, prior)
-    means, weights = [], []
+    gains, weights = [], []
     for spread in spreads:
         gain = spread / (1.0 + spread * values)
-        means.append(prior.mean + root @ (gain * seen))
+        gains.append(gain)
         # The t distribution as a mixture of normals: its factor is inverse gamma.
         factor = -(0.5 * _FREEDOM) * np.log(spread) - 0.5 * _FREEDOM / spread
         weights.append(factor + 0.5 * float(gain @ seen**2) - 0.5 * float(np.log1p(spread * values).sum()))
     share = np.exp(np.array(weights) - np.max(weights))
     share /= share.sum()
-    best = int(np.argmax(share))
-    mean = np.einsum("i,ij->j", share, np.array(means))
-    spread = float(np.asarray(spreads)[best])
-    half = root * np.sqrt(spread / (1.0 + spread * values))
-    return mean, half @ half.T, spread
+    along = np.array(gains) * seen
+    mean = share @ along
+    # Scatter about each factor's mean, and of those means.
+    covariance = np.diag(share @ np.array(gains)) + ((along - mean).T * share) @ (along - mean)
+    best = float(np.asarray(spreads)[int(np.argmax(share))])
+    return prior.mean + root @ mean, root @ covariance @ root.T, best
 
 
-def agreement(
-    information: FloatArray, image: FloatArray, prior: Prior, freedom: float = float("inf")
-) -> float:
+def agreement(told: Told, prior: Prior) -> float:
     """Probability that a unit of the fleet would lie as far from its mean as these rows do, or farther.
 
     The unit's own estimate is compared with the fleet's mean under the covariance of both together
@@ -243,31 +250,29 @@ def agreement(
     which the rows tell something: all jointly, by the sum of squares, and each for itself, by the
     largest one. What counts is the lesser of the two probabilities, against how small it comes out for
     units of the fleet, drawn: their constants from the t distribution that a mean and variances estimated
-    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.2), their noise likewise.
+    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.2), their noise from the models
+    that the rows speak for, each as often as it is likely.
     0 if the rows tell nothing, as then an odd unit would look the same.
 
     Parameters
     ----------
-    information, image
-        As for `posterior`.
+    told
+        What the unit's rows tell of its constants.
     prior
         What the fleet tells.
-    freedom
-        Degrees of freedom behind the variance of the rows' noise.
     """
-    _, values, seen = _directions(information, image, prior)
-    told = values > _TOLD
-    if not told.any():
+    directions, values, seen = _directions(told.information, told.image, prior)
+    heard = values > _TOLD
+    if not heard.any():
         return 0.0
-    precise = values[told]
-    squares = seen[told] ** 2 / (precise * (1.0 + precise))
+    precise = values[heard]
+    squares = seen[heard] ** 2 / (precise * (1.0 + precise))
     random = np.random.default_rng(0)
-    unit, noise = random.standard_normal((2, _DRAWS, len(precise)))
+    unit = random.standard_normal((_DRAWS, len(precise)))
+    noise = _noise_drawn(told, directions[:, heard] / np.sqrt(precise), random)
     if np.isfinite(prior.units):
         known = max(prior.units - 1.0, 1.0)
         unit *= np.sqrt((1.0 + 1.0 / prior.units) * known / random.chisquare(known, _DRAWS))[:, None]
-    if np.isfinite(freedom):
-        noise *= np.sqrt(freedom / random.chisquare(freedom, _DRAWS))[:, None]
     drawn = (unit * np.sqrt(precise) + noise) ** 2 / (1.0 + precise)
     figures = np.vstack(
         [np.append(drawn.sum(axis=1), squares.sum()), np.append(drawn.max(axis=1), squares.max())]
@@ -291,6 +296,30 @@ def _directions(
     values, vectors = np.linalg.eigh(root.T @ information @ root)
     directions = root @ vectors
     return directions, np.maximum(values, 0.0), directions.T @ (image - information @ prior.mean)
+
+
+def _noise_drawn(told: Told, directions: FloatArray, random: np.random.Generator) -> FloatArray:
+    """Noise of what rows tell of directions, of unit variance on average, shape (_DRAWS, directions)."""
+    along = told.columns @ directions
+    model = random.choice(len(told.weights), _DRAWS, p=told.weights)
+    noise = random.standard_normal((_DRAWS, along.shape[1]))
+    for place in np.unique(model):
+        squares, axes = np.linalg.eigh(along.T @ told.noise[place] @ along)
+        noise[model == place] *= np.sqrt(np.maximum(squares, 0.0))
+        noise[model == place] @= axes.T
+    if np.isfinite(told.freedom):
+        noise *= np.sqrt(told.freedom / random.chisquare(told.freedom, _DRAWS))[:, None]
+    return noise
+
+
+def _table(
+    columns: FloatArray, target: FloatArray, groups: ArrayLike | None, time: ArrayLike | None
+) -> TrainingTable:
+    """Rows of runs `groups` at times; by default rows of one run that follow each other evenly."""
+    count = len(target)
+    run = np.zeros(count, dtype=np.intp) if groups is None else np.unique(groups, return_inverse=True)[1]
+    times = np.arange(count, dtype=np.float64) if time is None else np.asarray(time, dtype=np.float64)
+    return TrainingTable(columns, target, run, times, np.zeros(count, dtype=np.intp))
 
 
 def _to_raw(prior: Prior) -> FloatArray:

@@ -71,6 +71,7 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
         )
     shown = _term_lines(figure, noise, taus, adev)
     shown += _model_lines(figure, noise, taus)
+    shown += _floor_line(figure, noise)
     figure.add_trace(
         go.Scatter(
             x=taus,
@@ -145,6 +146,36 @@ def _model_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray) 
         )
         told += f" Shaded: up to {number(holds)} s {why}, and the terms alone do not make the curve."
     return told
+
+
+def _floor_line(figure: go.Figure, noise: Mapping[str, Any]) -> str:
+    """Draw the noise floor of averages with its interval, where there is one; say so."""
+    floor = noise.get("floor")
+    if not floor:
+        return ""
+    times, intervals = floor["averaging_s"], np.asarray(floor["ci"], dtype=np.float64)
+    for side in (0, 1):
+        line = {**style.FLOOR_LINE, "width": 0.6}
+        figure.add_trace(
+            go.Scatter(
+                x=times, y=intervals[:, side], mode="lines", line=line, showlegend=False, hoverinfo="skip"
+            )
+        )
+    figure.add_trace(
+        go.Scatter(
+            x=times,
+            y=floor["value"],
+            mode="lines" if len(times) > 1 else "markers",
+            name="noise floor",
+            line=style.FLOOR_LINE,
+            marker={"symbol": "line-ew-open", "size": 14, "color": style.FLOOR_LINE["color"]},
+        )
+    )
+    return (
+        f" Dashed: the noise floor that drift models are held against, with its interval: the standard "
+        f"deviation of averages, {number(floor['value'][0])} deg/h over {number(times[0])} s; unlike the "
+        "Allan deviation it counts what moves averages slowly, drift with temperature kept out."
+    )
 
 
 def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, adev: FloatArray) -> str:

@@ -27,7 +27,7 @@ def noise_page(noise: Mapping[str, Any]) -> str:
     noise
         Schema ``fogml.noise/1``. Beside its keys these are shown where they are there: ``run``,
         ``span_s``, ``sample_s``, ``overlapping``, ``level``, ``stretches``, ``warnings``, ``notes``,
-        ``findings``, ``serial_number`` and ``axis``, and per term ``reason``.
+        ``findings``, ``floor``, ``serial_number`` and ``axis``, and per term ``reason``.
     """
     name = str(noise.get("run", "run"))
     warned = {warning["message"] for warning in noise.get("warnings", ())}
@@ -72,6 +72,11 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
             tiles.append(
                 Tile(TERM_WORDS[key].capitalize(), number(term["value"]), _unit(term), _interval(term))
             )
+    floor = noise.get("floor")
+    if floor:
+        low, high = floor["ci"][0]
+        told = f"{number(low)} … {number(high)}, averages over {number(floor['averaging_s'][0])} s"
+        tiles.append(Tile("Noise floor", number(floor["value"][0]), "deg/h", told))
     minimum = noise.get("minimum") or {}
     if minimum.get("adev"):
         tiles.append(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from scipy.signal import lfilter
 
 from fogml.errors import InputError
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import AT_REST_DEG_S
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.signals.floor import Columns, Floor, FloorModel, floor_model
+from fogml.signals.memory import Lag
 
 _LAGS_S = (60.0, 300.0, 1200.0, 3600.0)
 """Time constants of the temperature's lags that a drift may follow [s]: those of coils and housings."""
@@ -47,6 +48,22 @@ def floor_of_run(
         found = _model(run, used, error_deg_h, averaging_s)
         source = "the run itself"
     return Floor(0.0, 0.0, 0.0, source) if found is None else found.floor(averaging_s, windows, source)
+
+
+def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[Floor]:
+    """Floors of a run over averaging times [s] none of which is under `averaging_s`, for a curve of them.
+
+    The noise models are those of `floor_of_run` at `averaging_s`. None where the run is shorter than two
+    averages, or turns throughout.
+    """
+    still = np.abs(run.rate) < AT_REST_DEG_S
+    rows = int(np.count_nonzero(still))
+    if rows * run.sample_s < 2.0 * averaging_s:
+        return []
+    found = _model(run, still, run.error_deg_h, averaging_s)
+    if found is None:
+        return []
+    return [found.floor(time_s, max(int(rows * run.sample_s / time_s), 2)) for time_s in times_s]
 
 
 def check_noise_run(noise: Run) -> None:
@@ -98,10 +115,7 @@ def _thermal(run: Run, rows: np.ndarray) -> Columns:
     scale = float(np.std(coarse)) or 1.0
     t = (coarse - coarse.mean()) / scale
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    lags = []
-    for lag_s in _LAGS_S:
-        decay = float(np.exp(-step / lag_s))
-        lags.append(lfilter([1.0 - decay], [1.0, -decay], t, zi=[decay * t[0]])[0])
+    lags = [Lag(max(lag_s, step), step).push(time, t)[0] for lag_s in _LAGS_S]
     table = np.column_stack((t, t**2, t**3, *lags, t * (t - lags[0]), t * (t - lags[1])))
 
     def columns(places: np.ndarray) -> FloatArray:

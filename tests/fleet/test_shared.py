@@ -9,10 +9,11 @@ from scipy.stats import chi2
 from fogml.errors import InputError
 from fogml.fleet.constants import UnitConstants, fleet_constants
 from fogml.fleet.shared import ODD, shared_model
-from fogml.models.coloured_noise import whitened_rows
+from fogml.models.coefficient_errors import Told, told_by_rows
 from fogml.models.names import make_model
 from fogml.models.prior import Prior, PriorRegressor, agreement, posterior
 from fogml.models.saved import load_model, save_model
+from fogml.models.table import TrainingTable
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 
@@ -62,34 +63,50 @@ def test_condensed_rows_tell_what_the_rows_tell():
     np.testing.assert_array_equal(again.triangle, constants.triangle)
 
 
+def table(columns: np.ndarray, target: np.ndarray, runs: int = 1) -> TrainingTable:
+    """Rows of runs of equal length, a second apart."""
+    each = len(target) // runs
+    index = np.repeat(np.arange(runs), each)
+    return TrainingTable(columns, target, index, np.tile(np.arange(float(each)), runs), index)
+
+
+def told(information: np.ndarray, image: np.ndarray) -> Told:
+    """Rows of known noise that tell so much."""
+    values, vectors = np.linalg.eigh(information)
+    root = np.sqrt(np.maximum(values, 0.0))
+    target = np.divide(vectors.T @ image, root, out=np.zeros_like(root), where=root > 1e-9)
+    return Told(root[:, None] * vectors.T, target, np.eye(len(root))[None], np.ones(1), float("inf"))
+
+
 def slow_noise(rng: np.random.Generator, count: int, walk: float) -> np.ndarray:
     return 0.05 * rng.normal(size=count) + walk * np.cumsum(rng.normal(size=count))
 
 
 @pytest.mark.parametrize("walk", [0.0, 0.004])
-def test_what_whitened_rows_tell_is_as_sure_as_it_says(walk: float):
+def test_what_rows_tell_is_as_sure_as_it_says(walk: float):
     """Errors of the coefficients over what the rows say of them, under white noise and a random walk."""
     apart = []
     for seed in range(40):
         rng = np.random.default_rng([seed, 8])
         u = np.sin(np.linspace(0.0, 9.0, 900))
         columns = np.column_stack([np.ones(900), u, u**2])
-        rows, _ = whitened_rows(columns, columns @ [1.0, 2.0, 3.0] + slow_noise(rng, 900, walk))
-        information = rows[:, :-1].T @ rows[:, :-1]
-        off = np.linalg.solve(information, rows[:, :-1].T @ rows[:, -1]) - [1.0, 2.0, 3.0]
-        apart.append(off[1:] / np.sqrt(np.diag(np.linalg.inv(information))[1:]))
+        rows = told_by_rows(table(columns, columns @ [1.0, 2.0, 3.0] + slow_noise(rng, 900, walk)))
+        off = np.linalg.solve(rows.information, rows.image) - [1.0, 2.0, 3.0]
+        apart.append(off[1:] / np.sqrt(np.diag(np.linalg.inv(rows.information))[1:]))
     # The constant's error is unbounded under a walk. Of 80 values, 0.67 to 1.33 are four standard errors.
     assert 0.6 < np.sqrt(np.mean(np.square(apart))) < 1.33
 
 
-def test_runs_of_a_group_are_independent():
+def test_runs_are_independent_and_their_noise_is_of_unit_covariance():
     rng = np.random.default_rng(3)
     columns = np.column_stack([np.ones(400), rng.normal(size=400)])
     target = rng.normal(size=400)
-    groups = np.repeat(["b", "a"], 200)
-    rows, freedom = whitened_rows(columns, target, groups, np.tile(np.arange(200.0), 2))
-    assert freedom == len(rows) - 2 and 90 <= len(rows) <= 128
-    assert len(whitened_rows(columns[:3], target[:3])[0]) == 3
+    rows = told_by_rows(table(columns, target, runs=2))
+    np.testing.assert_allclose(np.einsum("m,mij->ij", rows.weights, rows.noise), np.eye(2), atol=1e-9)
+    own = np.linalg.solve(rows.information, rows.image)
+    np.testing.assert_allclose(own, np.linalg.lstsq(columns, target)[0], atol=1e-9)
+    few = told_by_rows(table(columns[:3], target[:3]))
+    assert len(few.weights) == 1 and np.all(np.isfinite(few.information))
 
 
 def test_the_posterior_is_the_textbooks_for_one_spread():
@@ -120,7 +137,7 @@ def test_agreement_is_the_distance_of_the_two_estimates_under_both_covariances()
     apart = own - prior.mean
     both = np.linalg.inv(information) + prior.covariance
     joint = chi2.sf(apart @ np.linalg.solve(both, apart), 3)
-    found = agreement(information, information @ own, prior)
+    found = agreement(told(information, information @ own), prior)
     # The lesser of two probabilities is at most twice as likely to be so small; 10000 draws tell it.
     room = 4.0 * np.sqrt(joint / 10_000)
     assert found <= 2.0 * joint + room
@@ -136,11 +153,11 @@ def test_units_of_the_fleet_are_called_odd_as_seldom_as_stated():
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     found = []
     for far in (1.0, 6.0):
-        units = far * rng.normal(size=(500, 3)) * np.sqrt(np.diag(prior.covariance))
-        images = units @ information + rng.normal(size=(500, 3)) @ root.T
-        found.append(np.mean([agreement(information, image, prior) < ODD for image in images]))
-    # Three standard deviations of 500 units.
-    assert found[0] == pytest.approx(0.05, abs=0.03)
+        units = far * rng.normal(size=(300, 3)) * np.sqrt(np.diag(prior.covariance))
+        images = units @ information + rng.normal(size=(300, 3)) @ root.T
+        found.append(np.mean([agreement(told(information, image), prior) < ODD for image in images]))
+    # Three standard deviations of 300 units.
+    assert found[0] == pytest.approx(0.05, abs=0.038)
     assert found[1] > 0.8
 
 
@@ -154,15 +171,15 @@ def test_a_fleet_of_few_units_is_less_sure_of_an_odd_one():
         for few in odd:
             units = 6.0 if few else float("inf")
             prior = Prior(fleet.mean(axis=0), covariance, np.empty(0), np.empty(0), units)
-            odd[few] += agreement(np.array([[1e6]]), np.array([1e6 * rng.normal()]), prior) < ODD
+            odd[few] += agreement(told(np.array([[1e6]]), np.array([1e6 * rng.normal()])), prior) < ODD
     assert odd[True] / 400 == pytest.approx(0.05, abs=0.033)
     assert odd[False] / 400 > 0.09
 
 
 def test_what_rows_do_not_tell_can_agree_with_nothing():
     prior = Prior(np.zeros(3), np.eye(3), np.zeros(2), np.ones(2))
-    assert agreement(1e-3 * np.eye(3), np.zeros(3), prior) == 0.0
-    assert agreement(np.diag([10.0, 0.0, 0.0]), np.zeros(3), prior) == 1.0
+    assert agreement(told(1e-3 * np.eye(3), np.zeros(3)), prior) == 0.0
+    assert agreement(told(np.diag([10.0, 0.0, 0.0]), np.zeros(3)), prior) == 1.0
 
 
 def test_a_unit_like_its_fleet_needs_a_shorter_run(fleet):
@@ -189,7 +206,7 @@ def test_an_odd_unit_is_left_to_its_own_run(fleet):
 
 def test_the_fleet_does_no_harm_to_odd_units(fleet):
     ratios = []
-    for seed in range(500, 530):
+    for seed in range(500, 510):
         constants = draw(seed, far=6.0)
         short, other = unit_run(seed, constants, hours=1.0), unit_run(seed + 1, constants, phase=2.0)
         errors = [
@@ -217,7 +234,7 @@ def test_what_rests_on_the_fleet_alone_is_told(fleet):
 
 def test_where_a_unit_has_been_the_fleet_does_no_harm_to_odd_ones(fleet):
     ratios = []
-    for seed in range(700, 730):
+    for seed in range(700, 712):
         constants = draw(seed, far=3.0)
         short, other = unit_run(seed, constants, hours=1.5), unit_run(seed + 1, constants, phase=2.0)
         drawn, alone = shared_model(fleet).fit(short), make_model("polynomial", FORM).fit(short)
@@ -226,7 +243,7 @@ def test_where_a_unit_has_been_the_fleet_does_no_harm_to_odd_ones(fleet):
             np.sqrt(np.mean((model.predict(other) - other.gyro)[there] ** 2)) for model in (drawn, alone)
         ]
         ratios.append(errors[0] / errors[1])
-    assert len(set(ratios)) > 5
+    assert len(set(ratios)) > 3
     assert max(ratios) <= 1.05
 
 

@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from fogml.models.coefficient_errors import noise_covariance
+from fogml.models.joint import JointModel
 from fogml.models.linear import LinearRegressor
 from fogml.models.table import RunRows
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
 from fogml.signals.flicker import Flicker
 
 N, STEP_S, REPEATS = 3000, 5.0, 40
@@ -44,7 +47,10 @@ def test_errors_scatter_as_stated(flicker: float, white: float, walk: float) -> 
     if flicker + walk > 0.0:
         assert np.sqrt(np.mean((errors / plain)[:, 1] ** 2)) > 2.0
     else:
-        np.testing.assert_allclose(np.median(stated / plain, axis=0), 1.0, atol=0.12)
+        ratio = np.median(stated / plain, axis=0)
+        np.testing.assert_allclose(ratio[1:], 1.0, atol=0.12)
+        # That no noise is slower than the run, a run cannot tell.
+        assert 1.0 < ratio[0] < 2.0
 
 
 def test_runs_stretches_and_a_ridge() -> None:
@@ -53,9 +59,40 @@ def test_runs_stretches_and_a_ridge() -> None:
     whole = LinearRegressor(ridge=1e-3).fit(COLUMNS, y)
     halves = [RunRows(COLUMNS[s], y[s], TIME[s]) for s in (slice(0, N // 2), slice(N // 2, N))]
     found = np.sqrt(np.diag(noise_covariance(halves, lambda atoms: atoms, whole)))
-    np.testing.assert_allclose(found, whole.standard_errors(), rtol=0.3)
+    np.testing.assert_allclose(found[1:], whole.standard_errors()[1:], rtol=0.3)
+    assert whole.standard_errors()[0] < found[0] < 3.0 * whole.standard_errors()[0]
     through_zero = LinearRegressor(fit_intercept=False).fit(COLUMNS, y)
     covariance = noise_covariance(halves, lambda atoms: atoms, through_zero)
     assert covariance[0, 0] == 0.0 and np.all(np.diag(covariance)[1:] > 0.0)
     short = [RunRows(COLUMNS[:10], y[:10], TIME[:10])]
     assert noise_covariance(short, lambda atoms: atoms, whole) is None
+
+
+def turning_run(seed: int) -> tuple[Run, np.ndarray]:
+    """A cycle with turns both ways at a scale factor that is exact, with slow noise; and the noise."""
+    time = 10.0 * np.arange(1440)
+    temperature = 20.0 + 30.0 * np.sin(2 * np.pi * time / 7000.0)
+    rate = 5.0 * ((time % 1200.0 >= 300.0) & (time % 1200.0 < 480.0)).astype(float)
+    rate -= 5.0 * ((time % 1200.0 >= 480.0) & (time % 1200.0 < 660.0))
+    noise = 0.1 * np.random.default_rng(seed).normal(size=len(time))
+    noise += Flicker(0.2, 10.0, np.random.default_rng(700 + seed)).block(len(time))
+    gyro = 3600.0 * rate + 0.01 * temperature + noise
+    facts = Facts(unit="u", axis="x")
+    return Run("turns", {"time": time, "gyro": gyro, "rate": rate, "T": temperature}, facts), noise
+
+
+def test_joint_scale_factor_and_bias_scatter_as_stated() -> None:
+    z, plain = [], []
+    for seed in range(16):
+        run, noise = turning_run(seed)
+        model, clean = JointModel().fit(run), JointModel().fit(run.with_columns(gyro=run.gyro - noise))
+        table = model._columns(model._rows(run).atoms)
+        white = LinearRegressor().fit(table, model._rows(run).y)
+        errors = model.regressor_.coef_ - clean.regressor_.coef_
+        z.append(errors / model.regressor_.standard_errors()[1:])
+        plain.append(errors / white.standard_errors()[1:])
+    size = np.sqrt(np.mean(np.square(z), axis=0))
+    assert np.all((size > 0.5) & (size < 1.6))
+    # The bias' slope over temperature feels slow noise, the scale factor that turns both ways does not.
+    slope = model.column_names.index("T")
+    assert np.sqrt(np.mean(np.square(plain), axis=0))[slope] > 1.8

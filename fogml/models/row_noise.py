@@ -1,0 +1,140 @@
+"""The noise of a model's rows, as told by what its columns leave of them.
+
+A grid of models, white noise with flicker and a random walk, weighed by their restricted likelihood, in
+which what the coefficients absorb is accounted for (H. Patterson & R. Thompson, Biometrika 58 (1971) 545).
+A short run tells little of slow noise; so nothing is chosen, all models that count are averaged over.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.models.table import TrainingTable
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_model import NoiseModel
+from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.spectrum_fit import SpectrumTerms, term_shapes
+
+_GAP = 1.5
+"""Steps longer than this many usual ones part a run."""
+_FEWEST = 8
+"""Degrees of freedom that columns must leave for a noise to be told."""
+_LIGHT = 1e-4
+"""Weight below which a model no longer counts."""
+_INDEPENDENT = 1e-9
+"""Columns whose singular value is below this share of the largest hold nothing new."""
+_OCTAVES_BEYOND = 2
+"""Octaves above the highest frequency at which flicker or walk may still equal the white noise."""
+
+
+@dataclass(frozen=True)
+class RowNoise:
+    """Noise models that rows speak for.
+
+    Attributes
+    ----------
+    squares
+        N^2 [(deg/h)^2 s, white density], B^2 [(deg/h)^2] and K^2 [(deg/h)^2/s] of each model, shape (m, 3).
+    weights
+        Posterior probabilities, shape (m,).
+    freedom
+        Degrees of freedom behind the variances.
+    step_s
+        Interval of the rows [s].
+    """
+
+    squares: FloatArray
+    weights: FloatArray
+    freedom: float
+    step_s: float
+
+    @property
+    def mean(self) -> NoiseModel:
+        """The model whose covariance is the mean of all models', as that is straight in the squares."""
+        n, b, k = np.sqrt(self.weights @ self.squares)
+        return NoiseModel(float(n) / 60.0, float(b), 60.0 * float(k))
+
+
+def stretches_of(table: TrainingTable) -> tuple[list[slice], float]:
+    """Rows of one run without a gap each, and the usual step [s]."""
+    steps = np.diff(table.time_s)
+    inside = np.diff(table.run_index) == 0
+    step_s = float(np.median(steps[inside])) if np.any(inside) else 1.0
+    cuts = np.flatnonzero(~inside | (steps > _GAP * step_s)) + 1
+    return [slice(int(p[0]), int(p[-1]) + 1) for p in np.split(np.arange(len(table)), cuts)], step_s
+
+
+def noise_of_rows(table: TrainingTable) -> RowNoise | None:
+    """Noise of a table's values beside its columns and a constant of each stretch; None where they tell none.
+
+    Parameters
+    ----------
+    table
+        Rows in time order, run after run.
+
+    Notes
+    -----
+    What moves a run as a whole from one to the next is no part of it. A form that is wrong leaves residuals
+    that count as slow noise. Beforehand, flicker is as likely there as not, and so is the walk; the frequency
+    at which one that is there equals the white noise is as likely in any octave that the rows reach.
+    """
+    if len(table) < 3:
+        return None
+    parts, step_s = stretches_of(table)
+    parts = [part for part in parts if part.stop - part.start >= 3]
+    scale = np.std(table.X, axis=0)
+    columns = (table.X - table.X.mean(axis=0)) / np.where(scale > 0.0, scale, 1.0)
+    if not parts:
+        return None
+    spectrum = spectrum_of([table.y[p] for p in parts], step_s, [columns[p] for p in parts])
+    if not np.any(spectrum.power > 0.0):
+        return None
+    lowest, half = float(spectrum.frequency_hz.min()), 0.5 / step_s
+    corners = lowest * 2.0 ** np.arange(np.log2(half / lowest) + _OCTAVES_BEYOND + 1.0)
+    flicker = np.concatenate(([0.0], 2.0 * np.pi * corners))
+    walk = np.concatenate(([0.0], 4.0 * np.pi**2 * corners**2))
+    ratios = np.array([(1.0, b, k) for b in flicker for k in walk])
+    beforehand = -np.log(len(corners)) * np.count_nonzero(ratios[:, 1:], axis=1)
+    return _weighed(spectrum, ratios, beforehand)
+
+
+def _weighed(spectrum: Spectrum, ratios: FloatArray, beforehand: FloatArray) -> RowNoise | None:
+    """Models of squares in given ratios by their restricted likelihood, the scale integrated out.
+
+    `beforehand` are logarithms of their prior probabilities.
+    """
+    shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, SpectrumTerms(("N", "B", "K")))
+    shapes = shapes.mean(axis=1)
+    single = len(spectrum.values)
+    left, strength, _ = np.linalg.svd(spectrum.columns, full_matrices=False)
+    basis = left[:, strength > _INDEPENDENT * strength.max(initial=0.0)]
+    freedom = float(spectrum.count.sum()) - basis.shape[1]
+    if freedom < _FEWEST:
+        return None
+    likelihood, squares = np.empty(len(ratios)), np.empty(len(ratios))
+    for place, ratio in enumerate(ratios):
+        density = shapes @ ratio
+        weight = 1.0 / density[:single]
+        weighed = basis * weight[:, None]
+        root = np.linalg.cholesky(basis.T @ weighed)
+        along = np.linalg.solve(root, weighed.T @ spectrum.values)
+        square = float(weight @ spectrum.values**2 - along @ along)
+        square += float(spectrum.count[single:] @ (spectrum.power[single:] / density[single:]))
+        squares[place] = max(square, 1e-300) / freedom
+        logarithms = float(spectrum.count @ np.log(density)) + 2.0 * float(np.log(np.diag(root)).sum())
+        likelihood[place] = -0.5 * (logarithms + freedom * np.log(squares[place]))
+    likelihood += beforehand
+    weights = np.exp(likelihood - likelihood.max())
+    live = weights > _LIGHT
+    return RowNoise(
+        ratios[live] * squares[live, None], weights[live] / weights[live].sum(), freedom, spectrum.sample_s
+    )
+
+
+def shape_models() -> Sequence[NoiseModel]:
+    """White noise of N^2 = 1, alone, with flicker of B^2 = 1, and with a walk of K^2 = 1."""
+    white = 1.0 / 60.0
+    return NoiseModel(white), NoiseModel(white, B=1.0), NoiseModel(white, K=60.0)
