@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.runs.shipped import shipped_run
+from fogml.validation.floors import floor_of_run
 
 
 def names(folder):
@@ -66,6 +67,11 @@ def test_noise_keys_and_files(invoke_json, tmp_path):
     assert len(values["taus_s"]) == len(values["adev"]) == len(values["ci"])
     assert set(values["terms"]) == {"N", "B", "K", "Q", "R"}
     assert set(values["minimum"]) == {"adev", "tau_s"}
+    run = shipped_run("ring-laser-x")
+    floor = floor_of_run(run, np.ones(len(run), dtype=bool), run.error_deg_h, 100.0)
+    told = (values["floor"]["value"][0], *values["floor"]["ci"][0])
+    assert told == pytest.approx((floor.value, floor.lower, floor.upper))
+    assert "noise floor" in (out / "noise.html").read_text(encoding="utf-8")
     for (low, high), deviation in zip(values["ci"], values["adev"], strict=True):
         assert low <= deviation <= high
     assert invoke_json("noise", "--config", out / "noise.config.yaml") == values
