@@ -56,7 +56,6 @@ class Prior:
     def as_dict(self) -> dict[str, Any]:
         """The prior as JSON-ready values."""
         values = {key: np.asarray(value).tolist() for key, value in vars(self).items()}
-        # JSON knows no infinity.
         return {**values, "units": self.units if np.isfinite(self.units) else None}
 
     @classmethod
@@ -104,8 +103,7 @@ class PriorRegressor(LinearRegressor):
     and is drawn less. How well the unit agrees with the fleet is told beside, as where rows tell
     little even an odd unit is drawn far.
 
-    The rows' noise is coloured, in a way that is averaged over
-    (:func:`fogml.models.coefficient_errors.told_by_rows`).
+    What the rows tell is that of :func:`fogml.models.coefficient_errors.told_by_rows`.
 
     Parameters
     ----------
@@ -158,9 +156,9 @@ class PriorRegressor(LinearRegressor):
         left = target - columns @ solution
         variance = float(left @ left) / max(1.0, len(target) - columns.shape[1])
         to_raw = _to_raw(prior)
-        raw, raw_covariance = to_raw @ solution, to_raw @ covariance @ to_raw.T
+        raw = to_raw @ solution
         self.intercept_, self.coef_ = float(raw[0]), raw[1:]
-        self.covariance_ = raw_covariance
+        self.covariance_ = to_raw @ covariance @ to_raw.T
         self.residual_std_ = float(np.sqrt(variance))
         self.ridge_, self.rank_ = 0.0, inputs.shape[1]
         return self
