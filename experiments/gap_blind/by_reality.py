@@ -38,6 +38,7 @@ def main() -> None:
     parser.add_argument("directory", type=Path, help="where the suites lie or are made")
     parser.add_argument("--reality", action="append", choices=choices, help="this one alone; may be repeated")
     parser.add_argument("--method", default=DIAGNOSIS, help="what answers (diagnosis)")
+    parser.add_argument("--share", type=float, default=1.0, help="how much of each part, to try it (1)")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     given = parser.parse_args()
     for reality in given.reality or choices:
@@ -68,9 +69,10 @@ def _do(given: argparse.Namespace, config: Mapping[str, Any], reality: str, part
     folder = BlindFolder(given.directory / reality / part["name"])
     terminal = Terminal()
     terminal.say(f"{reality}, {part['name']}")
-    drawn = {key: part[key] for key in ("count", "kinds", "d_prime") if key in part}
+    drawn = {key: part[key] for key in ("kinds", "d_prime") if key in part}
     made = MakeSettings(
         directory=str(folder.path),
+        count=max(round(given.share * part["count"]), 1),
         seed=config["seed"],
         sample=part.get("sample", config["sample"]),
         reality=reality,

@@ -13,7 +13,7 @@ MIX = "mix"
 """All of them in turn, case by case."""
 SAME_TWIN = "same-twin"
 """No reality: a shipped twin's own runs, to be diagnosed against it."""
-REALITIES = (FIRST, "second")
+REALITIES = (FIRST, "second", "third")
 """Their names, each that of a package beside this module."""
 
 

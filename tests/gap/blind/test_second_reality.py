@@ -10,6 +10,7 @@ from scipy.linalg import toeplitz
 
 from fogml.gap.blind.first.recurrences import bouc_wen, lag, play
 from fogml.gap.blind.frame.form import Additive, Demands, Distorting, Form
+from fogml.gap.blind.frame.operators import faded, late
 from fogml.gap.blind.frame.unit import Unit
 from fogml.gap.blind.frame.whitening import Whitening
 from fogml.gap.blind.realities import REALITIES, reality
@@ -17,14 +18,12 @@ from fogml.gap.blind.second.chamber import air_of, draw_chamber
 from fogml.gap.blind.second.memory import (
     backlash,
     bouc_wen_general,
-    faded,
     maxwell_slip,
     preisach,
     slab_lag,
 )
 from fogml.gap.blind.second.noise import draw_noise
 from fogml.gap.blind.second.plant import Plant, draw_plant
-from fogml.gap.blind.second.sensors import late
 
 RNG_SEED = 4
 LOOP = (np.linspace(-40.0, 60.0, 60), np.full(60, 7.0), np.linspace(0.5, 1.5, 60))

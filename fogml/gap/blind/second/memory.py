@@ -91,30 +91,6 @@ def backlash(x: FloatArray, half_width: float, past: Sequence[float] = ()) -> Fl
     return out[len(past) :]
 
 
-def faded(
-    time: FloatArray,
-    x: FloatArray,
-    kernel: Callable[[FloatArray], FloatArray],
-    hastened: FloatArray | None = None,
-) -> FloatArray:
-    """Integral of kernel(xi(t) - xi(s)) dx(s), at rest before the run; shape (n,).
-
-    Parameters
-    ----------
-    kernel
-        Of the material's own time [s], 1 at 0.
-    hastened
-        How many times faster that time runs than the clock's, shape (n,); 1 if None.
-    """
-    step = np.diff(time, prepend=2.0 * time[0] - time[1])
-    own = np.cumsum(step * (np.ones_like(time) if hastened is None else hastened))
-    grid = np.linspace(own[0], own[-1], 2 * len(time))
-    change = np.diff(np.interp(grid, own, x), prepend=x[0])
-    length = 2 * len(grid)
-    answer = np.fft.rfft(change, length) * np.fft.rfft(kernel(grid - grid[0]), length)
-    return np.interp(own, grid, np.fft.irfft(answer, length)[: len(grid)])
-
-
 def slab_lag(time: FloatArray, x: FloatArray, time_constant_s: float, modes: int = 12) -> FloatArray:
     """The far, insulated face of a slab whose near face follows x; `time_constant_s` is L^2 / D."""
     found = x.copy()

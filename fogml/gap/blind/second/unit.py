@@ -3,27 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import numpy as np
 
 from fogml.gap.blind.frame import nominal
 from fogml.gap.blind.frame.form import Demands, Form
-from fogml.gap.blind.frame.record import FloatArray, SetUp, World
-from fogml.gap.blind.frame.strength import Scales
+from fogml.gap.blind.frame.record import SetUp, World
+from fogml.gap.blind.frame.state_noise import StateNoise
+from fogml.gap.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.gap.blind.frame.unit import Unit, UnitRun
 from fogml.gap.blind.second.chamber import draw_chamber
-from fogml.gap.blind.second.noise import SlopedNoise, draw_noise
+from fogml.gap.blind.second.noise import draw_noise
 from fogml.gap.blind.second.plant import Plant, draw_plant
 from fogml.gap.blind.second.programme import Programme, draw_programme, static_programme
-from fogml.gap.blind.second.sensors import Instruments, Sensed, draw_instruments, felt_by, sense, slower
 from fogml.gap.blind.second.world import happen
 
 _ANOTHER_DAY, _FALSE, _FALSE_SHARE = 1.2, 2.0, 0.12
 """Noise of the static run relative to the others': usually, and where that run is not of this set-up."""
-_LAG_D_PRIME = 1.0
-"""Largest d' of what the thermometers' own lags do to a replay: where nothing is missing, nothing shows."""
 
 
 def draw_unit(
@@ -47,7 +44,7 @@ def draw_unit(
     chamber = draw_chamber(rng)
     begin, past = 0.0, tuple(rng.uniform((-20.0, 20.0, 15.0), (15.0, 55.0, 30.0)).tolist())
 
-    def run(name: str, programme: Programme, of: SlopedNoise, place: int) -> UnitRun:
+    def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, chamber, programme, set_up, sample_s, place, begin, past)
         series = of.series(rng, len(world.time), sample_s)
         return UnitRun(name, world, sense(rng, world, instruments), series, int(rng.integers(2**62)))
@@ -78,34 +75,7 @@ def draw_unit(
         shown=tuple(name for name in instruments.others if name in thermal[0].world.drives),
         first_day=stated.replace(microsecond=0) if rng.random() < 0.7 else None,
     )
-    return _quick_enough(unit, instruments)
-
-
-def _quick_enough(unit: Unit, instruments: Instruments) -> Unit:
-    """The unit with thermometers so quick that what their lag alone does to a replay is lost in the noise."""
-
-    def falsified(run: UnitRun) -> FloatArray:
-        assert isinstance(run.sensed, Sensed)
-        replayed = nominal.output(unit.constants, unit.seen(run, run.sensed.exact()))
-        missed = unit.output(run) - replayed
-        return missed[unit.skipped :]
-
-    length = Scales(unit).projected().length([falsified(run) for run in unit.fit])
-    if length <= _LAG_D_PRIME:
-        return unit
-    quicker = slower(instruments, 0.8 * _LAG_D_PRIME / length)
-
-    def again(run: UnitRun) -> UnitRun:
-        assert isinstance(run.sensed, Sensed)
-        return replace(run, sensed=Sensed(felt_by(quicker, run.world), run.sensed.noise, quicker))
-
-    return replace(
-        unit,
-        instruments=quicker,
-        fit=tuple(again(run) for run in unit.fit),
-        held_out=tuple(again(run) for run in unit.held_out),
-        static=again(unit.static) if unit.static else None,
-    )
+    return quick_enough(unit, instruments)
 
 
 def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:

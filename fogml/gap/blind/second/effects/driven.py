@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.gap.blind.frame.form import Additive, Demands, Shape
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import FloatArray, World
 from fogml.gap.blind.second.memory import preisach
-from fogml.gap.blind.second.sensors import late
 
 
 class PolarisationBeats(Additive):

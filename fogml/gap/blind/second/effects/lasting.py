@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.gap.blind.frame.form import Additive, Demands, ScaleFactor, Shape
+from fogml.gap.blind.frame.operators import faded, late
 from fogml.gap.blind.frame.record import FloatArray, World
-from fogml.gap.blind.second.memory import bouc_wen_general, faded, maxwell_slip, preisach, slab_lag
-from fogml.gap.blind.second.sensors import late
+from fogml.gap.blind.second.memory import bouc_wen_general, maxwell_slip, preisach, slab_lag
 
 _CLUSTER = 12
 

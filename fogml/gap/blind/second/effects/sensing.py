@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.gap.blind.frame.form import Sensing, Shape
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import FloatArray, World
 from fogml.gap.blind.second.memory import slab_lag
-from fogml.gap.blind.second.sensors import late
 
 _OUTER = ("T_out", "T2", "T4")
 

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from fogml.gap.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import EARTH_DEG_H, FloatArray, World
-from fogml.gap.blind.second.sensors import late
 
 
 class SourceOwnHeat(ScaleFactor):

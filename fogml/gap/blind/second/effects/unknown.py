@@ -6,9 +6,9 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from fogml.gap.blind.frame.form import Additive, Demands, Shape
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import FloatArray, World
 from fogml.gap.blind.second.memory import backlash, preisach
-from fogml.gap.blind.second.sensors import late
 
 
 class ThresholdSteps(Additive):

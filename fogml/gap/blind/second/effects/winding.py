@@ -6,10 +6,10 @@ import numpy as np
 from scipy.special import expit
 
 from fogml.gap.blind.frame.form import Additive, Demands, Shape
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import FloatArray, World
 from fogml.gap.blind.second.memory import backlash
 from fogml.gap.blind.second.plant import AXIAL, RADIAL
-from fogml.gap.blind.second.sensors import late
 
 _C_T = 0.6
 """deg/h per m of fibre and degC/min."""

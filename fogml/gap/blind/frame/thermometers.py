@@ -5,12 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.signal import lfilter
 
+from fogml.gap.blind.frame import nominal
+from fogml.gap.blind.frame.operators import late
 from fogml.gap.blind.frame.record import FloatArray, World
+from fogml.gap.blind.frame.strength import Scales
+from fogml.gap.blind.frame.unit import Unit, UnitRun
 
 _AT_REST, _IN_TURNS = 0.1, 0.4
 """What the thermometers' noise may add to the gyro's white noise in a sample, rms, in shares of it."""
+
+_LAG_D_PRIME = 1.0
+"""Largest d' of what the thermometers' own lags do to a replay: where nothing is missing, nothing shows."""
 
 
 @dataclass(frozen=True)
@@ -131,12 +137,28 @@ def felt_by(instruments: Instruments, world: World) -> dict[str, FloatArray]:
     return {name: late(world.nodes[one.place], one.lag_s, world.sample_s) for name, one in each}
 
 
-def late(x: FloatArray, time_constant_s: float, step_s: float) -> FloatArray:
-    """First-order lag of x, straight between samples and at rest before the first; shape (n,)."""
-    if time_constant_s <= 1e-9 * step_s:
-        return x
-    ratio = step_s / time_constant_s
-    kept = np.exp(-ratio)
-    mean = -np.expm1(-ratio) / ratio
-    y, _ = lfilter([1.0 - mean, mean - kept], [1.0, -kept], x, zi=[mean * x[0]])
-    return np.asarray(y)
+def quick_enough(unit: Unit, instruments: Instruments) -> Unit:
+    """The unit with thermometers so quick that what their lag alone does to a replay is lost in the noise."""
+
+    def falsified(run: UnitRun) -> FloatArray:
+        assert isinstance(run.sensed, Sensed)
+        replayed = nominal.output(unit.constants, unit.seen(run, run.sensed.exact()))
+        missed = unit.output(run) - replayed
+        return missed[unit.skipped :]
+
+    length = Scales(unit).projected().length([falsified(run) for run in unit.fit])
+    if length <= _LAG_D_PRIME:
+        return unit
+    quicker = slower(instruments, 0.8 * _LAG_D_PRIME / length)
+
+    def again(run: UnitRun) -> UnitRun:
+        assert isinstance(run.sensed, Sensed)
+        return replace(run, sensed=Sensed(felt_by(quicker, run.world), run.sensed.noise, quicker))
+
+    return replace(
+        unit,
+        instruments=quicker,
+        fit=tuple(again(run) for run in unit.fit),
+        held_out=tuple(again(run) for run in unit.held_out),
+        static=again(unit.static) if unit.static else None,
+    )

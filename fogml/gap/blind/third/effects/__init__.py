@@ -1,0 +1,1 @@
+"""Forms of effects of the third reality, by subject."""
