@@ -39,9 +39,10 @@ def main() -> None:
     parser.add_argument("--reality", action="append", choices=choices, help="this one alone; may be repeated")
     parser.add_argument("--method", default=DIAGNOSIS, help="what answers (diagnosis)")
     parser.add_argument("--share", type=float, default=1.0, help="how much of each part, to try it (1)")
+    parser.add_argument("--page", action="store_true", help="the page of what is there alone")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     given = parser.parse_args()
-    for reality in given.reality or choices:
+    for reality in () if given.page else given.reality or choices:
         for part in _parts(config, reality):
             _do(given, config, reality, part)
     found = [read_marks(path) for path in sorted(given.directory.glob(f"*/*/{given.method}-{MARKS}"))]

@@ -55,7 +55,7 @@ def make(
         typer.Option(
             "--reality",
             metavar="NAME",
-            help="first (default), second, mix for all in turn, or same-twin for a shipped twin's own runs.",
+            help="first (default), second, third, mix for all in turn, or same-twin for a twin's own runs.",
         ),
     ] = None,
     leave_one_out: Annotated[

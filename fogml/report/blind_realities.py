@@ -32,6 +32,15 @@ _REALITIES = {
         "on the optics; Richards' sigmoid with its own hysteresis; random smooth functions), and none was "
         "taken or left for its likeness to the catalogue."
     ),
+    "third": (
+        "Ten masses between stirred air and a radiating wall, not linear, by Runge and Kutta's fourth "
+        "order; a valve that pulses to cool; paths drawn as a whole; noise of two or three time constants. "
+        "Other forms again (Duhem's loops, plays with a dead zone, Eyring's creep, fractional strain, "
+        "products of periods, splines), drawn without a catalogue at hand."
+    ),
+    "same-twin": (
+        "No reality: a shipped twin's own runs with its thermometers as shipped, diagnosed against that twin."
+    ),
 }
 _SHOWN = ("right", "exact", "unknown")
 

@@ -46,7 +46,8 @@ class Programme:
 
     def set_point(self, time: FloatArray) -> FloatArray:
         """Set point at times [degC]; held before the run."""
-        return np.interp(time, _NODES_S * np.arange(len(self.path)), self.path)
+        nodes = _NODES_S * np.arange(len(self.path), dtype=np.float64)
+        return np.interp(time, nodes, self.path)
 
 
 def draw_programme(rng: np.random.Generator, demands: Demands, sample_s: float) -> Programme:

@@ -59,7 +59,8 @@ def draw_unit(
     latitude = float(rng.uniform(25.0, 58.0))
     heading = float(rng.choice([90.0, 270.0])) if any(f.horizontal for f in forms) else None
     set_up = SetUp(latitude, heading)
-    begin, past = 0.0, (22.0,)
+    begin = 0.0
+    past: tuple[float, ...] = (22.0,)
 
     def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
         world = happen(rng, plant, programme, set_up, sample_s, place, begin, past)
