@@ -29,7 +29,7 @@ class RateSettings(Settings):
     answers: float = Field(0.5, gt=0.0, lt=1.0)
     dead: float = Field(0.1, gt=0.0, lt=1.0)
     range_error: float = Field(0.01, gt=0.0, lt=1.0)
-    small: float = Field(0.02, gt=0.0, lt=1.0)
+    small: float = Field(0.02, gt=0.0, le=1.0)
     repair: Repairing = False
     out: str | None = None
 

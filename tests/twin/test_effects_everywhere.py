@@ -148,6 +148,7 @@ def test_scale_factor_is_odd_in_the_rate_and_vanishes_with_it(id: str) -> None:
 
 
 SCALING = {
+    "shupe_winding": (1.0, -1.0),
     "pigtail_shupe": (0.0, -1.0),
     "shupe_trim": (0.0, -1.0),
     "intensity_modulation": (-1.0, -1.0),
@@ -162,6 +163,7 @@ def test_responses_scale_with_the_units_coil(id: str) -> None:
     declared, (of_length, of_diameter) = effect(id), SCALING[id]
     time = np.arange(4000.0)
     nodes = {"T": 25.0 + 0.01 * time, "T_case": 25.0 + 0.02 * time, "T_electronics": 25.0 + 0.003 * time}
+    nodes["T_out"] = 25.0 + 1e-6 * time**2
 
     def shown(coil: Coil) -> FloatArray:
         given = Inputs(time, nodes, np.zeros(4000), coil=coil, rate_window_s=0.0)

@@ -22,7 +22,8 @@ class Deadband(LoopEffect):
     zone, and beyond it the error fades as w_d**2 / (2 w). Only rates near zero show it; with the axis
     up and Earth rate well above w_d there is nearly nothing. The amplitude w_d is all that it has. It is
     0.01 to 1 deg/h; a closed loop with dither comes down to 1e-3 deg/h, several deg/h are those of an old
-    design without.
+    design without. The dead zone of IEEE Std 952 is 2 w_d wide, and the threshold, where half of the rate
+    shows, is 2 w_d / sqrt(3): `fogml lab rate` reads both.
 
     Source: Adler, Proceedings of the IRE 34 (1946) 351, for the locked oscillator (literature; mean beat
     rate derived); "Interferometric FOG dead band suppression" (read), whose suppressed designs show none at

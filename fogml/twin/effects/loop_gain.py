@@ -18,9 +18,9 @@ class LoopGain(LoopEffect):
 
     w is the rate that the loop meets, y what it gives, u = T_electronics - 25; tau = 1 / (G P_0) = 1 / (2 pi
     bandwidth) is the amplitude and ``power_slope`` the change of the light P_0 [dB per 100 degC], in whose
-    place that of ``light_power`` counts where it is on.
-    The integrator's ``leak_time`` makes the finite gain at rest: an error of 1 / (1 + leak_time / tau) of
-    the rate, none for a perfect one. An open loop has an error of -phi_s**2 / 6 and one like P_0 instead.
+    place that of ``light_power`` counts where it is on. The integrator's ``leak_time`` makes the finite gain
+    at rest: an error of 1 / (1 + leak_time / tau) of the rate, none for a perfect one. `fogml lab rate` reads
+    the bandwidth off oscillations. An open loop has an error of -phi_s**2 / 6 and one like P_0 instead.
 
     Source: linear control (derived); bandwidths of 0.1 to 5 kHz and light changing by 0.5 to 3 dB over
     temperature are engineering ranges.
