@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus
+from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged
 from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
 from fogml.lab.rate_temperature import temperature_sensitivity
 from fogml.lab.rate_tests import (
@@ -72,7 +72,7 @@ def rate_json(
     Raises
     ------
     InputError
-        If no run holds a turn of the table.
+        If no run holds two lasting rates of the table, or an oscillation.
     """
     criteria = Criteria() if criteria is None else criteria
     read = _read(runs, settle_s)
@@ -126,7 +126,8 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
             slews += [] if found is None else [(float(np.median(np.diff(run.time))), found)]
     if not ladders and not gains:
         raise InputError(
-            "no run holds a turn of the table: the column 'rate [deg/s]' is missing or 0 throughout"
+            f"{', '.join(run.name for run in runs)}: holds no test on a rate table; the column "
+            "'rate [deg/s]' has to stay at two rates or more, each for some samples, or go to and fro as a sine"
         )
     return _Read(ladders, gains, slews)
 
@@ -134,11 +135,11 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
 def _main_ladder(read: _Read, criteria: Criteria) -> tuple[Line, Range] | None:
     """Of the run with the most different large rates, as temperatures and small rates tell less."""
     best: tuple[Line, Range] | None = None
-    most = 1
+    most = 0
     for _, plateaus in read.ladders:
         found = scale_line(plateaus, criteria)
-        large = np.abs(plateaus.rate) >= criteria.small * np.abs(plateaus.rate).max(initial=0.0)
-        levels = len(np.unique(np.round(plateaus.rate[large], 6)))
+        rate = merged(plateaus.rate, plateaus.rate_error)
+        levels = len(np.unique(rate[np.abs(rate) >= criteria.small * np.abs(rate).max()]))
         if found is not None and levels > most:
             best, most = found, levels
     return best

@@ -18,6 +18,8 @@ LEAST_CYCLES = 3
 """Cycles that make an oscillation."""
 SINE_SHARE = 0.95
 """Share of the rate's square that a sine explains of an oscillation; of turns to and fro it is 8 / pi**2."""
+ROUND_OFF_DEG_H = 1e-6
+"""Rates that differ by less are the same."""
 _BAND = 0.05
 _SAME_CYCLE = 0.2
 _NOISES = 6.0
@@ -40,6 +42,8 @@ class Plateaus:
         Mean output [deg/h], shape (k,).
     error
         Standard error of that mean from the white noise of its samples [deg/h], shape (k,).
+    rate_error
+        The same of the recorded rate [deg/h], 0 for one that was commanded, shape (k,).
     """
 
     start: FloatArray
@@ -48,13 +52,14 @@ class Plateaus:
     rate: FloatArray
     output: FloatArray
     error: FloatArray
+    rate_error: FloatArray
 
     def __len__(self) -> int:
         return len(self.time)
 
     def __getitem__(self, which: BoolArray) -> Plateaus:
         """Some of them."""
-        kept = (self.start, self.stop, self.time, self.rate, self.output, self.error)
+        kept = (self.start, self.stop, self.time, self.rate, self.output, self.error, self.rate_error)
         return Plateaus(*(values[which] for values in kept))
 
 
@@ -102,18 +107,32 @@ def find_plateaus(run: Run, waves: Sequence[Oscillation] = (), settle_s: float |
         if last - begin >= LEAST_ROWS and last - first > 2 * LEAST_ROWS:
             rows.append((begin, last))
     told = [_told(run, output, *pair) for pair in rows]
-    columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 6)
+    columns = np.array([(*pair, *values) for pair, values in zip(rows, told, strict=True)]).reshape(-1, 7)
     start, stop = columns[:, :2].astype(np.intp).T
     return Plateaus(start, stop, *columns[:, 2:].T)
 
 
-def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, float, float, float]:
-    part = output[start:stop]
-    # From differences of neighbours, so that a drifting bias is no noise.
-    white = float(np.sqrt(0.5 * np.mean(np.diff(part) ** 2)))
+def _told(run: Run, output: FloatArray, start: int, stop: int) -> tuple[float, ...]:
+    part, rate = output[start:stop], 3600.0 * run.rate[start:stop]
     middle = 0.5 * (run.time[start] + run.time[stop - 1])
-    acting = 3600.0 * float(run.rate[start:stop].mean()) + earth_deg_h(run)
-    return float(middle), acting, float(part.mean()), white / np.sqrt(stop - start)
+    acting = float(rate.mean()) + earth_deg_h(run)
+    return float(middle), acting, float(part.mean()), _error_of_mean(part), _error_of_mean(rate)
+
+
+def _error_of_mean(part: FloatArray) -> float:
+    # From differences of neighbours, so that a drift is no noise.
+    return float(np.sqrt(0.5 * np.mean(np.diff(part) ** 2) / len(part)))
+
+
+def merged(values: FloatArray, error: FloatArray) -> FloatArray:
+    """Values of which those within `_NOISES` of their errors are one, their mean; shape (k,)."""
+    order = np.argsort(values, kind="stable")
+    ordered, slack = values[order], ROUND_OFF_DEG_H + _NOISES * error[order]
+    group = np.concatenate([[0], np.cumsum(np.diff(ordered) > np.maximum(slack[1:], slack[:-1]))])
+    means = np.bincount(group, ordered) / np.bincount(group)
+    out = np.empty(len(values))
+    out[order] = means[group]
+    return out
 
 
 def find_oscillations(run: Run) -> list[Oscillation]:

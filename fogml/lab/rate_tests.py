@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.lab.rate_pieces import Plateaus
+from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
 from fogml.runs.run import FloatArray
 
 LEAST_FOR_DRIFT = 3
@@ -106,11 +106,10 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
     Rates are taken in by their size as long as the next one stays within `range_error` of the line through
     those below it.
     """
-    size = np.abs(plateaus.rate)
-    large = size >= criteria.small * size.max(initial=0.0)
-    sizes = np.unique(np.round(size[large], 6))
-    if len(plateaus) < 3 or np.ptp(plateaus.rate) == 0.0:
+    if len(plateaus) < 3 or len(np.unique(merged(plateaus.rate, plateaus.rate_error))) < 2:
         return None
+    size = merged(np.abs(plateaus.rate), plateaus.rate_error)
+    sizes = np.unique(size[size >= criteria.small * size.max()])
     within = np.ones(len(plateaus), dtype=np.bool_)
     for place in range(len(sizes) - 1, 0, -1):
         below = size < 0.5 * (sizes[place - 1] + sizes[place])
@@ -128,7 +127,7 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
     if len(beyond):
         exceeded = float(np.abs(beyond.rate).min())
         output = float(np.abs(beyond.output).mean())
-    return _line(kept), Range(float(np.abs(kept.rate).max()), exceeded, output)
+    return _line(kept, criteria), Range(float(np.abs(kept.rate).max()), exceeded, output)
 
 
 def _design(plateaus: Plateaus) -> FloatArray:
@@ -145,7 +144,7 @@ def _fit(plateaus: Plateaus) -> FloatArray:
     return solved
 
 
-def _line(plateaus: Plateaus) -> Line:
+def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
     solved, matrix = _fit(plateaus), _design(plateaus)
     columns = 3 if len(plateaus) > 4 else 2
     left = plateaus.output - matrix @ solved
@@ -154,9 +153,9 @@ def _line(plateaus: Plateaus) -> Line:
     deviation = max(float(np.sqrt(left @ left / freedom)), float(np.sqrt(np.mean(plateaus.error**2))))
     inverse = np.linalg.pinv(matrix[:, :columns].T @ matrix[:, :columns])
     greatest = float(np.abs(plateaus.rate).max())
-    levels = len(np.unique(np.round(plateaus.rate, 6)))
-    asymmetry = None
-    senses = [plateaus.rate > 0.0, plateaus.rate < 0.0]
+    levels = len(np.unique(merged(plateaus.rate, plateaus.rate_error)))
+    asymmetry, least = None, criteria.small * greatest
+    senses = [plateaus.rate > least, plateaus.rate < -least]
     if levels >= 4 and all(sense.any() for sense in senses):
         # The gain of |rate| beside that of the rate is half of the difference of the two senses.
         both = np.column_stack([matrix[:, :columns], np.abs(plateaus.rate)])
@@ -184,11 +183,11 @@ def zero_answers(small: Plateaus, scale_factor: float, criteria: Criteria) -> li
     if len(small) < 3:
         return []
     rate = small.rate - 0.5 * (small.rate.min() + small.rate.max())
-    sizes = np.round(np.abs(rate), 6)
-    tested = np.unique(sizes[sizes > 0.0])
+    sizes = merged(np.abs(rate), small.rate_error)
+    middle = np.abs(rate) <= ROUND_OFF_DEG_H + small.rate_error.max()
+    tested = np.unique(sizes[~middle])
     of_size = np.sign(rate)[:, None] * (sizes[:, None] == tested)
     steady = _design(small)[:, 1:]
-    middle = sizes == 0.0
     if middle.sum() >= LEAST_FOR_DRIFT:
         bias = np.linalg.lstsq(steady[middle], small.output[middle], rcond=None)[0]
     else:
@@ -200,7 +199,8 @@ def zero_answers(small: Plateaus, scale_factor: float, criteria: Criteria) -> li
         here, expected = sizes == size, abs(scale_factor) * size
         senses = [above[here & (np.sign(rate) == sense)] for sense in (1.0, -1.0)]
         shown = float(np.mean([part.mean() for part in senses if len(part)])) / expected
-        se = float(np.sqrt(np.mean(small.error[here] ** 2) / here.sum())) / expected
+        noise = small.error[here] ** 2 + small.rate_error[here] ** 2
+        se = float(np.sqrt(noise.mean() / here.sum())) / expected
         if se <= criteria.doubt:
             answers.append(Answer(size, shown * float(np.sign(scale_factor)), se))
     return answers
@@ -213,13 +213,14 @@ def step_answers(
     step, low = np.diff(plateaus.rate), criteria.small * greatest
     far = np.minimum(np.abs(plateaus.rate[:-1]), np.abs(plateaus.rate[1:])) >= low
     here = far & (np.abs(step) < low) & (step != 0.0)
-    sizes = np.where(here, np.round(np.abs(step), 6), 0.0)
+    noise = plateaus.error**2 + plateaus.rate_error**2
+    sizes = merged(np.abs(step), np.hypot(plateaus.rate_error[:-1], plateaus.rate_error[1:]))
     answers = []
-    for size in np.unique(sizes[sizes > 0.0]):
-        which = sizes == size
+    for size in np.unique(sizes[here]):
+        which = here & (sizes == size)
         share = np.diff(plateaus.output)[which] / (scale_factor * step[which])
-        noise = plateaus.error[:-1][which] ** 2 + plateaus.error[1:][which] ** 2
-        se = float(np.sqrt(noise.mean() / which.sum())) / (abs(scale_factor) * float(size))
+        both = noise[:-1][which] + noise[1:][which]
+        se = float(np.sqrt(both.mean() / which.sum())) / (abs(scale_factor) * float(size))
         if se <= criteria.doubt:
             answers.append(Answer(float(size), float(share.mean()), se))
     return answers
