@@ -127,7 +127,7 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
     if not ladders and not gains:
         raise InputError(
             f"{', '.join(run.name for run in runs)}: holds no test on a rate table; the column "
-            "'rate [deg/s]' has to stay at two rates or more for some samples each, or go to and fro as a sine"
+            "'rate [deg/s]' has to stay at two rates for some samples each, or to go to and fro as a sine"
         )
     return _Read(ladders, gains, slews)
 
