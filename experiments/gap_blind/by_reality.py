@@ -8,6 +8,7 @@ where it was. Each reality alone: ``--reality NAME``; the others then stand as t
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -19,10 +20,11 @@ from fogml.cli.terminal import Terminal
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.gap.blind.realities import SAME_TWIN
 from fogml.gap.blind.score import gather
-from fogml.gap.blind.scoring.by_reality import by_form, by_reality
+from fogml.gap.blind.scoring.by_reality import ALL, by_form, by_reality
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.scoring.marks_file import MARKS, read_marks, write_marks
 from fogml.gap.blind.scoring.statistics import proportion
+from fogml.gap.blind.seeds import record_use
 from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
@@ -32,7 +34,7 @@ HERE = Path(__file__).parent
 
 def main() -> None:
     """Make, answer and score what is asked for; write the page of all that there is."""
-    config = read_yaml(HERE / "by_reality.yaml")
+    config = dict(read_yaml(HERE / "by_reality.yaml"))
     choices = [*config["realities"], SAME_TWIN]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("directory", type=Path, help="where the suites lie or are made")
@@ -41,31 +43,56 @@ def main() -> None:
     parser.add_argument("--share", type=float, default=1.0, help="how much of each part, to try it (1)")
     parser.add_argument("--page", action="store_true", help="the page of what is there alone")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
+    parser.add_argument("--final", action="store_true", help="the seed and numbers kept for final figures")
     given = parser.parse_args()
+    ledger = HERE / "final_uses.json" if given.final else None
+    if given.final:
+        config |= config["final"]
+        given.share = config["share"]
     for reality in () if given.page else given.reality or choices:
         for part in _parts(config, reality):
-            _do(given, config, reality, part)
+            _do(given, config, reality, part, ledger)
     found = [read_marks(path) for path in sorted(given.directory.glob(f"*/*/{given.method}-{MARKS}"))]
     marks = [mark for one in found for mark in one.methods[given.method]]
-    values = {
-        "seed": config["seed"],
-        "method": given.method,
-        "by_reality": by_reality([m for m in marks if m.truth.reality != SAME_TWIN]),
-        "by_form": by_form(marks),
-        "same_twin": list(_same_twin([m for m in marks if m.truth.reality == SAME_TWIN])),
-        "cases": {name: sum(m.truth.reality == name for m in marks) for name in choices},
-    }
-    write_page("by_reality", _page(values))
+    values = told(marks, choices, config["seed"], given.method, given.final)
+    if ledger is not None:
+        hashes = "\n".join(one.truth for one in found)
+        figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
+        digest = hashlib.sha256(hashes.encode()).hexdigest()
+        record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})
+    write_page("by_reality", page(values))
     with (HERE / "by_reality.json").open("w", encoding="utf-8") as file:
         json.dump(values, file, indent=1)
         file.write("\n")
+
+
+def told(
+    marks: Sequence[Mark], realities: Sequence[str], seed: int, method: str, final: bool
+) -> dict[str, Any]:
+    """What ``by_reality.json`` holds of some marks."""
+    drawn = [m for m in marks if m.truth.reality != SAME_TWIN]
+    return {
+        "seed": seed,
+        "final": final,
+        "method": method,
+        "by_reality": by_reality(drawn),
+        "by_form": by_form(drawn),
+        "same_twin": list(_same_twin([m for m in marks if m.truth.reality == SAME_TWIN])),
+        "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
+    }
 
 
 def _parts(config: Mapping[str, Any], reality: str) -> list[dict[str, Any]]:
     return list(config["same_twin"] if reality == SAME_TWIN else config["parts"])
 
 
-def _do(given: argparse.Namespace, config: Mapping[str, Any], reality: str, part: Mapping[str, Any]) -> None:
+def _do(
+    given: argparse.Namespace,
+    config: Mapping[str, Any],
+    reality: str,
+    part: Mapping[str, Any],
+    ledger: Path | None,
+) -> None:
     """Make, answer and score one part."""
     folder = BlindFolder(given.directory / reality / part["name"])
     terminal = Terminal()
@@ -86,7 +113,7 @@ def _do(given: argparse.Namespace, config: Mapping[str, Any], reality: str, part
     )
     run_and_tell(answered, terminal)
     write_marks(
-        folder.path / f"{given.method}-{MARKS}", gather(folder, [given.method], workers=given.workers)
+        folder.path / f"{given.method}-{MARKS}", gather(folder, [given.method], ledger, workers=given.workers)
     )
 
 
@@ -106,16 +133,18 @@ def _same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
         }
 
 
-def _page(values: Mapping[str, Any]) -> str:
+def page(values: Mapping[str, Any]) -> str:
+    """``by_reality.md`` of what ``by_reality.json`` holds."""
     names = list(values["by_reality"])
     places = range(len(values["by_reality"][names[0]]))
+    kept = "kept for final figures" if values["final"] else "one to develop on: no final figures"
     counted = ", ".join(f"{name} {count}" for name, count in values["cases"].items())
     return "\n".join(
         [
             "# The diagnosis by reality",
             "",
-            f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is one to "
-            f"develop on: no final figures. Cases: {counted}. Each figure with its 95 % interval "
+            f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is {kept}. "
+            f"Cases: {counted}. Each figure with its 95 % interval "
             "(Wilson's for shares) and what it rests on; wanted figures ask for 400 cases each, and none "
             "rests on as many here. Forms of the first reality lie near the catalogue's, those of the others "
             "were drawn without asking how near. A far form that is called by its name is right; called "

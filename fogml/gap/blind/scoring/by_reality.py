@@ -7,7 +7,7 @@ miss. What is named has a probability of one half or more.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -98,6 +98,14 @@ def _false(marks: Sequence[Mark]) -> Estimate:
     return proportion([x for m in marks for x in ([True] if m.failure else [not i.right for i in m.named])])
 
 
+def _within_one(estimate: Estimate) -> Estimate:
+    """A mean of probabilities, its interval cut at 0 and 1."""
+    low, high = estimate.low, estimate.high
+    return replace(
+        estimate, low=None if low is None else max(low, 0.0), high=None if high is None else min(high, 1.0)
+    )
+
+
 def _always(m: Mark) -> bool:
     return True
 
@@ -151,7 +159,7 @@ WANTED = (
     Wanted("false_names", "named effects that are false", _always, _false, high=0.06),
     Wanted(
         "mass_on_true", "mean probability on the true cause, one cause, d′ > 10 (as DX 2025)",
-        _of("one", *_UNKNOWN, low=_STRONG), lambda marks: mean([mass_on_true(m) for m in marks]),
+        _of("one", *_UNKNOWN, low=_STRONG), lambda marks: _within_one(mean([mass_on_true(m) for m in marks])),
         low=0.90, format="number",
     ),
     Wanted(

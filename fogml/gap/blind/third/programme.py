@@ -53,7 +53,7 @@ class Programme:
 def draw_programme(rng: np.random.Generator, demands: Demands, sample_s: float) -> Programme:
     """A run of 5 to 8 h."""
     duration = float(np.round(rng.uniform(5.0, 8.0) * 3600.0 / sample_s) * sample_s)
-    t = _NODES_S * np.arange(int(duration / _NODES_S) + 2)
+    t = _NODES_S * np.arange(int(duration / _NODES_S) + 2, dtype=np.float64)
     kind = "plunges" if demands.shock else str(rng.choice(list(_KINDS)))
     low = float(rng.uniform(-40.0, 0.0))
     path = _KINDS.get(kind, _plunges)(rng, t, low, float(rng.uniform(max(low + 35.0, 38.0), 70.0)))
