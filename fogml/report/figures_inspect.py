@@ -43,7 +43,7 @@ def recording(run: Run) -> Drawing:
     _output(figure, run, time, per_unit)
     for index, name in enumerate(run.temperature_columns):
         place = rows.index("temperature") + 1
-        x, y = drawn(time, run.columns[name], gaps=run.gap_starts)
+        x, y = drawn(time, run.temperature(name), gaps=run.gap_starts)
         _line(figure, place, x, y, name, index)
         if name in rates:
             rate_time, rate, gaps = rates[name]
@@ -66,10 +66,8 @@ def recording(run: Run) -> Drawing:
     named = shade(figure, regime_segments(run, per_unit))
     style.styled(figure, 120 + 165 * len(rows), hovermode="x", legend={"y": 1.06})
     words = ", ".join(regime_word(name) for name in named) or "none"
-    spans = [
-        f"{name} {number(float(run.columns[name].min()))} to {number(float(run.columns[name].max()))} °C"
-        for name in run.temperature_columns
-    ]
+    held = {name: run.temperature(name) for name in run.temperature_columns}
+    spans = [f"{name} {number(float(x.min()))} to {number(float(x.max()))} °C" for name, x in held.items()]
     broken = f"{plural(len(run.gap_starts), 'gap')}, drawn as gaps. " if len(run.gap_starts) else ""
     return Drawing(
         figure,
@@ -118,7 +116,7 @@ def temperature_rates(run: Run) -> dict[str, tuple[FloatArray, FloatArray, NDArr
     names = run.temperature_columns
     if not names:
         return {}
-    means = block_averages(run.time, *(run.columns[name] for name in names), window_s=_rate_window(run))
+    means = block_averages(run.time, *(run.temperature(name) for name in names), window_s=_rate_window(run))
     if len(means) < 3:
         return {}
     steps = np.diff(means.time_s)

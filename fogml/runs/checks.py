@@ -125,7 +125,7 @@ def _stuck(run: Run) -> Iterator[Finding]:
             samples = len(values) - int((stops - starts)[long].sum())
             if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
                 continue
-        others = [run.columns[other] for other in temperatures if other != name]
+        others = [run.temperature(other) for other in temperatures if other != name]
         found = [i for i in long.tolist() if any(np.ptp(x[starts[i] : stops[i]]) > least for x in others)]
         if found:
             first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
@@ -224,7 +224,7 @@ def _span(run: Run) -> Iterator[Finding]:
     try:
         temperature = run.temperature()
     except InputError:
-        temperature = run.columns[run.temperature_columns[0]]
+        temperature = run.temperature(run.temperature_columns[0])
     span = float(np.ptp(temperature))
     if span < SMALL_SPAN_DEGC:
         message = f"the temperature spans {span:.3g} degC only; under 5 degC a drift model is poorly told"

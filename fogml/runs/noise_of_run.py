@@ -164,7 +164,7 @@ def moving_temperatures(run: Run) -> dict[str, float]:
     if not names:
         return {}
     window_s = min(60.0, run.span_s / 4)
-    averages = block_averages(run.time, *(run.columns[name] for name in names), window_s=window_s)
+    averages = block_averages(run.time, *(run.temperature(name) for name in names), window_s=window_s)
     spans = {name: float(np.ptp(values)) for name, values in zip(names, averages.values)}
     return {name: span for name, span in spans.items() if span > MOVING_DEGC}
 

@@ -37,7 +37,7 @@ def _run(run: Run) -> dict[str, Any]:
         "facts": run.facts.as_dict(),
         "earth_rate_deg_h": run.facts.earth_rate_deg_h,
         "gyro_unit": run.gyro_unit,
-        "columns": [_column(run, name, values) for name, values in run.columns.items()],
+        "columns": [_column(run, name, values) for name, values in run.without_dropouts.columns.items()],
         "temperatures": {name: _temperature(run, name) for name in run.temperature_columns},
         "gaps": _gaps(run),
         "regimes": _regimes(run),
@@ -62,7 +62,7 @@ def _column(run: Run, name: str, values: FloatArray) -> dict[str, Any]:
 
 def _temperature(run: Run, name: str) -> dict[str, Any]:
     """Range [degC] and fastest change [degC/min] of one temperature."""
-    values = run.columns[name]
+    values = run.temperature(name)
     found: dict[str, Any] = {
         "least": float(values.min()),
         "greatest": float(values.max()),

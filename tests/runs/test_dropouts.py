@@ -8,7 +8,9 @@ import pytest
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.runs.dropouts import RULE, read_thermometer
+from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.run import Run
+from fogml.validation.inspection import inspection_json
 
 ROWS = 7200
 BAD = np.r_[50, 900:905, 3000, 5000:5200, 7199]
@@ -94,3 +96,15 @@ def test_model_box_and_flags_are_those_of_the_clean_rows(features):
     np.testing.assert_array_equal(np.concatenate([part.flag for part in parts]), flags)
     drift = np.concatenate([part.drift for part in parts])
     np.testing.assert_allclose(drift, model.compensate(run).drift, atol=1e-9)
+
+
+def test_what_is_told_of_a_run_counts_no_dropout():
+    columns = cycle()
+    columns["T"][BAD] = -127.0
+    run = Run("r.csv", columns)
+    told = inspection_json([run])["runs"][0]
+    temperature = told["temperatures"]["T"]
+    assert temperature["least"] > 19.0 and temperature["span"] < 41.0
+    assert next(c for c in told["columns"] if c["name"] == "T")["least"] == temperature["least"]
+    still = Run("s.csv", {**columns, "T": np.where(np.isin(np.arange(ROWS), BAD), -127.0, 25.0)})
+    assert moving_temperatures(still) == {}
