@@ -70,6 +70,11 @@ class Effect(ABC):
     drawn_per_run
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
+    family
+        All that it can do in a diagnosis: a name of `fogml.gap.families.catalogue.FAMILIES`; ``signature`` is
+        its own signature over a grid of its shapes.
+    place
+        Where it sits: what temperature drives it, and where to look for it.
     seeded
         Whether a simulation draws what differs each time itself, from its seed: then repeats leave the
         amplitude alone, and a replay, which can't know the draw, has what is expected of it.
@@ -91,6 +96,8 @@ class Effect(ABC):
     amplitudes: ClassVar[tuple[float, ...]] = ()
     drawn_per_run: ClassVar[bool] = False
     seeded: ClassVar[bool] = False
+    family: ClassVar[str] = "signature"
+    place: ClassVar[str] = ""
 
     @abstractmethod
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:

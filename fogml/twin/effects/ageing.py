@@ -28,6 +28,8 @@ class Ageing(BiasEffect):
 
     id = "ageing"
     code = "C10"
+    family = "ageing"
+    place = "unit"
     title = "Ageing of the bias"
     amplitude = Quantity("amplitude", "deg/h", (0.02, 0.2), (4e-4, 4e-3), "b_1", (-100.0, 100.0), signed=True)
     shape = (Quantity("time_constant", "s", (3600.0, 36e5), (3600.0, 36e5), "tau", (1.0, 1e9)),)

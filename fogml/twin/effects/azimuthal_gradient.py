@@ -25,6 +25,7 @@ class AzimuthalGradient(BiasEffect):
 
     id = "azimuthal_gradient"
     code = "B7"
+    place = "coil"
     title = "Shupe effect of a side-on gradient"
     amplitude = Quantity(
         "amplitude", "deg/h/(degC/min)", (0.01, 0.6), (4e-4, 0.03), "S_az", (-1e3, 1e3), signed=True

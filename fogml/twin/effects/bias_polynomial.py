@@ -23,6 +23,8 @@ class BiasPolynomial(BiasEffect):
 
     id = "bias_polynomial"
     code = "C1"
+    family = "static"
+    place = "coil"
     title = "Static bias of third to fifth order in temperature"
     amplitude = Quantity("amplitude", "deg/h", (0.25, 5.0), (5e-3, 0.1), "p_3", (-1e3, 1e3), signed=True)
     shape = (

@@ -25,6 +25,8 @@ class ChamberPickup(BiasEffect):
 
     id = "chamber_pickup"
     code = "F4"
+    family = "machines"
+    place = "chamber"
     title = "Pick-up of the chamber's machines"
     amplitude = Quantity("amplitude", "deg/h", (0.01, 0.5), (5e-4, 1e-2), "A", (-1e4, 1e4), signed=True)
     shape = (

@@ -24,6 +24,7 @@ class CoilExpansion(ScaleFactorEffect):
 
     id = "coil_expansion"
     code = "D2"
+    place = "coil"
     title = "Expansion of the coil"
     amplitude = Quantity("amplitude", "ppm/degC", (1.0, 30.0), (0.5, 5.0), "alpha_L + alpha_D", (-1e3, 1e3))
     needs = ("T",)

@@ -32,6 +32,7 @@ class Deadband(LoopEffect):
 
     id = "deadband"
     code = "D6"
+    place = "electronics"
     title = "Dead zone about zero rate"
     amplitude = Quantity("amplitude", "deg/h", (0.01, 1.0), (1e-3, 0.05), "w_d", (0.0, 1e3))
     amplitudes = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)

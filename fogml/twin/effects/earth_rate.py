@@ -27,6 +27,7 @@ class EarthRate(RigEffect):
 
     id = "earth_rate"
     code = "G1"
+    place = "mount"
     title = "Earth rate outside the reference"
     amplitude = Quantity(
         "amplitude",

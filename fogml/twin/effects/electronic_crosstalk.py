@@ -27,6 +27,7 @@ class ElectronicCrosstalk(BiasEffect):
 
     id = "electronic_crosstalk"
     code = "C4"
+    place = "electronics"
     title = "Electronic cross-talk"
     amplitude = Quantity(
         "amplitude", "deg/h/degC", (1e-3, 2e-2), (2e-5, 2e-4), "e_1", (-100.0, 100.0), signed=True

@@ -30,6 +30,8 @@ class GlassTransition(BiasEffect):
 
     id = "glass_transition"
     code = "B5"
+    family = "transition"
+    place = "coil"
     title = "Glass transition of coating or adhesive"
     amplitude = Quantity(
         "amplitude", "deg/h/(degC/min)", (0.1, 25.0), (5e-3, 1.5), "A", (-1e3, 1e3), signed=True

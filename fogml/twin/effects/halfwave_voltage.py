@@ -27,6 +27,8 @@ class HalfwaveVoltage(ScaleFactorEffect):
 
     id = "halfwave_voltage"
     code = "D3"
+    family = "modulator"
+    place = "optics"
     title = "Half-wave voltage of the modulator"
     amplitude = Quantity(
         "amplitude", "ppm/degC", (3.0, 30.0), (0.3, 3.0), "rho a_v", (-1e3, 1e3), signed=True

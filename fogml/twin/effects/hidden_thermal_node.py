@@ -23,6 +23,8 @@ class HiddenThermalNode(ThermalEffect):
 
     id = "hidden_thermal_node"
     code = "A5"
+    family = "hidden_node"
+    place = "chamber"
     title = "Hidden thermal node"
     amplitude = Quantity("amplitude", "deg/h/degC", (0.01, 0.5), (2e-4, 1e-2), "A", (-1e3, 1e3), signed=True)
     shape = (

@@ -30,6 +30,7 @@ class InputAxisMisalignment(RigEffect):
 
     id = "input_axis_misalignment"
     code = "G3"
+    place = "mount"
     title = "Misalignment of the input axis"
     amplitude = Quantity("amplitude", "mrad", (0.5, 20.0), (0.05, 0.5), "delta", (0.0, 1500.0))
     shape = (

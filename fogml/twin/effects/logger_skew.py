@@ -28,6 +28,8 @@ class LoggerSkew(LoggerEffect):
 
     id = "logger_skew"
     code = "G10"
+    family = "clock_skew"
+    place = "logger"
     title = "Skew of the logger's clock"
     amplitude = Quantity("amplitude", "s", (0.1, 60.0), (0.1, 60.0), "A", (-1e5, 1e5), signed=True)
     shape = (Quantity("growth", "1/h", (0.0, 0.5), (0.0, 0.5), "of the skew", (-10.0, 10.0), default=0.0),)

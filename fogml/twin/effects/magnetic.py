@@ -32,6 +32,7 @@ class Magnetic(BiasEffect):
 
     id = "magnetic"
     code = "C3"
+    place = "coil and shield"
     title = "Magnetic sensitivity"
     amplitude = Quantity(
         "amplitude", "deg/h/G", (0.05, 1.0), (1e-3, 2e-2), "s_r", (-100.0, 100.0), signed=True

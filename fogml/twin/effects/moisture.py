@@ -26,6 +26,7 @@ class Moisture(BiasEffect):
 
     id = "moisture"
     code = "B11"
+    place = "coil"
     title = "Moisture in the coil"
     amplitude = Quantity(
         "amplitude", "deg/h/(%/h)", (5e-3, 5e-2), (5e-4, 5e-3), "S_w", (-100.0, 100.0), signed=True

@@ -29,6 +29,7 @@ class MountTilt(RigEffect):
 
     id = "mount_tilt"
     code = "G2"
+    place = "mount"
     title = "Tilt of the mount over temperature"
     amplitude = Quantity("amplitude", "urad/degC", (0.2, 5.0), (0.2, 5.0), "beta_1", (-1e4, 1e4), signed=True)
     shape = (

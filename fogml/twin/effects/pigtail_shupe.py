@@ -26,6 +26,7 @@ class PigtailShupe(BiasEffect):
 
     id = "pigtail_shupe"
     code = "B6"
+    place = "leads"
     title = "Shupe effect of the leads"
     amplitude = Quantity("amplitude", "m", (0.1, 1.0), (0.005, 0.1), "l_1", (-100.0, 100.0), signed=True)
     shape = (Quantity("length_ratio", "1", (0.3, 3.0), (0.3, 3.0), "l_2 / l_1", (-100.0, 100.0)),)

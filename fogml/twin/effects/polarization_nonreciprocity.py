@@ -26,6 +26,8 @@ class PolarizationNonreciprocity(BiasEffect):
 
     id = "polarization_nonreciprocity"
     code = "C2"
+    family = "wave"
+    place = "optics"
     title = "Polarisation non-reciprocity"
     amplitude = Quantity("amplitude", "deg/h", (0.02, 0.5), (5e-4, 1e-2), "A", (-1e3, 1e3), signed=True)
     shape = (

@@ -26,6 +26,7 @@ class RateRamp(NoiseEffect):
 
     id = "rate_ramp"
     code = "E5"
+    place = "electronics"
     title = "Rate ramp"
     amplitude = Quantity("amplitude", "deg/h/h", (1e-3, 0.1), (1e-5, 1e-3), "R", (-1e6, 1e6), signed=True)
     sources = ("IEEE Std 952-1997",)

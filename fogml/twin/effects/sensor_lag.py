@@ -24,6 +24,8 @@ class SensorLag(SensorEffect):
 
     id = "sensor_lag"
     code = "G6"
+    family = "sensor_lag"
+    place = "sensor"
     title = "Lag of the temperature sensors"
     amplitude = Quantity("amplitude", "s", (5.0, 300.0), (5.0, 60.0), "tau_s", (0.0, 1e5))
     needs = ("slopes", "T", "T_in", "T_out")

@@ -27,6 +27,8 @@ class SensorPlacement(SensorEffect):
 
     id = "sensor_placement"
     code = "G9"
+    family = "sensor_placement"
+    place = "sensor"
     title = "Place of the temperature sensors"
     amplitude = Quantity("amplitude", "1", (0.02, 0.3), (0.02, 0.3), "share of the case", (-2.0, 2.0))
     needs = ("slopes", "T", "T_in", "T_out", "T_case")

@@ -36,6 +36,8 @@ class SensorQuantisation(SensorEffect):
 
     id = "sensor_quantisation"
     code = "G8"
+    family = "sensor_steps"
+    place = "sensor"
     digitises = True
     title = "Resolution of the temperature sensors"
     amplitude = Quantity("amplitude", "degC", (1e-3, 0.0625), (1e-3, 0.0625), "q", (0.0, 10.0))

@@ -23,6 +23,8 @@ class SfHysteresis(ScaleFactorEffect):
 
     id = "sf_hysteresis"
     code = "D8"
+    family = "scale_factor_loops"
+    place = "coil"
     title = "Thermal hysteresis of the scale factor"
     amplitude = Quantity(
         "amplitude", "ppm", (10.0, 400.0), (1.0, 20.0), "k times half_width", (-1e5, 1e5), signed=True

@@ -24,6 +24,8 @@ class ShupeMohr(BiasEffect):
 
     id = "shupe_mohr"
     code = "B3"
+    family = "rate"
+    place = "coil"
     title = "Elasto-optic Shupe effect (Mohr effect)"
     amplitude = Quantity(
         "amplitude", "deg/h/(degC/min)", (0.2, 5.0), (0.01, 0.3), "S_m0", (-1e3, 1e3), signed=True

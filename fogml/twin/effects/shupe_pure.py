@@ -25,6 +25,8 @@ class ShupePure(BiasEffect):
 
     id = "shupe_pure"
     code = "B1"
+    family = "gradient_rate"
+    place = "coil"
     title = "Shupe effect of a changing gradient"
     amplitude = Quantity(
         "amplitude", "deg/h/(degC/min)", (0.05, 2.0), (2e-3, 0.1), "S_g", (-1e3, 1e3), signed=True

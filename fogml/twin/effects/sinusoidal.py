@@ -25,6 +25,8 @@ class Sinusoidal(NoiseEffect):
 
     id = "sinusoidal"
     code = "E6"
+    family = "line"
+    place = "electronics"
     title = "Sinusoidal noise"
     amplitude = Quantity("amplitude", "deg/h", (0.01, 1.0), (1e-4, 2e-2), "Omega_0", (0.0, 1e6))
     shape = (Quantity("frequency", "Hz", (1e-3, 10.0), (1e-3, 10.0), "of the line", (1e-9, 1e6)),)

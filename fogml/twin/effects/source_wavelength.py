@@ -24,6 +24,8 @@ class SourceWavelength(ScaleFactorEffect):
 
     id = "source_wavelength"
     code = "D1"
+    family = "scale_factor_node"
+    place = "optics"
     title = "Wavelength of the source"
     amplitude = Quantity(
         "amplitude", "ppm/degC", (2.0, 400.0), (0.1, 10.0), "alpha_lambda", (-1e3, 1e3), signed=True

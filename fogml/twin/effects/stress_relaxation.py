@@ -29,6 +29,8 @@ class StressRelaxation(BiasEffect):
 
     id = "stress_relaxation"
     code = "B9"
+    family = "relaxation"
+    place = "coil"
     title = "Stress relaxation in the winding"
     amplitude = Quantity(
         "amplitude", "deg/h/degC", (1e-3, 1e-2), (1e-5, 5e-4), "r", (-100.0, 100.0), signed=True

@@ -26,6 +26,8 @@ class SupplyRipple(BiasEffect):
 
     id = "supply_ripple"
     code = "C8"
+    family = "supply"
+    place = "electronics"
     title = "Supply voltage and ripple"
     amplitude = Quantity("amplitude", "deg/h/V", (0.05, 1.0), (1e-3, 2e-2), "k_dc", (-1e3, 1e3), signed=True)
     shape = (

@@ -24,6 +24,7 @@ class TableRateError(RigEffect):
 
     id = "table_rate_error"
     code = "G5"
+    place = "table"
     title = "Error of the table's rate"
     amplitude = Quantity("amplitude", "ppm", (1.0, 100.0), (1.0, 100.0), "A", (0.0, 1e5))
     shape = (

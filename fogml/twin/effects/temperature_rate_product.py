@@ -23,6 +23,8 @@ class TemperatureRateProduct(BiasEffect):
 
     id = "temperature_rate_product"
     code = "B4"
+    family = "rate_product"
+    place = "coil"
     title = "Temperature times its rate"
     amplitude = Quantity(
         "amplitude", "deg/h/degC/(degC/min)", (2e-4, 0.1), (1e-5, 6e-3), "S_x", (-1e3, 1e3), signed=True

@@ -24,6 +24,8 @@ class ThermalHysteresis(BiasEffect):
 
     id = "thermal_hysteresis"
     code = "B8"
+    family = "loops"
+    place = "coil"
     title = "Thermal hysteresis of the bias"
     amplitude = Quantity(
         "amplitude", "deg/h", (0.025, 0.5), (0.001, 0.025), "k_h times half_width", (-1e3, 1e3), signed=True

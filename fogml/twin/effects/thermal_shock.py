@@ -32,6 +32,7 @@ class ThermalShock(BiasEffect):
 
     id = "thermal_shock"
     code = "B10"
+    place = "coil"
     title = "Slips under thermal shock"
     amplitude = Quantity(
         "amplitude", "deg/h/degC", (1e-3, 2e-2), (2e-5, 5e-4), "J", (-100.0, 100.0), signed=True

@@ -27,6 +27,8 @@ class TurnOnBias(BiasEffect):
 
     id = "turn_on_bias"
     code = "C9"
+    family = "power_cycles"
+    place = "electronics"
     title = "Turn-on bias"
     amplitude = Quantity(
         "amplitude", "deg/h", (0.05, 1.0), (5e-4, 5e-3), "sigma_on", (-1e3, 1e3), signed=True

@@ -25,6 +25,8 @@ class WarmupBias(BiasEffect):
 
     id = "warmup_bias"
     code = "C12"
+    family = "warm_up"
+    place = "electronics"
     title = "Warm-up of the bias"
     amplitude = Quantity("amplitude", "deg/h", (0.2, 5.0), (0.01, 0.2), "w_1", (-1e3, 1e3), signed=True)
     shape = (

@@ -1,0 +1,96 @@
+"""Whose family is which: the catalogue's effects by what they declare, the unknown, other plants."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from fogml.gap.families import other_families as other
+from fogml.gap.families import thermal_families as thermal
+from fogml.gap.families.family import Build, Family
+from fogml.gap.families.places import Scene
+from fogml.gap.families.unknown import unknown_families
+from fogml.runs.steps import recorded_step
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.twin import Twin
+
+FAMILIES: dict[str, Build] = {
+    "loops": thermal.hysteresis,
+    "scale_factor_loops": thermal.scale_factor_hysteresis,
+    "warm_up": thermal.warm_up,
+    "wave": thermal.polarization,
+    "transition": thermal.transition,
+    "hidden_node": thermal.hidden_node,
+    "relaxation": thermal.relaxation,
+    "rate_product": thermal.rate_product,
+    "rate": thermal.rate_of_temperature,
+    "gradient_rate": thermal.shupe,
+    "static": thermal.static,
+    "ageing": thermal.ageing,
+    "machines": other.machines,
+    "line": other.lines,
+    "supply": other.supply,
+    "power_cycles": other.power_cycles,
+    "sensor_lag": other.sensor_lag,
+    "sensor_placement": other.sensor_placement,
+    "sensor_steps": other.sensor_steps,
+    "clock_skew": other.clock_skew,
+    "scale_factor_node": other.scale_factor_node,
+    "modulator": other.modulator,
+}
+"""Families by the names that effects declare; an effect of family ``signature`` has its own signature's."""
+COARSE_STEP_DEGC = 0.0101
+"""Steps of a good sensor are no coarser: part of any recording."""
+
+
+def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[Family, ...]:
+    """Families of everything that may act on these runs.
+
+    Effects that the twin has are among them: their sizes may be wrong.
+    """
+    from fogml.twin.registry import effects
+
+    left_out = set(without)
+    known = [
+        _known(declared)
+        for id, declared in effects().items()
+        if declared.candidate and id not in left_out and _can_show(declared, scene)
+    ]
+    return (*known, *unknown_families(), Family("other_plant", "plant", other.other_plant))
+
+
+def _known(declared: Effect) -> Family:
+    build = FAMILIES.get(declared.family) or other.signature_of(declared)
+    return Family(
+        declared.id,
+        "known",
+        build,
+        drawn_per_run=declared.drawn_per_run or declared.family == "line",
+        twice=declared.family == "wave",
+        place=declared.place,
+    )
+
+
+def _can_show(declared: Effect, scene: Scene) -> bool:
+    """Whether the runs hold what tells an effect, if it says what that is."""
+    if isinstance(declared, NoiseEffect) and not declared.steady and declared.family == "signature":
+        return False
+    if declared.family == "sensor_steps":
+        return steps_are_coarse(scene)
+    if declared.family == "machines":
+        return True
+    runs = scene.runs[: scene.fitted]
+    return all(
+        any(
+            name in r.run.columns and float(abs(r.run.columns[name] - r.run.columns[name][0]).max()) > 0.0
+            for name in group
+            for r in runs
+        )
+        for group in declared.told_by
+    )
+
+
+def steps_are_coarse(scene: Scene) -> bool:
+    """Whether a sensor of the fit runs reads in coarser steps than a good one."""
+    runs = scene.runs[: scene.fitted]
+    steps = [recorded_step(r.run.columns[n]) for r in runs for n in r.run.temperature_columns]
+    return max(steps, default=0.0) > COARSE_STEP_DEGC

@@ -1,0 +1,245 @@
+"""All runs as whitened rows, and every family's blocks over them, at one noise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from fogml.gap.families.family import Family
+from fogml.gap.families.linear_gaussian import LinearGaussian
+from fogml.gap.families.places import Scene, rate
+from fogml.gap.families.priors import Priors
+from fogml.gap.families.rows import Rows, slopes, through_nominal
+from fogml.gap.model import Constant
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_model import NoiseModel
+from fogml.signals.whitening import Whitener
+
+LONGEST_RUNS = 30.0
+"""Flicker goes on to this many run lengths: what is slower sets runs apart by a constant."""
+IN_CONSTANTS = 1e-4
+"""A block that keeps less of its energy beside the constants lies in their span."""
+
+
+@dataclass(frozen=True)
+class Node:
+    """A block of a family over all runs: where its columns are, its shape and its weight's logarithm."""
+
+    family: int
+    start: int
+    stop: int
+    shape: Mapping[str, Any]
+    log_weight: float
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Blocks of all families on each run, not whitened.
+
+    ``by_run`` has shape (m_r, k) for each run of the scene, held-out ones too.
+    """
+
+    families: tuple[Family, ...]
+    nodes: tuple[Node, ...]
+    by_run: tuple[FloatArray, ...]
+
+    @classmethod
+    def of(cls, families: Sequence[Family], scene: Scene, constants: Mapping[str, float]) -> Columns:
+        """Every family's blocks."""
+        nodes: list[Node] = []
+        parts: list[list[FloatArray]] = [[] for _ in scene.runs]
+        at = 0
+        for f, family in enumerate(families):
+            by_run = [list(family.build(rows, scene, constants)) for rows in scene.runs]
+            # Blocks whose weights add to less are the part of a grid that stands out.
+            total = max(sum(b.weight for b in by_run[0]), 1.0)
+            for blocks in zip(*by_run):
+                width = blocks[0].columns.shape[1]
+                wide = width * (scene.fitted if family.drawn_per_run else 1)
+                for r, (block, held) in enumerate(zip(blocks, parts)):
+                    if not family.drawn_per_run:
+                        held.append(block.columns)
+                        continue
+                    spread = np.zeros((len(block.columns), wide))
+                    if r < scene.fitted:
+                        spread[:, r * width : (r + 1) * width] = block.columns
+                    held.append(spread)
+                weight = float(np.log(max(blocks[0].weight, 1e-300) / total))
+                nodes.append(Node(f, at, at + wide, blocks[0].shape, weight))
+                at += wide
+        return cls(tuple(families), tuple(nodes), tuple(np.concatenate(held, axis=1) for held in parts))
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What all noises share: the scene, the fixed block of constants and nuisances, and the columns.
+
+    Attributes
+    ----------
+    fixed
+        Responses to one prior standard deviation, shape (m_r, p) for each run; constants first.
+    widened
+        Factors on the standard deviations of constants that are far off, by name.
+    values
+        The constants as fitted beside nothing.
+    """
+
+    scene: Scene
+    constants: tuple[Constant, ...]
+    priors: Priors
+    fixed: tuple[FloatArray, ...]
+    values: Mapping[str, float]
+    widened: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def deviations(self) -> FloatArray:
+        """Prior standard deviations of the constants, widened ones so, shape (c,)."""
+        return np.array([c.sd * self.widened.get(c.name, 1.0) for c in self.constants])
+
+    @property
+    def spans(self) -> tuple[slice, ...]:
+        """Rows of each fit run in what is stacked."""
+        edges = np.cumsum([0, *(len(r) for r in self.scene.runs[: self.scene.fitted])])
+        return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
+
+
+class Whitening:
+    """Whitens series over the rows of the fit runs by one noise; readings' noise adds to it."""
+
+    def __init__(self, noise: NoiseModel, setting: Setting) -> None:
+        self.noise = noise
+        self._whiteners, self._weights = [], []
+        for rows in setting.scene.runs[: setting.scene.fitted]:
+            span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
+            held = Whitener(noise, rows.end_s, rows.row_s, noise.ladder(rows.row_s, LONGEST_RUNS * span))
+            reading = reading_deviation(rows, setting.values)
+            extra = 1.0 / rows.weight**2 - 1.0
+            self._whiteners.append(held)
+            white = noise.white_density / rows.row_s
+            added = (reading**2 + extra * white) / held.deviation**2
+            self._weights.append(1.0 / np.sqrt(1.0 + added))
+
+    def stacked(self, series: Sequence[FloatArray]) -> FloatArray:
+        """Series of each fit run, shape (m_r, ...), whitened and one after the other."""
+        parts = []
+        for values, whitener, weight in zip(series, self._whiteners, self._weights):
+            white = whitener.whiten(np.ascontiguousarray(values))
+            parts.append(white * (weight if white.ndim == 1 else weight[:, None]))
+        return np.concatenate(parts)
+
+    @cached_property
+    def log_det(self) -> float:
+        """Half the logarithm of the determinant of the rows' covariance."""
+        return float(
+            sum(w.log_det - np.sum(np.log(weight)) for w, weight in zip(self._whiteners, self._weights))
+        )
+
+
+def reading_deviation(rows: Rows, constants: Mapping[str, float]) -> FloatArray:
+    """What errors of the smoothed readings make of the replay, a standard deviation [deg/h], shape (m,)."""
+    variance = np.zeros(len(rows.kept))
+    for name, slope in slopes(rows, constants).items():
+        noise = rows.reading_noise.get(name, rows.reading_noise.get("T_in", 0.0) if name == "T" else 0.0)
+        variance = variance + (slope * noise) ** 2
+    return np.asarray(np.sqrt(rows.of(variance)))
+
+
+def fixed_columns(
+    rows: Rows,
+    constants: Sequence[Constant],
+    widened: Mapping[str, float],
+    values: Mapping[str, float],
+    coarse: bool,
+    priors: Priors,
+) -> FloatArray:
+    """One standard deviation of each constant, and of what sensors of ordinary quality miss, shape (m, p).
+
+    Each sensor is late by a little, and its readings may be what acted, rather than the smooth course.
+    Where they come in coarse steps, the constants meet them as they were read, as a replay does.
+    """
+    sd = np.array([c.sd * widened.get(c.name, 1.0) for c in constants])
+    told, time = slopes(rows, values), rows.even.time
+    columns = [rows.constants * sd]
+    hidden = {n: v - rows.even.temperatures[n] for n, v in rows.readings.items()}
+    if coarse:
+        columns[0] = columns[0] + _through_each(rows, constants, hidden) * sd
+    for names in (("T", "T_in"), ("T_out",)):
+        own = [n for n in names if n in rows.readings]
+        late = {n: priors.missed_lag / 60.0 * rate(time, rows.even.temperatures[n]) for n in own}
+        columns.append(through_nominal(rows, told, late)[:, None])
+        errors = {n: hidden[n] for n in own}
+        columns.append(through_nominal(rows, told, {} if coarse else errors)[:, None])
+    return np.concatenate(columns, axis=1)
+
+
+def _through_each(rows: Rows, constants: Sequence[Constant], errors: Mapping[str, FloatArray]) -> FloatArray:
+    """What readings differ by from the smooth course in the response to each constant, shape (m, c)."""
+    zeros = {c.name: 0.0 for c in constants}
+    return np.column_stack(
+        [
+            through_nominal(rows, slopes(rows, zeros | {c.name: 1.0}), errors)
+            if c.name not in ("e0", "b0")
+            else np.zeros(len(rows))
+            for c in constants
+        ]
+    )
+
+
+class Field:
+    """Whitened data, fixed block and columns at one noise, each block scaled to a whitened length of 1."""
+
+    def __init__(
+        self, setting: Setting, columns: Columns, noise: NoiseModel, only: Sequence[int] | None = None
+    ):
+        self.setting, self.columns = setting, columns
+        self.whitening = Whitening(noise, setting)
+        fitted = setting.scene.fitted
+        data = self.whitening.stacked([r.gap for r in setting.scene.runs[:fitted]])
+        self.fixed = self.whitening.stacked(setting.fixed[:fitted])
+        self.base = LinearGaussian.of(data).beside(self.fixed)
+        picked = range(len(columns.nodes)) if only is None else only
+        places = np.concatenate(
+            [np.arange(columns.nodes[i].start, columns.nodes[i].stop) for i in picked] or [np.arange(0)]
+        )
+        raw = [values[:, places] if only is not None else values for values in columns.by_run[:fitted]]
+        white = self.whitening.stacked(raw)
+        across = self.base.basis.T @ white
+        kept = np.sum(white**2, axis=0) - np.sum(across**2, axis=0)
+        whole = np.sum(white**2, axis=0)
+        self.scale: dict[int, float] = {}
+        self.at: dict[int, slice] = {}
+        self.in_constants: set[int] = set()
+        at = 0
+        for i in picked:
+            node = columns.nodes[i]
+            part = slice(at, at + node.stop - node.start)
+            at = part.stop
+            length2 = float(kept[part].sum())
+            if not length2 > max(IN_CONSTANTS * float(whole[part].sum()), 1e-18):
+                self.in_constants.add(i)
+                white[:, part] = 0.0
+                continue
+            self.scale[i] = 1.0 / np.sqrt(length2)
+            white[:, part] *= self.scale[i]
+            self.at[i] = part
+        self.white = white
+
+    def block(self, node: int) -> FloatArray:
+        """Whitened columns of a node of whitened length 1, shape (n, k)."""
+        return self.white[:, self.at[node]]
+
+    def design(self, nodes: Sequence[tuple[int, float]]) -> FloatArray:
+        """Fixed block and nodes with their sizes, shape (n, q)."""
+        return np.concatenate([self.fixed, *(size * self.block(i) for i, size in nodes)], axis=1)
+
+    def beside(self, nodes: Sequence[tuple[int, float]]) -> LinearGaussian:
+        """The data beside the fixed block and nodes with their sizes."""
+        held = self.base
+        for i, size in nodes:
+            held = held.beside(self.block(i), size)
+        return held

@@ -1,0 +1,117 @@
+"""A linear model with normal priors and unit noise: evidence, conditioning, posterior, prediction.
+
+With whitened data y and blocks of columns F_i whose coefficients are normal with variance s_i^2 ::
+
+    y = sum_i F_i c_i + e,    log p(y) = -1/2 (y'y - |Q'y|^2) - sum log diag L
+
+Q spans, scaled, what the blocks can do: inner products beside all of them are A'B - (A'Q)(Q'B)
+(C. E. Rasmussen and C. K. I. Williams, Gaussian Processes for Machine Learning, 2006, ch. 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
+
+from fogml.runs.run import FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class LinearGaussian:
+    """Data beside blocks of columns that are integrated out.
+
+    Attributes
+    ----------
+    data
+        Whitened, shape (n,).
+    basis
+        Q, shape (n, q).
+    half_log_det
+        Sum of the logarithms of the diagonals of L.
+    """
+
+    data: FloatArray
+    basis: FloatArray
+    half_log_det: float = 0.0
+
+    @classmethod
+    def of(cls, data: FloatArray) -> LinearGaussian:
+        """Data with nothing beside."""
+        return cls(data, np.empty((len(data), 0)))
+
+    def beside(self, columns: FloatArray, size: float = 1.0) -> LinearGaussian:
+        """With a block of columns of prior standard deviation `size` more, shape (n, k)."""
+        left = size * (columns - self.basis @ (self.basis.T @ columns))
+        gram = size * (columns.T @ left)
+        factor = np.linalg.cholesky(np.eye(gram.shape[0]) + 0.5 * (gram + gram.T))
+        more = solve_triangular(factor, left.T, lower=True).T
+        log_det = self.half_log_det + float(np.log(np.diagonal(factor)).sum())
+        return LinearGaussian(self.data, np.concatenate([self.basis, more], axis=1), log_det)
+
+    @property
+    def log_evidence(self) -> float:
+        """Logarithm of the density of the data, less that of unit noise at zero."""
+        along = self.basis.T @ self.data
+        return float(-0.5 * (self.data @ self.data - along @ along)) - self.half_log_det
+
+    def fits(self, columns: FloatArray) -> FloatArray:
+        """Inner products of columns with the data beside all blocks, shape (k,)."""
+        return np.asarray(columns.T @ self.data - (columns.T @ self.basis) @ (self.basis.T @ self.data))
+
+    def gram(self, columns: FloatArray) -> FloatArray:
+        """Inner products of columns beside all blocks, shape (k, k)."""
+        across = self.basis.T @ columns
+        return np.asarray(columns.T @ columns - across.T @ across)
+
+
+def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
+    """Gain in log evidence of a block at each size: gram (..., k, k), fits (..., k), to (..., sizes)."""
+    if gram.shape[-1] == 1:
+        values, along = np.maximum(gram[..., 0], 0.0), fits**2
+    else:
+        values, vectors = np.linalg.eigh(gram)
+        values = np.maximum(values, 0.0)
+        along = np.einsum("...ki,...k->...i", vectors, fits) ** 2
+    wide = sizes[:, None] ** 2
+    scaled = 1.0 + wide * values[..., None, :]
+    return np.asarray(0.5 * np.sum(wide * along[..., None, :] / scaled - np.log(scaled), axis=-1))
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Coefficients of a design of unit priors, given the data: mean (q,), covariance (q, q)."""
+
+    mean: FloatArray
+    covariance: FloatArray
+
+    @classmethod
+    def of(cls, design: FloatArray, data: FloatArray) -> Posterior:
+        """Of a whitened design, prior standard deviations multiplied in, shape (n, q)."""
+        factor = cho_factor(np.eye(design.shape[1]) + design.T @ design, lower=True)
+        covariance = cho_solve(factor, np.eye(design.shape[1]))
+        return cls(covariance @ (design.T @ data), covariance)
+
+
+def log_evidence(gram: FloatArray, fits: FloatArray, square: float) -> float:
+    """Log evidence from a design's inner products (q, q), with the data (q,), and the data's square."""
+    factor = np.linalg.cholesky(np.eye(len(gram)) + gram)
+    along = solve_triangular(factor, fits, lower=True)
+    return float(-0.5 * (square - along @ along) - np.log(np.diagonal(factor)).sum())
+
+
+def left_out_log_density(design: FloatArray, data: FloatArray, parts: Sequence[slice]) -> float:
+    """Sum over parts of the log density of each given all others, noise of unit variance.
+
+    By p(y_r | the rest) = p(y) / p(the rest), constants of 2 pi left out.
+    """
+    grams = [design[p].T @ design[p] for p in parts]
+    fits = [design[p].T @ data[p] for p in parts]
+    squares = [float(data[p] @ data[p]) for p in parts]
+    total = log_evidence(sum(grams), sum(fits), sum(squares))  # type: ignore[arg-type]
+    return sum(
+        total - log_evidence(sum(grams) - g, sum(fits) - f, sum(squares) - s)
+        for g, f, s in zip(grams, fits, squares)
+    )

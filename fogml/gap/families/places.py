@@ -1,0 +1,141 @@
+"""Where causes sit: the temperatures that may drive them, from the sensors that there are."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from fogml.gap.families.rows import Rows
+from fogml.runs.run import FloatArray
+from fogml.signals.recursions import lag_kernel
+
+MIXES = (0.5, 0.0, 1.0, -0.5)
+"""Shares of the outer face in a place's temperature: within, inner, outer, and beyond the inner one."""
+LAGS_S = (0.0, 600.0, 1800.0)
+"""Lags of a place behind that [s]."""
+SAME_DEGC = 0.3
+"""Places that stay this near to one before drive alike."""
+
+
+class Place(NamedTuple):
+    """A temperature on the even rows [degC], how likely it is the one, and where it is."""
+
+    temperature: FloatArray
+    weight: float
+    name: str
+
+
+def lag(time: FloatArray, x: FloatArray, time_constant_s: float) -> FloatArray:
+    """First-order lag from rest, shape (n,)."""
+    if time_constant_s <= 0.0:
+        return x
+    return np.asarray(lag_kernel(time, x, np.array([time_constant_s]), np.nan, np.nan, np.nan)[0])
+
+
+def rate(time: FloatArray, x: FloatArray) -> FloatArray:
+    """Rate of a smooth course per minute, shape (n,)."""
+    return np.asarray(60.0 * np.gradient(x, time)) if len(x) > 1 else np.zeros(len(x))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All runs of a diagnosis together: what grids and places have to be the same for.
+
+    Attributes
+    ----------
+    runs
+        Fit runs, then held-out ones.
+    fitted
+        How many are fit runs.
+    grade
+        Whose ranges hold.
+    lines_hz
+        Frequencies that stand out of the fit runs.
+    """
+
+    runs: tuple[Rows, ...]
+    fitted: int
+    grade: str
+    lines_hz: tuple[float, ...] = ()
+
+    @cached_property
+    def range_degc(self) -> tuple[float, float]:
+        """Least and greatest T of the fit runs."""
+        held = [r.temperature for r in self.runs[: self.fitted]]
+        return min(float(t.min()) for t in held), max(float(t.max()) for t in held)
+
+    @property
+    def span_degc(self) -> float:
+        """Width of that range, 1 at least."""
+        low, high = self.range_degc
+        return max(high - low, 1.0)
+
+    @cached_property
+    def span_s(self) -> float:
+        """The longest fit run [s]."""
+        return max(float(r.run.span_s) for r in self.runs[: self.fitted])
+
+    @cached_property
+    def row_s(self) -> float:
+        """The longest row [s]."""
+        return max(r.row_s for r in self.runs[: self.fitted])
+
+    @cached_property
+    def begun_s(self) -> tuple[float, ...]:
+        """When each run's clock began, after the first run's [s]; one after the other where unknown."""
+        started = [r.run.facts.started for r in self.runs]
+        if all(s is not None for s in started):
+            first = min(s.timestamp() for s in started)  # type: ignore[union-attr]
+            return tuple(s.timestamp() - first for s in started)  # type: ignore[union-attr]
+        edges = np.cumsum([0.0, *(float(r.run.span_s) + r.row_s for r in self.runs)])
+        return tuple(float(e) - float(r.run.time[0]) for e, r in zip(edges, self.runs))
+
+    @cached_property
+    def order_known(self) -> bool:
+        """Whether the runs say when they began, so that what one leaves behind meets the next."""
+        return len(self.runs) > 1 and all(r.run.facts.started is not None for r in self.runs)
+
+    def before(self, rows: Rows) -> tuple[Rows, ...]:
+        """Runs that came before one, in order; none where that is not known."""
+        if not self.order_known:
+            return ()
+        own = self.begun_s[self.runs.index(rows)]
+        earlier = [(b, i) for i, b in enumerate(self.begun_s) if b < own]
+        return tuple(self.runs[i] for _, i in sorted(earlier))
+
+    def coil(self, rows: Rows, mixes: Sequence[float] = (0.5, 0.0, 1.0)) -> list[Place]:
+        """Places in the winding."""
+        return self._bank(rows, mixes, (0.0,))
+
+    def optics(self, rows: Rows, mixes: Sequence[float] = MIXES) -> list[Place]:
+        """Places of optics and electronics: the recorded one first, then lags behind the coil's faces."""
+        recorded = rows.even.temperatures.get("T_electronics") if "T_electronics" in rows.readings else None
+        bank = self._bank(rows, mixes, LAGS_S)
+        if recorded is None:
+            # As the model's own plant has it, self-heating included.
+            return [Place(rows.even.temperature("T_electronics"), 1.0, "electronics"), *bank]
+        return [Place(recorded, float(len(bank)), "recorded electronics"), *bank]
+
+    def _bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
+        inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
+        mixed = [m for m, same in zip(mixes, self._same(mixes)) if not same]
+        time = rows.even.time
+        names = {0.5: "middle of the coil", 0.0: "inner face", 1.0: "outer face", -0.5: "hub"}
+        return [
+            Place(
+                lag(time, (1.0 - m) * inner + m * outer, s), 1.0, names[m] + (f", {s:g} s late" if s else "")
+            )
+            for m in mixed
+            for s in lags_s
+        ]
+
+    def _same(self, mixes: Sequence[float]) -> list[bool]:
+        """Which mixes drive as the first one does, on all runs."""
+        apart = max(
+            float(np.abs(r.even.temperature("T_out") - r.even.temperature("T_in")).max()) for r in self.runs
+        )
+        return [i > 0 and abs(m - mixes[0]) * apart < SAME_DEGC for i, m in enumerate(mixes)]

@@ -1,0 +1,89 @@
+"""What the diagnosis takes for granted, in one place: every number has its reason, and reports print it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from fogml.runs.run import FloatArray
+
+
+@dataclass(frozen=True)
+class Priors:
+    """Priors, grids and prices of a diagnosis.
+
+    Attributes
+    ----------
+    expected_causes
+        Of the catalogue that act beside the model, on average: a gap that somebody diagnoses mostly has one.
+    unknown
+        Probability that a cause acts that no catalogue holds: about one gap in four.
+    other_plant
+        Probability that heat flows otherwise than the model's plant says, beyond what constants take up.
+    least_size, greatest_size, sizes
+        Whitened length of what a cause does: log-uniform, in so many values. Under 3 none can be told from
+        noise; from 60 on a prior makes no difference, whatever the size is.
+    plant_size
+        Greatest whitened length of another plant: unbounded it would do what Shupe's effect does.
+    beyond_range
+        A size this many times the card's range is one standard deviation less likely, in its logarithm.
+    most_causes
+        Of one explanation: more than four have not been told apart by any run.
+    beam
+        Explanations that each round of the search goes on from.
+    hopeless
+        Explanations this far behind the best are not gone on from [nats].
+    exchange
+        Members of a class cost less than this to be exchanged [nats]: one in twenty.
+    carried
+        What a name has to add to the prediction of each run from the others, all together [nats].
+    doubt
+        Odds of a name are divided by this for what no family describes: a monotone map, the same for all.
+    slow_noise
+        Factors on flicker and random walk that are integrated over, about what fits.
+    missed_lag
+        Lag of an ordinary sensor on the coil, a standard deviation [s].
+    most_rows
+        Rows of a run: enough for 30 s in ten hours; no thermal effect is faster.
+    least_detectable
+        Whitened length under which an effect counts as undetectable.
+    """
+
+    expected_causes: float = 1.0
+    unknown: float = 0.25
+    other_plant: float = 0.1
+    least_size: float = 3.0
+    greatest_size: float = 60.0
+    sizes: int = 6
+    plant_size: float = 8.0
+    beyond_range: float = 3.0
+    most_causes: int = 4
+    beam: int = 6
+    hopeless: float = 12.0
+    exchange: float = 3.0
+    carried: float = 2.0
+    doubt: float = 4.0
+    slow_noise: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0)
+    missed_lag: float = 0.7
+    most_rows: int = 1200
+    least_detectable: float = 3.0
+
+    @property
+    def lengths(self) -> FloatArray:
+        """The values of a cause's size, shape (sizes,)."""
+        return np.geomspace(self.least_size, self.greatest_size, self.sizes)
+
+    @property
+    def plant_lengths(self) -> FloatArray:
+        """The values of another plant's size, shape (2,)."""
+        return np.array([self.least_size, self.plant_size])
+
+    def log_odds(self, probability: float) -> float:
+        """Of a cause that acts with a probability."""
+        return math.log(probability / (1.0 - probability))
+
+    def described(self) -> tuple[str, ...]:
+        """Each number in a line, for reports."""
+        return tuple(f"{f.name.replace('_', ' ')}: {getattr(self, f.name)}" for f in fields(self))

@@ -1,0 +1,67 @@
+"""Readings of slow quantities without their noise and steps: splines whose roughness cross-validation picks.
+
+A reading is a smooth course and white noise. The smooth course minimises
+``sum (reading - smooth)^2 + penalty sum (third difference)^2`` (E. T. Whittaker, Proc. Edinburgh Math. Soc.
+41 (1923) 63), the penalty the generalised cross-validation (P. Craven and G. Wahba, Numer. Math. 31 (1979)
+377).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import solveh_banded
+
+from fogml.runs.run import FloatArray
+
+PENALTIES = np.geomspace(1e-3, 1e8, 23)
+_ORDER = 3
+_THIRD = np.array([-1.0, 3.0, -3.0, 1.0])
+
+
+def smoothed(values: FloatArray) -> tuple[FloatArray, float]:
+    """Evenly spaced readings smoothed, shape (n,), and the standard deviation of what noise leaves in it."""
+    n = len(values)
+    if n < 16 or float(np.ptp(values)) == 0.0:
+        return values, 0.0
+    bands = _bands(n)
+    waves = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** _ORDER
+    offset = float(values[0])
+    best: tuple[float, FloatArray, float] | None = None
+    for penalty in PENALTIES:
+        system = penalty * bands
+        system[-1] += 1.0
+        smooth = solveh_banded(system, values - offset, check_finite=False) + offset
+        free = float(np.sum(1.0 / (1.0 + penalty * waves)))
+        square = float(np.sum((values - smooth) ** 2))
+        score = n * square / (n - free) ** 2
+        if best is None or score < best[0]:
+            best = score, smooth, square / max(n - free, 1.0) * free / n
+    assert best is not None
+    return best[1], float(np.sqrt(best[2]))
+
+
+def _bands(n: int) -> FloatArray:
+    """Upper bands of D'D for third differences, as `scipy.linalg.solveh_banded` takes them."""
+    bands = np.zeros((_ORDER + 1, n))
+    for i in range(_ORDER + 1):
+        for j in range(i, _ORDER + 1):
+            bands[_ORDER - (j - i), j : n - _ORDER + j] += _THIRD[i] * _THIRD[j]
+    return bands
+
+
+def window_difference(time: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
+    """Mean over the last window less the mean over the one before, as integrals over time; shape (n,).
+
+    Values are linear between samples, and what they first were before.
+    """
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))])
+
+    def integral(at: FloatArray) -> FloatArray:
+        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
+        step = at - time[i]
+        slope = (values[i + 1] - values[i]) / (time[i + 1] - time[i])
+        inside = total[i] + step * (values[i] + 0.5 * slope * step)
+        return np.where(at < time[0], (at - time[0]) * values[0], inside)
+
+    here, before = integral(time), integral(time - window_s)
+    return np.asarray((here - 2.0 * before + integral(time - 2.0 * window_s)) / window_s)

@@ -1,0 +1,284 @@
+"""Sets of causes by their evidence: one noise first, in a beam; the best sets then at every noise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import logsumexp
+
+from fogml.gap.families.family import Family
+from fogml.gap.families.frame import Field
+from fogml.gap.families.linear_gaussian import LinearGaussian, log_evidence, size_gains
+from fogml.runs.run import FloatArray
+
+REFINED = 12
+"""Sets of each number of causes whose members are chosen again beside each other."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """A cause of an explanation: its family, the node and size that stand for it."""
+
+    family: int
+    node: int
+    size: float
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """A set of causes.
+
+    Attributes
+    ----------
+    members
+        The causes.
+    log_prior
+        Of the set.
+    log_evidence
+        At one noise, members' nodes and sizes averaged over beside each other.
+    spread
+        What averaging adds to the evidence at the nodes and sizes that stand for the members.
+    by_noise
+        Log evidence, with the noise's prior, at each noise.
+    """
+
+    members: tuple[Member, ...]
+    log_prior: float
+    log_evidence: float
+    spread: float = 0.0
+    by_noise: tuple[float, ...] = ()
+
+    @property
+    def key(self) -> tuple[int, ...]:
+        """Families, in order."""
+        return tuple(sorted(m.family for m in self.members))
+
+    @property
+    def score(self) -> float:
+        """Logarithm of the posterior, up to a constant."""
+        evidence = float(logsumexp(self.by_noise)) if self.by_noise else self.log_evidence
+        return self.log_prior + evidence
+
+    @property
+    def nodes(self) -> list[tuple[int, float]]:
+        """Nodes with their sizes."""
+        return [(m.node, m.size) for m in self.members]
+
+
+@dataclass(frozen=True, eq=False)
+class _Blocks:
+    """A family's nodes at one noise: their prior by size, and their inner products beside the constants.
+
+    ``groups`` hold blocks of one width: rows among the nodes, places of columns, inner products.
+    """
+
+    nodes: list[int]
+    prior: FloatArray
+    lengths: FloatArray
+    span: slice
+    groups: list[tuple[FloatArray, FloatArray, FloatArray]]
+
+
+class Search:
+    """Finds explanations.
+
+    Parameters
+    ----------
+    held
+        Data and columns at the noise that fits best.
+    """
+
+    def __init__(self, held: Field) -> None:
+        self.field = held
+        self.priors = held.setting.priors
+        self.families = held.columns.families
+        self.log_odds = self._log_odds()
+        self._known = held.base.basis.shape[1]
+        self._across = held.base.basis.T @ held.white
+        self._fits = held.white.T @ held.base.data - self._across.T @ (held.base.basis.T @ held.base.data)
+        self.blocks = {f: self._blocks(f) for f in range(len(self.families))}
+        self.blocks = {f: b for f, b in self.blocks.items() if b.nodes}
+
+    def explanations(self) -> list[Explanation]:
+        """The sets worth keeping, the likeliest first."""
+        nothing = Explanation((), 0.0, self.field.base.log_evidence)
+        found: dict[tuple[int, ...], Explanation] = {(): nothing}
+        level, best = [nothing], nothing.score
+        for count in range(1, self.priors.most_causes + 1):
+            grown: dict[tuple[int, ...], Explanation] = {}
+            for explanation in level:
+                for other in self._with_one_more(explanation):
+                    if other.key not in grown or other.score > grown[other.key].score:
+                        grown[other.key] = other
+            ranked = sorted(grown.values(), key=lambda e: -e.score)
+            if count > 1:
+                near = [e for e in ranked[:REFINED] if e.score > best - self.priors.hopeless]
+                ranked = [*map(self._refined, near), *ranked[len(near) :]]
+                ranked.sort(key=lambda e: -e.score)
+            found |= {e.key: e for e in ranked}
+            best = max(best, max((e.score for e in ranked), default=-math.inf))
+            beam = self.priors.beam if count < 3 else max(self.priors.beam // 2, 1)
+            level = [e for e in ranked[:beam] if count == 1 or e.score > best - self.priors.hopeless]
+            if not level:
+                break
+        kept = [e for e in found.values() if e.score > best - 2.0 * self.priors.hopeless or not e.members]
+        return sorted(kept, key=lambda e: -e.score)
+
+    def alone(self) -> Mapping[int, float]:
+        """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
+        across, fits = self._beside(self.field.base)
+        return {f: float(logsumexp(self._gains(f, across, fits) + b.prior)) for f, b in self.blocks.items()}
+
+    def exchanged(self, explanation: Explanation, member: Member) -> dict[int, Explanation]:
+        """The set with one of its members in turn exchanged for each other family that may be named."""
+        explanation = replace(explanation, by_noise=())
+        rest = self._without(explanation, member)
+        held = self.field.beside(rest.nodes)
+        across, fits = self._beside(held)
+        found = {}
+        for f in self.blocks:
+            if self.families[f].kind != "known" or f in rest.key:
+                continue
+            grown = self._grown(rest, held, f, across, fits)
+            if grown.score > explanation.score - 2.0 * self.priors.exchange - self.priors.hopeless:
+                found[f] = self._refined(grown)
+        return found
+
+    def _without(self, explanation: Explanation, member: Member) -> Explanation:
+        return replace(
+            explanation,
+            members=tuple(m for m in explanation.members if m is not member),
+            log_prior=explanation.log_prior - float(self.log_odds[member.family]),
+            spread=0.0,
+        )
+
+    def _with_one_more(self, explanation: Explanation) -> list[Explanation]:
+        held = self.field.beside(explanation.nodes)
+        across, fits = self._beside(held)
+        present = explanation.key
+        return [
+            self._grown(explanation, held, f, across, fits)
+            for f in self.blocks
+            if f not in present or (self.families[f].twice and present.count(f) < 2)
+        ]
+
+    def _grown(
+        self, rest: Explanation, held: LinearGaussian, f: int, across: FloatArray, fits: FloatArray
+    ) -> Explanation:
+        gains = self._gains(f, across, fits)
+        member, averaged, spread = self._averaged(f, gains)
+        return Explanation(
+            (*rest.members, member),
+            rest.log_prior + float(self.log_odds[f]),
+            held.log_evidence + averaged + rest.spread,
+            rest.spread + spread,
+        )
+
+    def _averaged(self, f: int, gains: FloatArray) -> tuple[Member, float, float]:
+        """The node and size that stand for a family, its gain averaged over all, and how much that adds."""
+        table = gains + self.blocks[f].prior
+        row, column = np.unravel_index(int(np.argmax(table)), table.shape)
+        averaged = float(logsumexp(table))
+        member = Member(f, self.blocks[f].nodes[row], float(self.blocks[f].lengths[column]))
+        return member, averaged, averaged - float(gains[row, column])
+
+    def _refined(self, explanation: Explanation) -> Explanation:
+        """Each member's node and size chosen again beside the others, and averaged over there."""
+        members = list(explanation.members)
+        spreads = [0.0] * len(members)
+        total = explanation.log_evidence
+        for i, member in enumerate(members):
+            held = self.field.beside([(m.node, m.size) for j, m in enumerate(members) if j != i])
+            across, fits = self._beside(held, self.blocks[member.family].span)
+            gains = self._gains(member.family, across, fits, self.blocks[member.family].span.start)
+            members[i], averaged, spreads[i] = self._averaged(member.family, gains)
+            total = held.log_evidence + averaged - spreads[i]
+        return replace(
+            explanation, members=tuple(members), log_evidence=total + sum(spreads), spread=sum(spreads)
+        )
+
+    def _beside(self, held: LinearGaussian, span: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
+        """Of columns: inner products with what is held beyond the constants, and with the data beside it."""
+        more = held.basis[:, self._known :]
+        across = more.T @ self.field.white[:, span]
+        return across, self._fits[span] - across.T @ (more.T @ held.data)
+
+    def _gains(self, f: int, across: FloatArray, fits: FloatArray, first: int = 0) -> FloatArray:
+        """Gain of each node of a family at each size, shape (nodes, sizes); columns begin at `first`."""
+        blocks = self.blocks[f]
+        out = np.empty((len(blocks.nodes), len(blocks.lengths)))
+        for rows, places, grams in blocks.groups:
+            at = places - first
+            beside = across.T[at]
+            gram = grams - beside @ beside.transpose(0, 2, 1)
+            out[rows] = size_gains(gram, fits[at], blocks.lengths)
+        return out
+
+    def _blocks(self, f: int) -> _Blocks:
+        held, family = self.field, self.families[f]
+        nodes = [i for i, n in enumerate(held.columns.nodes) if n.family == f and i in held.at]
+        lengths = self.priors.plant_lengths if family.kind == "plant" else self.priors.lengths
+        weights = np.array([held.columns.nodes[n].log_weight for n in nodes])
+        prior = weights[:, None] - math.log(len(lengths)) + self._range_penalties(family, nodes, lengths)
+        widths: dict[int, list[int]] = {}
+        for row, n in enumerate(nodes):
+            widths.setdefault(held.at[n].stop - held.at[n].start, []).append(row)
+        groups = []
+        for rows in widths.values():
+            places = np.array([np.arange(held.at[nodes[r]].start, held.at[nodes[r]].stop) for r in rows])
+            grams = np.array([held.block(nodes[r]).T @ held.block(nodes[r]) for r in rows])
+            beside = self._across.T[places]
+            groups.append((np.array(rows), places, grams - beside @ beside.transpose(0, 2, 1)))
+        spans = [held.at[n] for n in nodes]
+        span = slice(min(s.start for s in spans), max(s.stop for s in spans)) if spans else slice(0, 0)
+        return _Blocks(nodes, prior, lengths, span, groups)
+
+    def _log_odds(self) -> FloatArray:
+        count = {kind: sum(f.kind == kind for f in self.families) for kind in ("known", "unknown", "plant")}
+        mass = {
+            "known": self.priors.expected_causes,
+            "unknown": self.priors.unknown,
+            "plant": self.priors.other_plant,
+        }
+        return np.array([self.priors.log_odds(min(mass[f.kind] / count[f.kind], 0.5)) for f in self.families])
+
+    def _range_penalties(self, family: Family, nodes: Sequence[int], lengths: FloatArray) -> FloatArray:
+        """Logarithm of how likely each node's sizes are by the card's range, shape (nodes, sizes)."""
+        if family.kind != "known":
+            return np.zeros((len(nodes), len(lengths)))
+        from fogml.twin.registry import effect
+
+        _, high = effect(family.id).amplitude.range(self.field.setting.scene.grade)  # type: ignore[arg-type]
+        scales = np.array([self.field.scale[n] for n in nodes])
+        over = np.log(np.maximum(scales[:, None] * lengths / high, 1.0))
+        return np.asarray(-0.5 * (over / math.log(self.priors.beyond_range)) ** 2)
+
+
+def over_noises(
+    explanations: Sequence[Explanation], fields: Sequence[Field], log_priors: Sequence[float]
+) -> list[Explanation]:
+    """Explanations with their evidence at each noise, the likeliest first."""
+    by_noise: list[list[float]] = [[] for _ in explanations]
+    for held, log_prior in zip(fields, log_priors):
+        data, first = held.base.data, held.fixed.shape[1]
+        square = float(data @ data)
+        every = np.concatenate([held.fixed, held.white], axis=1)
+        gram, fits = every.T @ every, every.T @ data
+        for e, row in zip(explanations, by_noise):
+            places = [np.arange(first)] + [
+                np.arange(first + held.at[n].start, first + held.at[n].stop)
+                for n, _ in e.nodes
+                if n in held.at
+            ]
+            size = np.concatenate(
+                [np.ones(first), *(np.full(held.block(n).shape[1], s) for n, s in e.nodes if n in held.at)]
+            )
+            at = np.concatenate(places)
+            scaled = gram[np.ix_(at, at)] * np.outer(size, size)
+            value = log_evidence(scaled, fits[at] * size, square)
+            row.append(value + e.spread + log_prior - held.whitening.log_det)
+    told = [replace(e, by_noise=tuple(row)) for e, row in zip(explanations, by_noise)]
+    return sorted(told, key=lambda e: -e.score)
