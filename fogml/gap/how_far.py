@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
 
@@ -29,6 +30,20 @@ ten should.
 _Z90 = 1.6448536269514722
 
 
+class InRows(Protocol):
+    """A run as rows of equal averaging time."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def row_s(self) -> float:
+        """Averaging time of a row [s]."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Mean time of each row [s], shape (m,)."""
+
+
 @dataclass(frozen=True, eq=False)
 class Averages:
     """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps."""
@@ -45,7 +60,7 @@ class Averages:
     full: np.ndarray
 
 
-def averages(o: Observation, averaging_s: float = AVERAGING_S) -> Averages:
+def averages(o: InRows, averaging_s: float = AVERAGING_S) -> Averages:
     """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
     width = max(1, round(averaging_s / o.row_s))
     breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1

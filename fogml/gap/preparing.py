@@ -50,12 +50,12 @@ def prepare(
     tell: Progress = lambda what: None,
 ) -> Prepared:
     """Runs made ready, noise fitted, constants recalibrated."""
-    _check_runs(fit, held_out, noise)
+    check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     part = not held_out
     if part:
-        fit, held_out = _keep_back(fit)
+        fit, held_out = keep_back(fit)
     tell("reading inputs")
     fit_rows, unusable = _observed(fit, model)
     held_rows, more = _observed(held_out, model)
@@ -115,7 +115,7 @@ def with_noise_beside(
     return replace(p, noise=noise, whiteners=whiteners, recalibrated=recalibrated)
 
 
-def _check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
+def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
     if not fit:
         raise InputError("no run to diagnose is given")
     held: dict[str, tuple[str, str]] = {}
@@ -138,7 +138,8 @@ def _check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) 
             raise InputError(f"the runs are of different {what}s ({listed}); diagnose one {what} at a time")
 
 
-def _keep_back(fit: Sequence[Run]) -> tuple[Sequence[Run], Sequence[Run]]:
+def keep_back(fit: Sequence[Run]) -> tuple[Sequence[Run], Sequence[Run]]:
+    """Fit runs less the last stretch of the last one, and that."""
     last = fit[-1]
     cut = int(len(last) * (1.0 - KEPT_BACK))
     return [*fit[:-1], last[:cut]], [last[cut:]]

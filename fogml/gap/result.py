@@ -66,6 +66,12 @@ class Found:
         The amplitude from each run that can show it.
     consistent
         Whether those agree in sign and size.
+    share
+        Of the structural gap's energy above the floor, between 0 and 1.
+    place
+        Where it sits: the place to look.
+    times_usual
+        The amplitude over the top of its card's range.
     """
 
     effect: str
@@ -76,6 +82,9 @@ class Found:
     parameters: Mapping[str, Estimate] = field(default_factory=dict)
     by_run: tuple[RunAmplitude, ...] = ()
     consistent: bool = True
+    share: float | None = None
+    place: str = ""
+    times_usual: float | None = None
     support: Support = field(default_factory=Support)
     unrealised: float = 0.0
     left_out: tuple[str, ...] = ()
@@ -117,6 +126,32 @@ class HowFar:
     closed_ci90: tuple[float, float] | None
     note: str = ""
     unit: str = "deg/h"
+
+
+@dataclass(frozen=True)
+class WhatIf:
+    """What a held-out run keeps with one more candidate beside those named [deg/h rms of averages].
+
+    ``share`` is of the fit runs' structural gap.
+    """
+
+    effect: str
+    beside: tuple[str, ...]
+    run: str
+    after: float
+    closed: float | None
+    closed_ci90: tuple[float, float] | None
+    share: float
+
+
+@dataclass(frozen=True)
+class Nearest:
+    """A known family, how much of the gap's energy it holds alone, and how probable it is."""
+
+    family: str
+    effect: str
+    share: float
+    probability: float
 
 
 @dataclass(frozen=True)
@@ -250,6 +285,12 @@ class Diagnosis:
         What was assumed, in words.
     model
         Name of the model.
+    what_if
+        For every candidate what the held-out runs keep with it.
+    nearest
+        The known families that come nearest to the gap, each alone.
+    headline
+        Sentences that say the result.
     """
 
     fit: tuple[str, ...]
@@ -272,6 +313,9 @@ class Diagnosis:
     assumed: tuple[str, ...] = ()
     model: str = "nominal"
     suspected: tuple[Found, ...] = ()
+    what_if: tuple[WhatIf, ...] = ()
+    nearest: tuple[Nearest, ...] = ()
+    headline: tuple[str, ...] = ()
 
     @property
     def named(self) -> tuple[Found, ...]:

@@ -42,6 +42,9 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "noise": _plain(asdict(diagnosis.noise)),
         "evidence": [_plain(asdict(item)) for item in diagnosis.evidence],
+        "what_if": [_plain(asdict(item)) for item in diagnosis.what_if],
+        "nearest": [_plain(asdict(item)) for item in diagnosis.nearest],
+        "headline": list(diagnosis.headline),
         "assumed": list(diagnosis.assumed),
     }
 
@@ -57,6 +60,9 @@ def _found(found: Found) -> dict[str, Any]:
         "stage": found.stage,
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
+        "share": found.share,
+        "place": found.place,
+        "times_usual": found.times_usual,
         **asdict(found.support),
         "unrealised": found.unrealised,
     }

@@ -9,21 +9,38 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from fogml.gap.how_far import Averages, averages
+from fogml.gap.how_far import Averages, InRows, averages
 from fogml.gap.noise import Noise
-from fogml.gap.observation import Observation
 from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.runs.regimes import Regimes
-from fogml.runs.run import FloatArray
+from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_expectation import expected_mean_square
 
 SHORTEST_SEGMENT_S = 600.0
 BIN_DEGC = 10.0
 _Z90 = 1.6448536269514722
 _Z_SIGNIFICANT = 2.6
+
+
+class RunInRows(InRows, Protocol):
+    """A run as rows, with what tells them apart."""
+
+    @property
+    def run(self) -> Run:
+        """As recorded."""
+
+    @property
+    def temperature(self) -> FloatArray:
+        """T of each row [degC], shape (m,)."""
+
+    @property
+    def regime(self) -> NDArray[np.int8]:
+        """Regime of each row."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +59,7 @@ class GapOnRun:
         Mean square of what the fitted constants take up of the noise [(deg/h)^2].
     """
 
-    observation: Observation
+    observation: RunInRows
     gap: FloatArray
     systematic: FloatArray
     taken: float = 0.0

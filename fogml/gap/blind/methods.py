@@ -15,8 +15,11 @@ Method = Callable[[CaseFiles, Path], Any]
 """Reads a case's runs and writes ``gap.json`` into a folder."""
 
 _PACKAGE = "fogml.gap.blind"
+FAMILIES = "families"
+"""The diagnosis on families."""
 METHODS = {
     DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
+    FAMILIES: f"{_PACKAGE}.methods:families",
     "bic": f"{_PACKAGE}.baselines.forward:bic",
     "bic-unwhitened": f"{_PACKAGE}.baselines.forward:bic_unwhitened",
     "bic-fixed-nominal": f"{_PACKAGE}.baselines.forward:bic_fixed_nominal",
@@ -28,7 +31,7 @@ METHODS = {
 """Name of each method to ``module:function``; all of them run sealed."""
 ORACLE = "oracle"
 """The baseline that is given the truth, and so can't run sealed."""
-BASELINES = (*(name for name in METHODS if name != DIAGNOSIS), ORACLE)
+BASELINES = (*(name for name in METHODS if name not in (DIAGNOSIS, FAMILIES)), ORACLE)
 
 
 def load_method(text: str) -> Method:
@@ -68,6 +71,27 @@ def diagnosis(case: CaseFiles, out: Path) -> Any:
         noise=read_run(case.noise) if case.noise else None,
         seed=case.seed,
         plan=False,
+    )
+    write_json(out / "gap.json", found.as_dict(), indent=None)
+    found.write_model(model, out / "twin.yaml")
+    return found
+
+
+def families(case: CaseFiles, out: Path) -> Any:
+    """The diagnosis on families; as `diagnosis`."""
+    from fogml.gap.families.answer import diagnose
+    from fogml.gap.twin_model import TwinModel
+    from fogml.runs.reading import read_run
+    from fogml.twin.twin_file import load_twin
+
+    model = TwinModel(load_twin("nominal"), case.without)
+    found = diagnose(
+        model,
+        [read_run(path) for path in case.fit],
+        [read_run(path) for path in case.held_out],
+        noise=read_run(case.noise) if case.noise else None,
+        without=case.without,
+        seed=case.seed,
     )
     write_json(out / "gap.json", found.as_dict(), indent=None)
     found.write_model(model, out / "twin.yaml")

@@ -95,6 +95,11 @@ class Rows:
         """Middle of each row [s], shape (m,)."""
         return self.end_s - 0.5 * self.row_s
 
+    @property
+    def time(self) -> FloatArray:
+        """As `time_s`."""
+        return self.time_s
+
     @cached_property
     def regime(self) -> NDArray[np.int8]:
         """Regime of each row; see `fogml.runs.regimes`."""

@@ -132,6 +132,11 @@ class Search:
         across, fits = self._beside(self.field.base)
         return {f: float(logsumexp(self._gains(f, across, fits) + b.prior)) for f, b in self.blocks.items()}
 
+    def best_members(self, held: LinearGaussian) -> dict[int, Member]:
+        """The node and size that stand for each family beside what is held."""
+        across, fits = self._beside(held)
+        return {f: self._averaged(f, self._gains(f, across, fits))[0] for f in self.blocks}
+
     def exchanged(self, explanation: Explanation, member: Member) -> dict[int, Explanation]:
         """The set with one of its members in turn exchanged for each other family that may be named."""
         explanation = replace(explanation, by_noise=())

@@ -1,0 +1,166 @@
+"""A cause in its card's terms: the amplitude in its unit, and the shape, that come nearest to it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.gap.families.frame import Field, Setting
+from fogml.gap.families.linear_gaussian import LinearGaussian
+from fogml.gap.families.other_families import signature_of
+from fogml.gap.model import EffectValue
+from fogml.gap.shapes import AT_AMPLITUDE, Node, grid, is_angle
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import Effect
+from fogml.twin.registry import effect
+
+FORM_ERROR = 0.04
+"""What an amplitude may differ by because no form is known exactly, of its size."""
+MOST_NODES = 400
+
+
+@dataclass(frozen=True)
+class Card:
+    """An effect's amplitude and shape with standard errors, and what its form gains [nats]."""
+
+    value: EffectValue
+    amplitude_se: float
+    shape_se: Mapping[str, float]
+    held: float
+
+
+def card_of(
+    id: str, setting: Setting, field: Field, beside: LinearGaussian, lines: Mapping[str, float]
+) -> Card:
+    """The catalogue's form of an effect that fits best beside everything else.
+
+    Parameters
+    ----------
+    id
+        Of the effect.
+    setting, field
+        Runs, and what is whitened.
+    beside
+        The data beside constants and all other causes.
+    lines
+        Shape that the cause's family tells, such as a period.
+    """
+    declared = effect(id)
+    scene = setting.scene
+    shape = declared.default_shape(scene.grade) | {  # type: ignore[arg-type]
+        q.name: float(lines[q.name]) for q in declared.shape if isinstance(lines.get(q.name), float)
+    }
+    if declared.drawn_per_run or declared.family == "line" or declared.family == "power_cycles":
+        return _drawn(declared, shape, setting, field, beside)
+    nodes = _nodes(declared, setting)
+    runs = scene.runs[: scene.fitted]
+    build = signature_of(declared)
+    blocks = [list(build(rows, scene, setting.values)) for rows in runs]
+    count = min(len(blocks[0]), MOST_NODES)
+    best: tuple[float, int, FloatArray, FloatArray] | None = None
+    gains, values = [], []
+    stacked = field.whitening.stacked(
+        [np.concatenate([b.columns for b in held[:count]], axis=1) for held in blocks]
+    )
+    at = 0
+    for i in range(count):
+        width = blocks[0][i].columns.shape[1]
+        columns = stacked[:, at : at + width]
+        at += width
+        gram, fits = beside.gram(columns), beside.fits(columns)
+        scale = np.sqrt(np.maximum(np.diagonal(gram), 1e-300))
+        inverse = np.linalg.pinv(gram / np.outer(scale, scale), rcond=1e-6, hermitian=True) / np.outer(
+            scale, scale
+        )
+        coefficients = inverse @ fits
+        gain = 0.5 * float(fits @ coefficients) - width
+        gains.append(gain)
+        node = nodes[i % len(nodes)]
+        values.append(_value(declared, node, node.mix @ coefficients))
+        if best is None or gain > best[0]:
+            best = gain, i, coefficients, inverse
+    assert best is not None
+    _, i, coefficients, inverse = best
+    node = nodes[i % len(nodes)]
+    value = values[i]
+    amplitude, told = value
+    spread = node.mix @ inverse @ node.mix.T
+    se = math.sqrt(max(float(np.ones(len(spread)) @ spread @ np.ones(len(spread))), 0.0))
+    weights = np.exp(np.clip(np.array(gains) - max(gains), -50.0, 0.0))
+    weights /= weights.sum()
+    sizes = np.array([a for a, _ in values])
+    se = math.sqrt(se**2 + float(weights @ (sizes - amplitude) ** 2) + (FORM_ERROR * amplitude) ** 2)
+    shape_se = {
+        name: math.sqrt(float(weights @ np.array([(v.get(name, x) - x) ** 2 for _, v in values])))
+        for name, x in told.items()
+    }
+    shape |= {k: v for k, v in told.items() if k != AT_AMPLITUDE}
+    if not declared.amplitude.signed and amplitude < 0.0:
+        amplitude = abs(amplitude)
+    amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
+    return Card(EffectValue(id, amplitude, shape), se, shape_se, max(best[0], 0.0))
+
+
+def _nodes(declared: Effect, setting: Setting) -> Sequence[Node]:
+    scene = setting.scene
+    spans = {"s": scene.span_s, "degC": scene.span_degc, "sample": scene.row_s}
+
+    def on_first(shape: Mapping[str, float]) -> FloatArray:
+        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+        return scene.runs[0].response(declared, bare, None, setting.values)
+
+    return grid(declared, scene.grade, on_first, spans)
+
+
+def _value(declared: Effect, node: Node, weights: FloatArray) -> tuple[float, dict[str, float]]:
+    """Amplitude and shape of a node's draws with weights."""
+    turns = node.turns
+    angles = [q for q in declared.shape if is_angle(q)]
+    told = {k: float(v) for k, v in node.shape.items()}
+    if angles and turns == 2:
+        table = weights.reshape(-1, 2).sum(axis=0)
+        amplitude = float(np.hypot(*table))
+        told[angles[0].name] = float(np.degrees(np.arctan2(table[1], table[0])) % 360.0)
+        return amplitude, told
+    if turns > 1:
+        return float(np.abs(weights).max()), told
+    amplitude = float(weights.sum())
+    for k in range(1, len(node.draws)):
+        for q in declared.shape:
+            step = float(node.draws[k].get(q.name, 0.0)) - float(node.draws[0].get(q.name, 0.0))
+            if step and amplitude:
+                moved = float(node.draws[0][q.name]) + step * float(weights[k]) / amplitude
+                low, high = q.range("tactical")
+                told[q.name] = float(np.clip(moved, low - (high - low), high + (high - low)))
+    return amplitude, told
+
+
+def _drawn(
+    declared: Effect, shape: Mapping[str, float], setting: Setting, field: Field, beside: LinearGaussian
+) -> Card:
+    """The spread over runs of an effect that each draws anew: a standard deviation, or a line's amplitude."""
+    scene = setting.scene
+    runs = scene.runs[: scene.fitted]
+    parts: list[list[FloatArray]] = []
+    for r, rows in enumerate(runs):
+        if declared.family == "line":
+            phase = 2.0 * np.pi * shape["frequency"] * rows.time_s
+            own = np.column_stack([np.sin(phase), np.cos(phase)])
+        else:
+            own = rows.response(declared, shape, None, setting.values)[:, None]
+        wide = np.zeros((len(rows), own.shape[1] * len(runs)))
+        wide[:, r * own.shape[1] : (r + 1) * own.shape[1]] = own
+        parts.append([wide])
+    columns = field.whitening.stacked([np.concatenate(p, axis=1) for p in parts])
+    gram, fits = beside.gram(columns), beside.fits(columns)
+    inverse = np.linalg.pinv(gram, rcond=1e-6, hermitian=True)
+    found = inverse @ fits
+    each = found.reshape(len(runs), -1)
+    size = float(np.sqrt(np.mean(np.sum(each**2, axis=1))))
+    noise = float(np.sqrt(np.trace(inverse)) / len(runs))
+    se = math.hypot(noise, size / math.sqrt(2.0 * max(len(runs) - 1, 1)))
+    amplitude = float(np.clip(size, *declared.amplitude.limits))
+    return Card(EffectValue(declared.id, amplitude, dict(shape)), se, {}, 0.0)

@@ -1,0 +1,155 @@
+"""How far the gap closes on held-out runs with causes as their families foretell them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.gap.families.inference import Inference
+from fogml.gap.families.linear_gaussian import Posterior
+from fogml.gap.families.search import Member
+from fogml.gap.how_far import averages
+from fogml.gap.result import HowFar
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
+
+AVERAGING_S = 100.0
+DRAWS, NOISES = 40, 200
+LEAST_GAP = 0.2
+"""A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
+_Z90 = 1.6448536269514722
+
+
+@dataclass(frozen=True, eq=False)
+class Foretold:
+    """Constants and causes fitted together, and what they make of every run.
+
+    Attributes
+    ----------
+    found
+        The inference.
+    members
+        Causes that are fitted.
+    posterior
+        Of coefficients: fixed block first, then each member's.
+    counted
+        Which of them take part in what is foretold, shape (q,).
+    """
+
+    found: Inference
+    members: tuple[Member, ...]
+    posterior: Posterior
+    counted: FloatArray
+
+    @classmethod
+    def of(cls, found: Inference, members: Sequence[Member], counted: Sequence[Member]) -> Foretold:
+        """Members fitted, and those among them that count."""
+        held = found.field
+        posterior = Posterior.of(held.design([(m.node, m.size) for m in members]), held.base.data)
+        kept = [np.ones(held.fixed.shape[1])]
+        kept += [np.full(held.block(m.node).shape[1], float(m in counted)) for m in members]
+        return cls(found, tuple(members), posterior, np.concatenate(kept))
+
+    def design(self, run: int) -> FloatArray:
+        """Responses of the coefficients on a run of the scene, shape (m, q) [deg/h]."""
+        held = self.found.field
+        parts = [self.found.setting.fixed[run]]
+        for m in self.members:
+            node = self.found.columns.nodes[m.node]
+            parts.append(
+                m.size * held.scale[m.node] * self.found.columns.by_run[run][:, node.start : node.stop]
+            )
+        return np.concatenate(parts, axis=1) * self.counted
+
+    def on(self, run: int) -> FloatArray:
+        """What is foretold [deg/h], shape (m,)."""
+        return np.asarray(self.design(run) @ self.posterior.mean)
+
+    def of_member(self, run: int, member: Member) -> FloatArray:
+        """What one cause makes on a run [deg/h], shape (m,)."""
+        at = self.found.field.fixed.shape[1]
+        for m in self.members:
+            width = self.found.field.block(m.node).shape[1]
+            if m is member:
+                return np.asarray(self.design(run)[:, at : at + width] @ self.posterior.mean[at : at + width])
+            at += width
+        raise ValueError("not a member")
+
+    def draws(self, run: int, rng: np.random.Generator) -> FloatArray:
+        """What coefficients drawn from the posterior foretell, shape (m, draws)."""
+        values, vectors = np.linalg.eigh(self.posterior.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        drawn = self.posterior.mean[:, None] + root @ rng.standard_normal((len(values), DRAWS))
+        return np.asarray(self.design(run) @ drawn)
+
+
+class HeldOut:
+    """One held-out run: what is common to all that is asked of it.
+
+    Parameters
+    ----------
+    found
+        The inference.
+    run
+        Number of the run in the scene.
+    recalibrated
+        Constants alone.
+    seed
+        Of the draws behind intervals.
+    """
+
+    def __init__(self, found: Inference, run: int, recalibrated: Foretold, seed: int) -> None:
+        self.run, self.rows = run, found.setting.scene.runs[run]
+        self._rng = np.random.default_rng([seed, run])
+        self._windows = windows = averages(self.rows)
+        model = found.field.whitening.noise
+        self._before = _square(windows.of(self.rows.gap))
+        self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
+        self._floor = float(floor_square(model, windows.time, windows.window_s))
+        models = found.points.fit.draw(self._rng, DRAWS)
+        self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
+        alone = expected_mean_square(model, windows.time, windows.window_s)
+        noises = mean_square_draws(model, windows.time, windows.window_s, NOISES, self._rng)
+        self._noises = noises / noises.mean() * alone
+        self._at_floor = self._recalibrated - alone <= _Z90 * float(np.std(self._noises))
+
+    def how_far(self, after: Foretold) -> HowFar:
+        """Before, recalibrated, after and floor, and what is closed.
+
+        With nothing but constants, `after` is `recalibrated`. The interval holds errors of coefficients and
+        an uncertain floor.
+        """
+        windows, rec, floor = self._windows, self._recalibrated, self._floor
+        aft = _square(windows.of(self.rows.gap - after.on(self.run)))
+        closed, interval = None, None
+        note = "the recalibrated twin is at the floor within its noise: what is closed can't be told"
+        if not self._at_floor:
+            note = "" if aft <= rec else "the run is foretold worse with what was found than without"
+            gap = rec - floor
+            closed = (rec - aft) / gap
+            moved = np.zeros(DRAWS)
+            if after.members:
+                left = self.rows.gap[:, None] - after.draws(self.run, self._rng)
+                moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
+            room = np.maximum(aft - self._rng.choice(self._noises, (DRAWS, DRAWS)), 0.0)
+            closing = rec - aft + np.minimum(moved[:, None], room)
+            drawn = closing / np.maximum(rec - self._floors[None, :], LEAST_GAP * gap)
+            low, high = np.quantile(drawn, (0.05, 0.95))
+            interval = min(float(low), closed), max(float(high), closed)
+        return HowFar(
+            run=self.rows.run.name,
+            averaging_s=windows.window_s,
+            before=self._before**0.5,
+            recalibrated=rec**0.5,
+            after=aft**0.5,
+            floor=floor**0.5,
+            closed=closed,
+            closed_ci90=interval,
+            note=note,
+        )
+
+
+def _square(values: FloatArray) -> float:
+    return float(np.mean(values**2))

@@ -1,0 +1,182 @@
+"""What a diagnosis reports beside its verdict: candidates, constants, noise, series, assumptions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from fogml.gap.families.inference import FAR_OFF, Inference
+from fogml.gap.families.search import Member
+from fogml.gap.how_far import averages
+from fogml.gap.result import CandidateEvidence, ConstantFit, NoiseReport, RunSeries
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_expectation import floor_square
+from fogml.twin.effect import NoiseEffect
+from fogml.twin.registry import effect, effects
+
+if TYPE_CHECKING:
+    from fogml.gap.families.closing import Foretold
+    from fogml.gap.families.posterior import Judgement
+
+POSSIBLE = 0.05
+"""A candidate is possible from this probability on."""
+UNKNOWN_STAGE = "bias"
+"""Stage that an unknown cause is booked on where its family says nothing of it."""
+
+
+def candidate_evidence(
+    found: Inference, judged: Judgement, named: Sequence[str]
+) -> tuple[CandidateEvidence, ...]:
+    """Each candidate alone, what the runs can show of it, and what became of it."""
+    gains, families = found.search.alone(), found.columns.families
+    index = {f.id: i for i, f in enumerate(families) if f.kind == "known"}
+    rows = []
+    for id, declared in effects().items():
+        if not declared.candidate:
+            continue
+        i = index.get(id)
+        if i is None or i not in gains:
+            # A random error has no mean response; others lie in the span of the constants.
+            rows.append(CandidateEvidence(id, declared.title, declared.stage, 0.0, 0.0, 0.0, "in_constants"))
+            continue
+        usual = usual_length(found, id)
+        held = float(sum(w for e, w in zip(judged.explanations, judged.weights) if i in e.key))
+        status: Literal["named", "possible", "no_sign", "undetectable", "in_constants"]
+        if id in named:
+            status = "named"
+        elif usual < found.setting.priors.least_detectable:
+            status = "undetectable"
+        else:
+            status = "possible" if held >= POSSIBLE else "no_sign"
+        rows.append(CandidateEvidence(id, declared.title, declared.stage, gains[i], held, usual, status))
+    return tuple(sorted(rows, key=lambda r: -r.gain))
+
+
+def usual_length(found: Inference, id: str) -> float:
+    """Whitened length beside the constants of an effect of the usual size and shape in its card."""
+    declared, setting = effect(id), found.setting
+    if isinstance(declared, NoiseEffect) and not declared.steady:
+        return float(setting.priors.least_detectable)
+    grade = setting.scene.grade
+    amplitude = declared.amplitude.typical(grade)  # type: ignore[arg-type]
+    shape = declared.default_shape(grade)  # type: ignore[arg-type]
+    runs = setting.scene.runs[: setting.scene.fitted]
+    parts = [amplitude * r.response(declared, shape, None, setting.values) for r in runs]
+    white = found.field.whitening.stacked(parts)
+    across = found.field.base.basis.T @ white
+    return float(np.sqrt(max(float(white @ white - across @ across), 0.0)))
+
+
+def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[str, float]:
+    """Energy of what acts by stage: that of each cause's card, the unknown's own guess."""
+    total: dict[str, float] = {}
+    for member, energy in energies.items():
+        family = found.columns.families[member.family]
+        stage: str = UNKNOWN_STAGE
+        if family.kind == "known":
+            stage = effect(family.id).stage
+        elif family.kind == "plant" or family.id == "table":
+            stage = "thermal" if family.kind == "plant" else "rig"
+        total[stage] = total.get(stage, 0.0) + energy
+    return total
+
+
+def constants_of(found: Inference, after: Foretold) -> tuple[ConstantFit, ...]:
+    """The constants, before and after."""
+    deviations = found.setting.deviations
+    errors = np.sqrt(np.maximum(np.diagonal(after.posterior.covariance), 0.0))
+    return tuple(
+        ConstantFit(
+            c.name,
+            c.unit,
+            c.mean,
+            c.sd,
+            float(c.mean + sd * after.posterior.mean[i]),
+            float(sd * errors[i]),
+        )
+        for i, (c, sd) in enumerate(zip(found.setting.constants, deviations))
+    )
+
+
+def noise_of(found: Inference) -> NoiseReport:
+    """The noise that the diagnosis judged by."""
+    model, errors = found.field.whitening.noise, found.points.fit.standard_errors
+    return NoiseReport(
+        {"N": model.N, "B": model.B, "K": model.K},
+        dict(zip("NBK", map(float, errors))),
+        found.points.source,
+    )
+
+
+def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tuple[RunSeries, ...]:
+    """Averages of every run for drawing."""
+    scene, model = found.setting.scene, found.field.whitening.noise
+    out = []
+    for i, rows in enumerate(scene.runs):
+        windows = averages(rows)
+        temperature = windows.of(rows.temperature)
+        speed = (
+            60.0 * np.gradient(temperature, windows.time)
+            if len(temperature) > 1
+            else np.zeros(len(temperature))
+        )
+        gaps = {
+            "before": rows.gap,
+            "recalibrated": rows.gap - recalibrated.on(i),
+            "after": rows.gap - after.on(i),
+        }
+        gap: dict[str, FloatArray] = {name: windows.of(values) for name, values in gaps.items()}
+        recorded = windows.of(rows.recorded)
+        out.append(
+            RunSeries(
+                run=rows.run.name,
+                role="fit" if i < scene.fitted else "held_out",
+                averaging_s=windows.window_s,
+                time_s=windows.time,
+                temperature_degc=temperature,
+                rate_degc_min=speed,
+                regime=rows.regime[windows.starts[windows.full]],
+                recorded=recorded,
+                replayed_before=recorded - gap["before"],
+                replayed_recalibrated=recorded - gap["recalibrated"],
+                replayed_after=recorded - gap["after"],
+                gap_before=gap["before"],
+                gap_recalibrated=gap["recalibrated"],
+                gap_after=gap["after"],
+                floor=float(floor_square(model, windows.time, windows.window_s)) ** 0.5,
+                gyro=rows.run.facts.unit,
+                axis=rows.run.facts.axis,
+                note=rows.run.facts.notes or "",
+            )
+        )
+    return tuple(out)
+
+
+def assumed(found: Inference) -> tuple[str, ...]:
+    """What was taken for granted, in sentences, the priors among them."""
+    setting, said = found.setting, []
+    for name, factor in setting.widened.items():
+        constant = next(c for c in setting.constants if c.name == name)
+        off = abs(setting.values[name] - constant.mean) / constant.sd
+        if off > FAR_OFF:
+            said.append(
+                f"{name} = {setting.values[name]:.4g} {constant.unit} is {off:.3g} standard deviations off "
+                f"what was expected ({constant.mean:g} ± {constant.sd:g}): a unit, a sign or the twin may be "
+                f"wrong. Its prior was widened {factor:.3g} times for the rest."
+            )
+    for rows in setting.scene.runs:
+        if rows.masked:
+            listed = ", ".join(f"{count} {why}" for why, count in rows.masked.items())
+            said.append(f"{rows.run.name}: samples left out: {listed}.")
+    if any("T_electronics" not in r.readings for r in setting.scene.runs):
+        said.append(
+            "The temperature of the electronics is not recorded: what follows it is looked for at several "
+            "places. A column T_electronics would tell."
+        )
+    widths = sorted({f"{r.row_s:g}" for r in setting.scene.runs})
+    said.append(f"Runs were brought to means over {', '.join(widths)} s; faster effects can't be seen.")
+    said.append(f"Noise: {found.points.source}; white noise is what the runs themselves show.")
+    said.append("Priors: " + "; ".join(setting.priors.described()) + ".")
+    return tuple(said)
