@@ -7,9 +7,8 @@ from collections.abc import Iterable
 from fogml.gap.families import other_families as other
 from fogml.gap.families import thermal_families as thermal
 from fogml.gap.families.family import Build, Family
-from fogml.gap.families.places import Scene
+from fogml.gap.families.places import Scene, steps_are_coarse
 from fogml.gap.families.unknown import unknown_families
-from fogml.runs.steps import recorded_step
 from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.twin import Twin
 
@@ -38,8 +37,6 @@ FAMILIES: dict[str, Build] = {
     "modulator": other.modulator,
 }
 """Families by the names that effects declare; an effect of family ``signature`` has its own signature's."""
-COARSE_STEP_DEGC = 0.0101
-"""Steps of a good sensor are no coarser: part of any recording."""
 
 
 def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[Family, ...]:
@@ -53,7 +50,7 @@ def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[
     known = [
         _known(declared)
         for id, declared in effects().items()
-        if declared.candidate and id not in left_out and _can_show(declared, scene)
+        if declared.candidate and id not in left_out and _can_show(declared, scene, twin)
     ]
     return (*known, *unknown_families(), Family("other_plant", "plant", other.other_plant))
 
@@ -70,12 +67,12 @@ def _known(declared: Effect) -> Family:
     )
 
 
-def _can_show(declared: Effect, scene: Scene) -> bool:
+def _can_show(declared: Effect, scene: Scene, twin: Twin) -> bool:
     """Whether the runs hold what tells an effect, if it says what that is."""
     if isinstance(declared, NoiseEffect) and not declared.steady and declared.family == "signature":
         return False
     if declared.family == "sensor_steps":
-        return steps_are_coarse(scene)
+        return steps_are_coarse(scene, twin)
     if declared.family == "machines":
         return True
     runs = scene.runs[: scene.fitted]
@@ -87,10 +84,3 @@ def _can_show(declared: Effect, scene: Scene) -> bool:
         )
         for group in declared.told_by
     )
-
-
-def steps_are_coarse(scene: Scene) -> bool:
-    """Whether a sensor of the fit runs reads in coarser steps than a good one."""
-    runs = scene.runs[: scene.fitted]
-    steps = [recorded_step(r.run.columns[n]) for r in runs for n in r.run.temperature_columns]
-    return max(steps, default=0.0) > COARSE_STEP_DEGC

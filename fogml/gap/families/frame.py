@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -12,13 +13,14 @@ import numpy as np
 
 from fogml.gap.families.family import Family
 from fogml.gap.families.linear_gaussian import LinearGaussian
-from fogml.gap.families.places import Scene, rate
+from fogml.gap.families.places import Scene, rate, steps_are_coarse
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows, slopes, through_nominal
 from fogml.gap.model import Constant
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
+from fogml.twin.twin import Twin
 
 LONGEST_RUNS = 30.0
 """Flicker goes on to this many run lengths: what is slower sets runs apart by a constant."""
@@ -151,29 +153,42 @@ def reading_deviation(rows: Rows, constants: Mapping[str, float]) -> FloatArray:
 
 def fixed_columns(
     rows: Rows,
+    run: int,
+    scene: Scene,
+    twin: Twin,
     constants: Sequence[Constant],
     widened: Mapping[str, float],
     values: Mapping[str, float],
-    coarse: bool,
     priors: Priors,
 ) -> FloatArray:
     """One standard deviation of each constant, and of what sensors of ordinary quality miss, shape (m, p).
 
     Each sensor is late by a little, and its readings may be what acted, rather than the smooth course.
-    Where they come in coarse steps, the constants meet them as they were read, as a replay does.
+    Where they come in coarser steps than the twin's, the constants meet them as they were read, as a replay
+    does. What the twin itself has that each run draws anew is another one on each.
     """
+    coarse = steps_are_coarse(scene, twin)
     sd = np.array([c.sd * widened.get(c.name, 1.0) for c in constants])
     told, time = slopes(rows, values), rows.even.time
     columns = [rows.constants * sd]
     hidden = {n: v - rows.even.temperatures[n] for n, v in rows.readings.items()}
     if coarse:
         columns[0] = columns[0] + _through_each(rows, constants, hidden) * sd
+    lag_s = math.hypot(priors.missed_lag, twin.sensors.common.lag)
     for names in (("T", "T_in"), ("T_out",)):
         own = [n for n in names if n in rows.readings]
-        late = {n: priors.missed_lag / 60.0 * rate(time, rows.even.temperatures[n]) for n in own}
+        late = {n: lag_s / 60.0 * rate(time, rows.even.temperatures[n]) for n in own}
         columns.append(through_nominal(rows, told, late)[:, None])
         errors = {n: hidden[n] for n in own}
         columns.append(through_nominal(rows, told, {} if coarse else errors)[:, None])
+    columns.append(rows.replay_errors * np.array([lag_s, 1.0]))
+    for declared, setting in twin.on:
+        if declared.drawn_per_run:
+            own_column = np.zeros((len(rows), scene.fitted))
+            if run < scene.fitted:
+                response = rows.response(declared, setting.shape, None, values)
+                own_column[:, run] = setting.amplitude * response
+            columns.append(own_column)
     return np.concatenate(columns, axis=1)
 
 

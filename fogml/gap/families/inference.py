@@ -8,16 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.families.catalogue import families_of, steps_are_coarse
+from fogml.gap.families.catalogue import families_of
 from fogml.gap.families.frame import Columns, Field, Setting, Whitening, fixed_columns
-from fogml.gap.families.linear_gaussian import Posterior
+from fogml.gap.families.linear_gaussian import Posterior, size_gains
+from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, noise_points
 from fogml.gap.families.other_families import LINES
 from fogml.gap.families.places import Scene
 from fogml.gap.families.priors import Priors
-from fogml.gap.families.rows import Rows, Unusable, rows_of
+from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search, over_noises
 from fogml.gap.families.spectral_lines import outstanding_lines
+from fogml.gap.families.unknown import unknown_families
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
@@ -26,6 +28,10 @@ FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
 RESCORED = 80
 """Sets whose evidence is taken at every noise."""
+SMOOTH = ("time_7200", "time_2400", "temperature_25", "past")
+"""Unknowns beside which the first noise is chosen."""
+SMOOTH_PRICE = 5.0
+"""What one of them costs there [nats]: sizes and odds."""
 Progress = Callable[[str], None]
 
 
@@ -98,7 +104,7 @@ def infer(
     setting = replace(setting, scene=scene)
     tell("building families")
     columns = Columns.of(families_of(model.twin, scene, without), scene, setting.values)
-    best = points.noises.index(points.fit.model) if points.fit.model in points.noises else 0
+    best = likeliest_noise(setting, points)
     for _ in range(2):
         tell("searching")
         search = Search(Field(setting, columns, points.noises[best]))
@@ -115,6 +121,23 @@ def infer(
     return Inference(model, setting, columns, points, search, best, tuple(rescored), (*unusable, *more))
 
 
+def likeliest_noise(setting: Setting, points: NoisePoints) -> int:
+    """The noise that explains the runs best beside smooth unknowns."""
+    scene = setting.scene
+    smooth = [f for f in unknown_families() if f.id in SMOOTH]
+    columns = Columns.of(smooth, scene, setting.values)
+    scores = []
+    for noise, log_prior in zip(points.noises, points.log_priors):
+        held = Field(setting, columns, noise)
+        evidence = [held.base.log_evidence]
+        for i in held.at:
+            block = held.block(i)
+            gains = size_gains(held.base.gram(block), held.base.fits(block), setting.priors.lengths)
+            evidence.append(held.base.log_evidence + float(np.logaddexp.reduce(gains)) - SMOOTH_PRICE)
+        scores.append(float(np.logaddexp.reduce(evidence)) + log_prior - held.whitening.log_det)
+    return int(np.argmax(scores))
+
+
 def _rows(runs: Sequence[Run], model: TwinModel, priors: Priors) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
     for run in runs:
@@ -127,11 +150,14 @@ def _rows(runs: Sequence[Run], model: TwinModel, priors: Priors) -> tuple[list[R
 
 def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: object) -> Setting:
     """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
-    constants, coarse = model.constants, steps_are_coarse(scene)
+    constants = model.constants
     values = {c.name: c.mean for c in constants}
     widened: dict[str, float] = {}
     for _ in range(3):
-        fixed = tuple(fixed_columns(r, constants, widened, values, coarse, priors) for r in scene.runs)
+        fixed = tuple(
+            fixed_columns(r, i, scene, model.twin, constants, widened, values, priors)
+            for i, r in enumerate(scene.runs)
+        )
         setting = Setting(scene, constants, priors, fixed, values, widened)
         whitening = Whitening(noise, setting)  # type: ignore[arg-type]
         fitted = scene.fitted

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -15,7 +16,7 @@ SMOOTH_S, SMOOTH_BUMPS = 2400.0, 12
 """What wanders with time or temperature is kept out of the noise's first fit: half period [s], bumps."""
 FREE_DEG_H = 5.0
 """Prior standard deviation of what that adds [deg/h]."""
-MOST_ROWS = 1200
+MOST_ROWS = 600
 
 
 @dataclass(frozen=True)
@@ -32,7 +33,8 @@ def noise_points(setting: Setting, prior: NoisePrior, source: str) -> NoisePoint
     """Noises to integrate over.
 
     White noise is what the runs themselves show, whatever a static run said: it is no evidence of a cause.
-    Slow noise is taken at factors about what fits beside smooth unknowns, each as likely as the prior has it.
+    Flicker and random walk are taken at steps about what was expected of them, each as likely as the prior
+    has it: the runs decide, beside everything that may act.
     """
     scene = setting.scene
     runs = scene.runs[: scene.fitted]
@@ -59,16 +61,18 @@ def noise_points(setting: Setting, prior: NoisePrior, source: str) -> NoisePoint
         averaging_s=runs[0].row_s,
         most=MOST_ROWS,
     )
+    offsets = setting.priors.slow_noise
+    held = dict(zip(NAMES, prior.deviations))
     noises, log_priors = [], []
-    for factor in setting.priors.slow_noise:
-        noise = replace(fit.model, B=fit.model.B * factor, K=fit.model.K * factor)
-        noises.append(noise)
-        off = [
-            np.log(getattr(noise, name) / getattr(prior.centre, name)) / deviation
-            for name, deviation in list(zip(NAMES, prior.deviations))[1:]
-            if getattr(prior.centre, name) > 0.0
-        ]
-        log_priors.append(float(-0.5 * np.sum(np.square(off))))
+    for b, k in product(offsets[:-1], offsets):
+        slow = {
+            name: getattr(prior.centre, name) * float(np.exp(x * held[name]))
+            for name, x in (("B", b), ("K", k))
+        }
+        noise = replace(fit.model, **slow)
+        if noise not in noises:
+            noises.append(noise)
+            log_priors.append(-0.5 * (b * b + k * k))
     return NoisePoints(tuple(noises), tuple(log_priors), fit, source)
 
 

@@ -11,12 +11,16 @@ import numpy as np
 
 from fogml.gap.families.rows import Rows
 from fogml.runs.run import FloatArray
+from fogml.runs.steps import recorded_step
 from fogml.signals.recursions import lag_kernel
+from fogml.twin.twin import Twin
 
 MIXES = (0.5, 0.0, 1.0, -0.5)
 """Shares of the outer face in a place's temperature: within, inner, outer, and beyond the inner one."""
 LAGS_S = (0.0, 600.0, 1800.0)
 """Lags of a place behind that [s]."""
+COARSE_STEP_DEGC = 0.0101
+"""Steps of a good sensor are no coarser: part of any recording."""
 SAME_DEGC = 0.3
 """Places that stay this near to one before drive alike."""
 
@@ -139,3 +143,11 @@ class Scene:
             float(np.abs(r.even.temperature("T_out") - r.even.temperature("T_in")).max()) for r in self.runs
         )
         return [i > 0 and abs(m - mixes[0]) * apart < SAME_DEGC for i, m in enumerate(mixes)]
+
+
+def steps_are_coarse(scene: Scene, twin: Twin) -> bool:
+    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's."""
+    usual = max(COARSE_STEP_DEGC, 1.01 * twin.sensors.common.resolution)
+    runs = scene.runs[: scene.fitted]
+    steps = [recorded_step(r.run.columns[n]) for r in runs for n in r.run.temperature_columns]
+    return max(steps, default=0.0) > usual

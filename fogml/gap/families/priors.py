@@ -42,7 +42,8 @@ class Priors:
     doubt
         Odds of a name are divided by this for what no family describes: a monotone map, the same for all.
     slow_noise
-        Factors on flicker and random walk that are integrated over, about what fits.
+        Prior standard deviations from the median at which random walk is integrated over; flicker at all but
+        the last. Far above, since a short static run shows little of a walk.
     missed_lag
         Lag of an ordinary sensor on the coil, a standard deviation [s].
     most_rows
@@ -65,7 +66,7 @@ class Priors:
     exchange: float = 3.0
     carried: float = 2.0
     doubt: float = 4.0
-    slow_noise: tuple[float, ...] = (0.5, 1.0, 2.0, 4.0)
+    slow_noise: tuple[float, ...] = (-1.0, 0.0, 1.0, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
     least_detectable: float = 3.0

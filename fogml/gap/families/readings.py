@@ -18,15 +18,18 @@ _ORDER = 3
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])
 
 
-def smoothed(values: FloatArray) -> tuple[FloatArray, float]:
-    """Evenly spaced readings smoothed, shape (n,), and the standard deviation of what noise leaves in it."""
+def smoothed(values: FloatArray, share: float = 1.0) -> tuple[FloatArray, float]:
+    """Evenly spaced readings smoothed, shape (n,), and the standard deviation of what noise leaves in it.
+
+    With a share of the penalty, less so.
+    """
     n = len(values)
     if n < 16 or float(np.ptp(values)) == 0.0:
         return values, 0.0
     bands = _bands(n)
     waves = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** _ORDER
     offset = float(values[0])
-    best: tuple[float, FloatArray, float] | None = None
+    best: tuple[float, FloatArray, float, float] | None = None
     for penalty in PENALTIES:
         system = penalty * bands
         system[-1] += 1.0
@@ -35,8 +38,12 @@ def smoothed(values: FloatArray) -> tuple[FloatArray, float]:
         square = float(np.sum((values - smooth) ** 2))
         score = n * square / (n - free) ** 2
         if best is None or score < best[0]:
-            best = score, smooth, square / max(n - free, 1.0) * free / n
+            best = score, smooth, square / max(n - free, 1.0) * free / n, penalty
     assert best is not None
+    if share != 1.0:
+        system = share * best[3] * bands
+        system[-1] += 1.0
+        return solveh_banded(system, values - offset, check_finite=False) + offset, float(np.sqrt(best[2]))
     return best[1], float(np.sqrt(best[2]))
 
 
