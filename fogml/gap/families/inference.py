@@ -26,7 +26,7 @@ from fogml.runs.run import Run
 
 FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
-RESCORED = 80
+RESCORED = 50
 """Sets whose evidence is taken at every noise."""
 SMOOTH = ("time_7200", "time_2400", "temperature_25", "past")
 """Unknowns beside which the first noise is chosen."""

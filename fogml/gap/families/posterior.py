@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import left_out_log_density
-from fogml.gap.families.search import Explanation, Member, over_noises
+from fogml.gap.families.search import Explanation, Member
 from fogml.runs.run import FloatArray
 
 
@@ -81,8 +81,7 @@ def judge(found: Inference) -> Judgement:
         ]
         members = {f for _, f in alike} | {member.family}
         held = float(sum(w for e, w in zip(explanations, weights) if members & set(e.key)))
-        without = next((e for e in explanations if not members & set(e.key)), Explanation((), 0.0, 0.0))
-        carried = carries(found, best) - carries(found, without)
+        carried = carries(found, best) - carries(found, found.search.unexplained(best, member))
         odds = min(_log_odds(held), max(carried, 0.0)) - math.log(priors.doubt)
         order = [families[f].id for _, f in sorted(alike, reverse=True) if f != member.family]
         causes.append(
@@ -140,22 +139,17 @@ def carries(found: Inference, explanation: Explanation) -> float:
 def _with_exchanges(
     found: Inference, exchanges: dict[Member, dict[int, Explanation]]
 ) -> tuple[Explanation, ...]:
-    """All explanations with those of exchanged members, evidence over all noises."""
-    from fogml.gap.families.frame import Field
-
+    """All explanations with those of exchanged members: as far ahead at every noise as at the likeliest."""
     have = {e.key for e in found.explanations}
+    best = found.explanations[0]
     more: dict[tuple[int, ...], Explanation] = {}
     for by_family in exchanges.values():
         for e in by_family.values():
             if e.key not in have and (e.key not in more or e.score > more[e.key].score):
                 more[e.key] = e
-    if not more:
-        return found.explanations
-    added = [replace(e, by_noise=()) for e in more.values()]
-    only = sorted({n for e in added for n, _ in e.nodes})
-    fields = [Field(found.setting, found.columns, m, only) for m in found.points.noises]
-    rescored = over_noises(added, fields, found.points.log_priors)
-    return tuple(sorted([*found.explanations, *rescored], key=lambda e: -e.score))
+    ahead = {key: e.log_evidence - best.log_evidence for key, e in more.items()}
+    added = [replace(e, by_noise=tuple(x + ahead[key] for x in best.by_noise)) for key, e in more.items()]
+    return tuple(sorted([*found.explanations, *added], key=lambda e: -e.score))
 
 
 def _log_odds(probability: float) -> float:

@@ -138,9 +138,8 @@ class Search:
         return {f: self._averaged(f, self._gains(f, across, fits))[0] for f in self.blocks}
 
     def exchanged(self, explanation: Explanation, member: Member) -> dict[int, Explanation]:
-        """The set with one of its members in turn exchanged for each other family that may be named."""
-        explanation = replace(explanation, by_noise=())
-        rest = self._without(explanation, member)
+        """The set with one of its members exchanged for each other family that may be named, where near."""
+        rest = self.without(explanation, member)
         held = self.field.beside(rest.nodes)
         across, fits = self._beside(held)
         found = {}
@@ -148,16 +147,33 @@ class Search:
             if self.families[f].kind != "known" or f in rest.key:
                 continue
             grown = self._grown(rest, held, f, across, fits)
-            if grown.score > explanation.score - 2.0 * self.priors.exchange - self.priors.hopeless:
+            if grown.log_prior + grown.log_evidence > self._alone(explanation) - 2.0 * self.priors.hopeless:
                 found[f] = self._refined(grown)
         return found
 
-    def _without(self, explanation: Explanation, member: Member) -> Explanation:
-        return replace(
-            explanation,
-            members=tuple(m for m in explanation.members if m is not member),
-            log_prior=explanation.log_prior - float(self.log_odds[member.family]),
-            spread=0.0,
+    def unexplained(self, explanation: Explanation, member: Member) -> Explanation:
+        """The likeliest set in which something unknown, or nothing, stands in for a member."""
+        rest = self.without(explanation, member)
+        held = self.field.beside(rest.nodes)
+        across, fits = self._beside(held)
+        others = [rest] + [
+            self._grown(rest, held, f, across, fits)
+            for f in self.blocks
+            if self.families[f].kind != "known" and f not in rest.key
+        ]
+        return max(others, key=lambda e: e.score)
+
+    @staticmethod
+    def _alone(explanation: Explanation) -> float:
+        return explanation.log_prior + explanation.log_evidence
+
+    def without(self, explanation: Explanation, member: Member) -> Explanation:
+        """The set without one of its members, at the one noise."""
+        members = tuple(m for m in explanation.members if m is not member)
+        return Explanation(
+            members,
+            explanation.log_prior - float(self.log_odds[member.family]),
+            self.field.beside([(m.node, m.size) for m in members]).log_evidence,
         )
 
     def _with_one_more(self, explanation: Explanation) -> list[Explanation]:

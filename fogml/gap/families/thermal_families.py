@@ -15,8 +15,11 @@ from fogml.gap.families.family import Block, column_block
 from fogml.gap.families.places import Place, Scene, lag, rate
 from fogml.gap.families.rows import Rows
 from fogml.runs.run import FloatArray
+from fogml.signals.recursions import play_kernel
 
 HALF_WIDTHS_DEGC = (1.5, 3.0, 6.0, 10.0, 16.0, 24.0)
+SHARP_DEGC = tuple(float(x) for x in np.geomspace(1.5, 26.0, 14))
+"""Half widths that all of a plane's relays may share."""
 RELAYS, DENSITY_BUMPS = 48, 5
 WARM_UPS_S = (100.0, 200.0, 400.0, 800.0, 1600.0, 3200.0, 6400.0)
 PERIODS_DEGC = (1.5, 40.0)
@@ -53,17 +56,19 @@ def relays(x: FloatArray, centres: FloatArray, half_width: float, first: int = 0
     return np.where(code == 0, state, 0)[first:].astype(np.float64)
 
 
-def preisach(x: FloatArray, low: float, high: float, first: int = 0) -> FloatArray:
-    """Loops of a Preisach plane less the mean of their branches: smooth densities, shape (n, 30).
+def preisach(x: FloatArray, low: float, high: float, half_width: float, first: int = 0) -> FloatArray:
+    """Loops of relays of one half width, less the mean of their branches, shape (n, bumps).
 
-    Reference: I. D. Mayergoyz, Mathematical Models of Hysteresis, Springer 1991.
+    Columns are smooth densities over the relays' centres. Reference: I. D. Mayergoyz, Mathematical Models of
+    Hysteresis, Springer 1991.
     """
-    centres = np.linspace(low, high, RELAYS)
-    density = bumps(centres, low, high, DENSITY_BUMPS) / RELAYS
-    return np.column_stack([relays(x, centres, w, first) @ density for w in HALF_WIDTHS_DEGC])
+    centres = np.linspace(low - half_width, high + half_width, RELAYS)
+    density = bumps(centres, low - half_width, high + half_width, DENSITY_BUMPS) / RELAYS
+    return relays(x, centres, half_width, first) @ density
 
 
-def _loops(rows: Rows, scene: Scene) -> Iterator[tuple[Place, FloatArray]]:
+def _loops(rows: Rows, scene: Scene) -> Iterator[tuple[str, float | None, FloatArray]]:
+    """Loops of each place: a smooth density over the whole plane, then one half width for all relays."""
     low, high = scene.range_degc
     earlier = scene.before(rows)
     places = scene.coil(rows)
@@ -71,20 +76,32 @@ def _loops(rows: Rows, scene: Scene) -> Iterator[tuple[Place, FloatArray]]:
     for i, place in enumerate(places):
         past = [p[i].temperature[r.kept] for p, r in zip(pasts, earlier)]
         course = np.concatenate([*past, place.temperature])
-        yield place, rows.of(preisach(course, low, high, len(course) - len(place.temperature)))
+        first = len(course) - len(place.temperature)
+        plane = [preisach(course, low, high, w, first) for w in HALF_WIDTHS_DEGC]
+        yield place.name, None, rows.of(np.column_stack(plane))
+        for width in SHARP_DEGC:
+            held = play_kernel(np.ascontiguousarray(course), width, np.nan)[0] - course
+            loops = np.column_stack([held[first:] / width, preisach(course, low, high, width, first)])
+            yield place.name, width, rows.of(loops)
 
 
 def hysteresis(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Any rate-independent loop of the bias."""
-    for place, loops in _loops(rows, scene):
-        yield Block(loops, {"place": place.name})
+    for place, width, loops in _loops(rows, scene):
+        yield _loop_block(loops, place, width)
 
 
 def scale_factor_hysteresis(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Any rate-independent loop of the scale factor."""
     speed = 1e-6 * rows.of(rows.even.input_rate_deg_h * np.ones(len(rows.kept)))
-    for place, loops in _loops(rows, scene):
-        yield Block(speed[:, None] * loops, {"place": place.name})
+    for place, width, loops in _loops(rows, scene):
+        yield _loop_block(speed[:, None] * loops, place, width)
+
+
+def _loop_block(loops: FloatArray, place: str, width: float | None) -> Block:
+    if width is None:
+        return Block(loops, {"place": place})
+    return Block(loops, {"place": place, "half_width": width}, 1.0 / len(SHARP_DEGC))
 
 
 def warm_up(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
