@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from fogml.gap.families.frame import Field, Setting
 from fogml.gap.families.linear_gaussian import LinearGaussian
-from fogml.gap.families.other_families import signature_of
+from fogml.gap.families.other_families import nodes_of, signature_of
 from fogml.gap.model import EffectValue
-from fogml.gap.shapes import AT_AMPLITUDE, Node, grid, is_angle
+from fogml.gap.shapes import AT_AMPLITUDE, Node, is_angle
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
 from fogml.twin.registry import effect
@@ -55,7 +55,7 @@ def card_of(
     }
     if declared.drawn_per_run or declared.family == "line" or declared.family == "power_cycles":
         return _drawn(declared, shape, setting, field, beside)
-    nodes = _nodes(declared, setting)
+    nodes = nodes_of(declared, scene, setting.values)
     runs = scene.runs[: scene.fitted]
     build = signature_of(declared)
     blocks = [list(build(rows, scene, setting.values)) for rows in runs]
@@ -102,17 +102,6 @@ def card_of(
         amplitude = abs(amplitude)
     amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
     return Card(EffectValue(id, amplitude, shape), se, shape_se, max(best[0], 0.0))
-
-
-def _nodes(declared: Effect, setting: Setting) -> Sequence[Node]:
-    scene = setting.scene
-    spans = {"s": scene.span_s, "degC": scene.span_degc, "sample": scene.row_s}
-
-    def on_first(shape: Mapping[str, float]) -> FloatArray:
-        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
-        return scene.runs[0].response(declared, bare, None, setting.values)
-
-    return grid(declared, scene.grade, on_first, spans)
 
 
 def _value(declared: Effect, node: Node, weights: FloatArray) -> tuple[float, dict[str, float]]:

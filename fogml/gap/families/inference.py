@@ -10,28 +10,23 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.families.catalogue import families_of
 from fogml.gap.families.frame import Columns, Field, Setting, Whitening, fixed_columns
-from fogml.gap.families.linear_gaussian import Posterior, size_gains
+from fogml.gap.families.linear_gaussian import Posterior
 from fogml.gap.families.making_rows import Unusable, rows_of
-from fogml.gap.families.noise_points import NoisePoints, noise_points
+from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
 from fogml.gap.families.other_families import LINES
 from fogml.gap.families.places import Scene
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search, over_noises
 from fogml.gap.families.spectral_lines import outstanding_lines
-from fogml.gap.families.unknown import unknown_families
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 
 FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
-RESCORED = 50
+RESCORED = 40
 """Sets whose evidence is taken at every noise."""
-SMOOTH = ("time_7200", "time_2400", "temperature_25", "past")
-"""Unknowns beside which the first noise is chosen."""
-SMOOTH_PRICE = 5.0
-"""What one of them costs there [nats]: sizes and odds."""
 Progress = Callable[[str], None]
 
 
@@ -90,25 +85,28 @@ def infer(
 ) -> Inference:
     """The posterior of the causes behind the fit runs."""
     tell("reading inputs")
-    runs, unusable = _rows(fit, model, priors)
+    most = min(priors.most_rows, priors.most_of_all // max(len(fit), 1))
+    runs, unusable = _rows(fit, model, most)
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))
-    held, more = _rows(held_out, model, priors)
+    held, more = _rows(held_out, model, most)
     scene = Scene((*runs, *held), len(runs), model.grade)
     prior, source = prior_of(model, noise)
     setting = _setting(model, scene, priors, prior.centre)
+    setting = _setting(model, scene, priors, first_noise(setting, prior))
     tell("fitting the noise")
-    points = noise_points(setting, prior, source)
+    points = noise_points(setting, prior, source, 0.5 * priors.hopeless)
     setting = _setting(model, scene, priors, points.fit.model)
     scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
     setting = replace(setting, scene=scene)
     tell("building families")
     columns = Columns.of(families_of(model.twin, scene, without), scene, setting.values)
-    best = likeliest_noise(setting, points)
+    best = points.best
     for _ in range(2):
         tell("searching")
         search = Search(Field(setting, columns, points.noises[best]))
-        found = search.explanations()[:RESCORED]
+        found = search.explanations()
+        found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members][:RESCORED]
         only = sorted({n for e in found for n, _ in e.nodes})
         fields = [Field(setting, columns, m, only) for m in points.noises]
         rescored = over_noises(found, fields, points.log_priors)
@@ -121,28 +119,11 @@ def infer(
     return Inference(model, setting, columns, points, search, best, tuple(rescored), (*unusable, *more))
 
 
-def likeliest_noise(setting: Setting, points: NoisePoints) -> int:
-    """The noise that explains the runs best beside smooth unknowns."""
-    scene = setting.scene
-    smooth = [f for f in unknown_families() if f.id in SMOOTH]
-    columns = Columns.of(smooth, scene, setting.values)
-    scores = []
-    for noise, log_prior in zip(points.noises, points.log_priors):
-        held = Field(setting, columns, noise)
-        evidence = [held.base.log_evidence]
-        for i in held.at:
-            block = held.block(i)
-            gains = size_gains(held.base.gram(block), held.base.fits(block), setting.priors.lengths)
-            evidence.append(held.base.log_evidence + float(np.logaddexp.reduce(gains)) - SMOOTH_PRICE)
-        scores.append(float(np.logaddexp.reduce(evidence)) + log_prior - held.whitening.log_det)
-    return int(np.argmax(scores))
-
-
-def _rows(runs: Sequence[Run], model: TwinModel, priors: Priors) -> tuple[list[Rows], list[tuple[str, str]]]:
+def _rows(runs: Sequence[Run], model: TwinModel, most: int) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
     for run in runs:
         try:
-            usable.append(rows_of(run, model.twin, priors))
+            usable.append(rows_of(run, model.twin, most))
         except Unusable as error:
             unusable.append((run.name, str(error)))
     return usable, unusable

@@ -1,81 +1,117 @@
-"""The noises that a diagnosis integrates over: about what fits, as likely as the static run allows."""
+"""The noises that a diagnosis integrates over: about what a static run shows, as the runs allow."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
-from fogml.gap.families.frame import Setting
-from fogml.gap.families.thermal_families import bumps
-from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior, fit_noise
+from fogml.gap.families.frame import Columns, Field, Setting
+from fogml.gap.families.linear_gaussian import size_gains
+from fogml.gap.families.unknown import unknown_families
+from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
-SMOOTH_S, SMOOTH_BUMPS = 2400.0, 12
-"""What wanders with time or temperature is kept out of the noise's first fit: half period [s], bumps."""
-FREE_DEG_H = 5.0
-"""Prior standard deviation of what that adds [deg/h]."""
-MOST_ROWS = 600
+SMOOTH = ("time_7200", "time_2400", "temperature_25", "past")
+"""Unknowns beside which noise is judged before anything else is known."""
+SMOOTH_PRICE = 5.0
+"""What one of them costs there [nats]: sizes and odds."""
+WHITE_STEPS = (1.3, 1.06)
+"""Factors by which white noise is searched, coarse and fine."""
+_MEDIAN = 0.6744897501960817
 
 
 @dataclass(frozen=True)
 class NoisePoints:
-    """Noises and the logarithms of their priors; `fit` is the one that the points lie about."""
+    """Noises, the logarithms of their priors, and their posterior beside smooth unknowns as a fit."""
 
     noises: tuple[NoiseModel, ...]
     log_priors: tuple[float, ...]
+    best: int
     fit: NoiseFit
     source: str
 
 
-def noise_points(setting: Setting, prior: NoisePrior, source: str) -> NoisePoints:
-    """Noises to integrate over.
+def noise_points(setting: Setting, prior: NoisePrior, source: str, negligible: float) -> NoisePoints:
+    """Noises to integrate over; those with less than exp(-`negligible`) of the likeliest left out.
 
     White noise is what the runs themselves show, whatever a static run said: it is no evidence of a cause.
     Flicker and random walk are taken at steps about what was expected of them, each as likely as the prior
     has it: the runs decide, beside everything that may act.
     """
-    scene = setting.scene
-    runs = scene.runs[: scene.fitted]
-    fixed, free = [], []
-    for rows, columns in zip(runs, setting.fixed):
-        phase = np.pi * (rows.time_s - rows.time_s[0]) / max(rows.time_s[-1] - rows.time_s[0], 1.0)
-        count = max(int((rows.time_s[-1] - rows.time_s[0]) / SMOOTH_S), 2)
-        waves = np.zeros((len(rows), len(runs) * 40))
-        own = np.cos(phase[:, None] * np.arange(1, min(count, 40) + 1))
-        at = 40 * runs.index(rows)
-        waves[:, at : at + own.shape[1]] = own
-        fixed.append(columns)
-        free.append(np.concatenate([waves, bumps(rows.temperature, *scene.range_degc, SMOOTH_BUMPS)], axis=1))
-    used = np.any(np.concatenate(free), axis=0)
-    beside = [np.concatenate([a, b[:, used]], axis=1) for a, b in zip(fixed, free)]
-    deviations = np.concatenate([np.ones(fixed[0].shape[1]), np.full(int(used.sum()), FREE_DEG_H)])
-    wide = NoisePrior(prior.centre, (10.0, prior_factor(prior, 1), prior_factor(prior, 2)))
-    fit = fit_noise(
-        [r.end_s for r in runs],
-        [r.gap for r in runs],
-        beside,
-        prior=wide,
-        deviations=deviations,
-        averaging_s=runs[0].row_s,
-        most=MOST_ROWS,
-    )
-    offsets = setting.priors.slow_noise
+    columns = Columns.of([f for f in unknown_families() if f.id in SMOOTH], setting.scene, setting.values)
     held = dict(zip(NAMES, prior.deviations))
-    noises, log_priors = [], []
+    offsets = setting.priors.slow_noise
+
+    def at(white: float, b: float, k: float) -> NoiseModel:
+        flicker = prior.centre.B * float(np.exp(b * held["B"]))
+        return NoiseModel(white, flicker, prior.centre.K * float(np.exp(k * held["K"])))
+
+    white = _glance(setting)
+    for step in WHITE_STEPS:
+        while True:
+            tried = [white / step, white, white * step]
+            scores = [_score(setting, columns, at(w, 0.0, 0.0)) for w in tried]
+            best = int(np.argmax(scores))
+            white = tried[best]
+            if best == 1:
+                break
+    noises: list[NoiseModel] = []
+    log_priors = []
     for b, k in product(offsets[:-1], offsets):
-        slow = {
-            name: getattr(prior.centre, name) * float(np.exp(x * held[name]))
-            for name, x in (("B", b), ("K", k))
-        }
-        noise = replace(fit.model, **slow)
+        noise = at(white, b, k)
         if noise not in noises:
             noises.append(noise)
             log_priors.append(-0.5 * (b * b + k * k))
-    return NoisePoints(tuple(noises), tuple(log_priors), fit, source)
+    total = np.array([_score(setting, columns, n) + p for n, p in zip(noises, log_priors)])
+    kept = np.flatnonzero(total > total.max() - negligible)
+    weights = np.exp(total[kept] - total.max())
+    fit = _as_fit([noises[i] for i in kept], weights / weights.sum(), prior, float(total.max()))
+    return NoisePoints(
+        tuple(noises[i] for i in kept),
+        tuple(log_priors[i] for i in kept),
+        int(np.argmax(total[kept])),
+        fit,
+        source,
+    )
 
 
-def prior_factor(prior: NoisePrior, index: int) -> float:
-    """The prior's factor of one coefficient."""
-    return float(np.exp(prior.deviations[index]))
+def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
+    """White noise as neighbouring rows show it, slow noise as expected."""
+    return replace(prior.centre, N=_glance(setting))
+
+
+def _glance(setting: Setting) -> float:
+    """Coefficient N from second differences of neighbouring rows."""
+    found = []
+    for rows in setting.scene.runs[: setting.scene.fitted]:
+        second = np.abs(np.diff(rows.gap, 2))
+        found.append(float(np.median(second)) / _MEDIAN / np.sqrt(6.0) * np.sqrt(rows.row_s / 3600.0))
+    return max(float(np.median(found)), 1e-9)
+
+
+def _score(setting: Setting, columns: Columns, noise: NoiseModel) -> float:
+    """Log evidence of a noise, beside nothing or one smooth unknown."""
+    held = Field(setting, columns, noise)
+    evidence = [held.base.log_evidence]
+    for i in held.at:
+        block = held.block(i)
+        gains = size_gains(held.base.gram(block), held.base.fits(block), setting.priors.lengths)
+        evidence.append(held.base.log_evidence + float(np.logaddexp.reduce(gains)) - SMOOTH_PRICE)
+    return float(np.logaddexp.reduce(evidence)) - held.whitening.log_det
+
+
+def _as_fit(
+    noises: Sequence[NoiseModel], weights: np.ndarray, prior: NoisePrior, log_posterior: float
+) -> NoiseFit:
+    """Moments of the logarithms over weighed noises."""
+    logs = np.log(np.maximum([[getattr(n, name) for name in NAMES] for n in noises], 1e-12))
+    mean = weights @ logs
+    covariance = (weights[:, None] * (logs - mean)).T @ (logs - mean)
+    # Between two points of the grid the coefficient may be anywhere.
+    step = np.array([0.01, 0.5 * prior.deviations[1], 0.5 * prior.deviations[2]])
+    covariance += np.diag(step**2 / 12.0)
+    model = NoiseModel(*(float(x) for x in np.exp(mean)))
+    return NoiseFit(model, covariance, prior, log_posterior, len(noises))

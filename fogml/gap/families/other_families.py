@@ -10,7 +10,7 @@ from fogml.gap.families.family import Block, column_block
 from fogml.gap.families.places import Scene, lag, rate
 from fogml.gap.families.rows import Rows, slopes, through_nominal
 from fogml.gap.model import amplitudes_about
-from fogml.gap.shapes import AT_AMPLITUDE, grid
+from fogml.gap.shapes import AT_AMPLITUDE, Node, grid
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
 
@@ -38,14 +38,7 @@ def signature_of(
     """
 
     def build(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-        first = scene.runs[0]
-        spans = {"s": scene.span_s, "degC": scene.span_degc, "sample": scene.row_s}
-
-        def on_first(shape: Mapping[str, float]) -> FloatArray:
-            bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
-            return first.response(declared, bare, None, constants)
-
-        nodes = grid(declared, scene.grade, on_first, spans)
+        nodes = nodes_of(declared, scene, constants)
         for name, temperature, weight in _driving(declared, rows, scene):
             for node in nodes:
                 columns = np.column_stack(
@@ -54,6 +47,20 @@ def signature_of(
                 yield Block(columns @ node.mix, {**node.shape, "place": name}, weight)
 
     return build
+
+
+def nodes_of(declared: Effect, scene: Scene, constants: Constants) -> tuple[Node, ...]:
+    """The grid of an effect's shapes."""
+    key = ("nodes", declared.id)
+    if key not in scene.cache:
+        spans = {"s": scene.span_s, "degC": scene.span_degc, "sample": scene.row_s}
+
+        def on_first(shape: Mapping[str, float]) -> FloatArray:
+            bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+            return scene.runs[0].response(declared, bare, None, constants)
+
+        scene.cache[key] = grid(declared, scene.grade, on_first, spans)
+    return tuple(scene.cache[key])
 
 
 def _driving(

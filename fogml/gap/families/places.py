@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -59,12 +59,15 @@ class Scene:
         Whose ranges hold.
     lines_hz
         Frequencies that stand out of the fit runs.
+    cache
+        What several families ask for.
     """
 
     runs: tuple[Rows, ...]
     fitted: int
     grade: str
     lines_hz: tuple[float, ...] = ()
+    cache: dict[Any, Any] = field(default_factory=dict)
 
     @cached_property
     def range_degc(self) -> tuple[float, float]:

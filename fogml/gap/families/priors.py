@@ -46,8 +46,8 @@ class Priors:
         the last. Far above, since a short static run shows little of a walk.
     missed_lag
         Lag of an ordinary sensor on the coil, a standard deviation [s].
-    most_rows
-        Rows of a run: enough for 30 s in ten hours; no thermal effect is faster.
+    most_rows, most_of_all
+        Rows of a run, enough for 30 s in ten hours, as no thermal effect is faster; and of all fit runs.
     least_detectable
         Whitened length under which an effect counts as undetectable.
     """
@@ -69,6 +69,7 @@ class Priors:
     slow_noise: tuple[float, ...] = (-1.0, 0.0, 1.0, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
+    most_of_all: int = 4500
     least_detectable: float = 3.0
 
     @property

@@ -67,22 +67,28 @@ def preisach(x: FloatArray, low: float, high: float, half_width: float, first: i
     return relays(x, centres, half_width, first) @ density
 
 
-def _loops(rows: Rows, scene: Scene) -> Iterator[tuple[str, float | None, FloatArray]]:
+def _loops(rows: Rows, scene: Scene) -> list[tuple[str, float | None, FloatArray]]:
     """Loops of each place: a smooth density over the whole plane, then one half width for all relays."""
+    key = ("loops", id(rows))
+    if key in scene.cache:
+        return list(scene.cache[key])
     low, high = scene.range_degc
     earlier = scene.before(rows)
     places = scene.coil(rows)
     pasts = [scene.coil(r) for r in earlier]
+    found: list[tuple[str, float | None, FloatArray]] = []
     for i, place in enumerate(places):
         past = [p[i].temperature[r.kept] for p, r in zip(pasts, earlier)]
         course = np.concatenate([*past, place.temperature])
         first = len(course) - len(place.temperature)
         plane = [preisach(course, low, high, w, first) for w in HALF_WIDTHS_DEGC]
-        yield place.name, None, rows.of(np.column_stack(plane))
+        found.append((place.name, None, rows.of(np.column_stack(plane))))
         for width in SHARP_DEGC:
             held = play_kernel(np.ascontiguousarray(course), width, np.nan)[0] - course
             loops = np.column_stack([held[first:] / width, preisach(course, low, high, width, first)])
-            yield place.name, width, rows.of(loops)
+            found.append((place.name, width, rows.of(loops)))
+    scene.cache[key] = found
+    return found
 
 
 def hysteresis(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
