@@ -73,8 +73,9 @@ class LinearGaussian:
 def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
     """Gain in log evidence of a block at each size: gram (..., k, k), fits (..., k), to (..., sizes)."""
     if gram.shape[-1] > WIDE:
-        gains = [_by_factors(g, f, sizes) for g, f in zip(gram, fits)]
-        return np.asarray(gains)
+        if gram.ndim == 2:
+            return _by_factors(gram, fits, sizes)
+        return np.array([_by_factors(g, f, sizes) for g, f in zip(gram, fits)])
     if gram.shape[-1] == 1:
         values, along = np.maximum(gram[..., 0], 0.0), fits**2
     else:
@@ -86,14 +87,14 @@ def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatAr
     return np.asarray(0.5 * np.sum(wide * along[..., None, :] / scaled - np.log(scaled), axis=-1))
 
 
-def _by_factors(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> list[float]:
+def _by_factors(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
     """The same of one wide block, for which a factor at each size is faster than eigenvectors."""
     found = []
     for size in sizes.tolist():
         factor = np.linalg.cholesky(np.eye(len(gram)) + size**2 * gram)
         along = solve_triangular(factor, size * fits, lower=True, check_finite=False)
         found.append(float(0.5 * along @ along - np.log(np.diagonal(factor)).sum()))
-    return found
+    return np.array(found)
 
 
 @dataclass(frozen=True, eq=False)
