@@ -13,6 +13,7 @@ from fogml.gap.confidence import UNSURE, likely
 from fogml.gap.describe import describe_unknown
 from fogml.gap.found import fit_named, found_effects
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
+from fogml.gap.how_far_result import HowFar
 from fogml.gap.left_out import doubted, with_look_alikes
 from fogml.gap.model import Candidate, GyroModel
 from fogml.gap.next_run import next_run
@@ -26,7 +27,7 @@ from fogml.gap.reports import (
     weighed_by_runs,
     with_run_amplitudes,
 )
-from fogml.gap.result import NAMED, Diagnosis, Found, HowFar, Unknown, Verdict
+from fogml.gap.result import NAMED, Diagnosis, Found, Unknown, Verdict
 from fogml.gap.structure import gaps_on_runs, stage_energies, systematic_parts
 from fogml.gap.trials import Trial, best_trial
 from fogml.gap.where import where

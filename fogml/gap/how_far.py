@@ -10,10 +10,10 @@ from typing import Protocol
 import numpy as np
 
 from fogml.gap.fitting import Fit
+from fogml.gap.how_far_result import HowFar
 from fogml.gap.model import Constant, EffectValue
 from fogml.gap.noise import Noise
 from fogml.gap.observation import Observation
-from fogml.gap.result import HowFar
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
 

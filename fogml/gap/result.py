@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.confidence import Support
+from fogml.gap.how_far_result import HowFar, Nearest, WhatIf
 from fogml.gap.model import EffectValue, GyroModel, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
@@ -110,48 +111,6 @@ class Unknown:
     probability: float
     looks_like: str
     log_odds: float = 0.0
-
-
-@dataclass(frozen=True)
-class HowFar:
-    """How far the gap closes on a held-out run; rms of averages over `averaging_s` [deg/h]."""
-
-    run: str
-    averaging_s: float
-    before: float
-    recalibrated: float
-    after: float
-    floor: float
-    closed: float | None
-    closed_ci90: tuple[float, float] | None
-    note: str = ""
-    unit: str = "deg/h"
-
-
-@dataclass(frozen=True)
-class WhatIf:
-    """What a held-out run keeps with one more candidate beside those named [deg/h rms of averages].
-
-    ``share`` is of the fit runs' structural gap.
-    """
-
-    effect: str
-    beside: tuple[str, ...]
-    run: str
-    after: float
-    closed: float | None
-    closed_ci90: tuple[float, float] | None
-    share: float
-
-
-@dataclass(frozen=True)
-class Nearest:
-    """A known family, how much of the gap's energy it holds alone, and how probable it is."""
-
-    family: str
-    effect: str
-    share: float
-    probability: float
 
 
 @dataclass(frozen=True)

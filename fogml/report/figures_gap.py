@@ -10,7 +10,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from fogml.gap.result import Diagnosis, HowFar, RunSeries
+from fogml.gap.how_far_result import HowFar
+from fogml.gap.result import Diagnosis, RunSeries
 from fogml.gap.where_result import GapSegment, TemperatureExcess
 from fogml.report import style
 from fogml.report.axes import log_axis, time_unit

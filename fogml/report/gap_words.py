@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from fogml.gap.result import Diagnosis, Estimate, Found, HowFar
+from fogml.gap.how_far_result import HowFar
+from fogml.gap.result import Diagnosis, Estimate, Found
 from fogml.report.words import MISSING, averages, listed, number, percent, plural
 from fogml.twin.registry import effects
 

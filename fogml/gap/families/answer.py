@@ -22,16 +22,15 @@ from fogml.gap.families.reports import (
 )
 from fogml.gap.families.search import Member
 from fogml.gap.families.words import headline, looks_like
+from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (
     Diagnosis,
     Estimate,
     Found,
-    Nearest,
     RunAmplitude,
     Unknown,
     Verdict,
-    WhatIf,
 )
 from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import GapOnRun, where

@@ -11,7 +11,7 @@ from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
 from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
-from fogml.gap.result import HowFar
+from fogml.gap.how_far_result import HowFar
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
 

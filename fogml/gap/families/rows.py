@@ -69,7 +69,8 @@ class Rows:
     @property
     def turns(self) -> bool:
         """Whether the table turns."""
-        return bool(np.any(self.even.table_rate)) or "angle" in self.even.drives
+        angle = self.even.drives.get("angle")
+        return bool(np.any(self.even.table_rate)) or (angle is not None and float(np.ptp(angle)) > 0.0)
 
     @cached_property
     def temperature(self) -> FloatArray:

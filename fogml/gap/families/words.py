@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from fogml.gap.result import Found, HowFar, Nearest, Verdict
+from fogml.gap.how_far_result import HowFar, Nearest
+from fogml.gap.result import Found, Verdict
 from fogml.twin.registry import effect
 
 if TYPE_CHECKING:

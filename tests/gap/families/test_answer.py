@@ -1,0 +1,68 @@
+"""Whole answers: nothing where nothing is missing, a twin's wrong size, dropped rows."""
+
+import numpy as np
+import pytest
+
+from fogml.gap.families.answer import diagnose
+from fogml.gap.families.making_rows import rows_of
+from fogml.gap.twin_model import TwinModel
+from fogml.runs.run import Run
+from fogml.twin.programme import programme_from
+from fogml.twin.simulate import simulate
+from fogml.twin.twin_file import load_twin
+
+
+def _run(twin, seed, sample_s=60.0, hot=50):
+    steps = [
+        "soak at 25 degC for 1 h",
+        f"ramp to {hot} degC at 1 degC/min",
+        f"soak at {hot} degC for 1.5 h",
+        "ramp to -10 degC at 1 degC/min",
+        "soak at -10 degC for 1.5 h",
+        "ramp to 25 degC at 0.5 degC/min",
+        "soak at 25 degC for 1 h",
+    ]
+    values = {"schema": "fogml.programme/1", "name": f"p{seed}", "steps": steps}
+    programme = programme_from(values | {"start_temperature": "25 degC", "power": "on"}, "test")
+    return simulate(programme, twin, sample_s=sample_s, seed=seed).run
+
+
+@pytest.fixture(scope="module")
+def tactical():
+    return load_twin("tactical")
+
+
+@pytest.fixture(scope="module")
+def runs(tactical):
+    return [_run(tactical, 1), _run(tactical, 2, hot=40), _run(tactical, 3, hot=45)]
+
+
+def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
+    found = diagnose(TwinModel(tactical), runs[:2], runs[2:])
+    assert found.verdict == "no_gap"
+    assert not found.named
+    errors = [abs(c.value - getattr(tactical.nominal, c.name)) / c.se for c in found.constants]
+    assert max(errors) < 3.0
+
+
+def test_a_size_that_the_twin_has_wrong_gets_its_own_name(tactical, runs):
+    wrong = tactical.with_effect("thermal_hysteresis", 0.9, half_width=8.0)
+    found = diagnose(TwinModel(wrong), runs[:2], runs[2:])
+    assert [f.effect for f in found.named] == ["thermal_hysteresis"]
+    (cause,) = found.named
+    assert cause.amplitude.value == pytest.approx(0.12 - 0.9, abs=4.0 * cause.amplitude.se)
+    assert found.how_far[0].closed is not None and found.how_far[0].closed > 0.8
+
+
+def test_dropped_rows_change_nothing_that_is_systematic(tactical):
+    run = _run(load_twin("nominal"), 4, sample_s=5.0)
+    keep = np.random.default_rng(1).random(len(run)) > 0.08
+    keep[[0, -1]] = True
+    less = Run(name="less", columns={n: v[keep] for n, v in run.columns.items()}, facts=run.facts)
+    whole, part = (rows_of(r, tactical, 600) for r in (run, less))
+    assert len(part) == len(whole)
+    held = np.isin(whole.end_s, part.end_s)
+    assert held.all()
+    scale = np.abs(whole.constants).max(axis=0)
+    # What is left is the noise of the readings that were dropped.
+    assert np.all(np.abs(part.constants - whole.constants) < 1e-2 * np.maximum(scale, 1e-12))

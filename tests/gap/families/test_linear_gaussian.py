@@ -1,0 +1,71 @@
+"""Evidence, conditioning and prediction against dense normal densities."""
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from fogml.gap.families.linear_gaussian import (
+    LinearGaussian,
+    Posterior,
+    left_out_log_density,
+    log_evidence,
+    size_gains,
+)
+
+
+def _made(n=30, seed=1):
+    rng = np.random.default_rng(seed)
+    fixed, block, other = (rng.standard_normal((n, k)) for k in (3, 4, 2))
+    data = 3.0 * block[:, 0] + fixed @ [1.0, -2.0, 0.5] + rng.standard_normal(n)
+    return data, fixed, block, other
+
+
+def _dense(data, *blocks):
+    """Log density by its definition, less that of unit noise at zero."""
+    covariance = np.eye(len(data)) + sum(b @ b.T for b in blocks)
+    return multivariate_normal.logpdf(data, cov=covariance) + 0.5 * len(data) * np.log(2.0 * np.pi)
+
+
+def test_evidence_is_the_density_of_the_data():
+    data, fixed, block, other = _made()
+    held = LinearGaussian.of(data).beside(fixed).beside(block, 2.0).beside(other, 0.3)
+    assert held.log_evidence == pytest.approx(_dense(data, fixed, 2.0 * block, 0.3 * other), abs=1e-9)
+
+
+@pytest.mark.parametrize("width", [1, 4, 60])
+def test_gains_at_sizes_are_differences_of_densities(width):
+    rng = np.random.default_rng(2)
+    data, fixed, *_ = _made(80)
+    block = rng.standard_normal((80, width))
+    held = LinearGaussian.of(data).beside(fixed)
+    sizes = np.array([0.5, 3.0])
+    gains = size_gains(held.gram(block)[None], held.fits(block)[None], sizes)[0]
+    expected = [_dense(data, fixed, s * block) - _dense(data, fixed) for s in sizes]
+    np.testing.assert_allclose(gains, expected, atol=1e-8)
+    np.testing.assert_allclose(size_gains(held.gram(block), held.fits(block), sizes), expected, atol=1e-8)
+
+
+def test_leaving_parts_out_is_conditioning():
+    data, fixed, block, _ = _made()
+    design = np.concatenate([fixed, block], axis=1)
+    covariance = np.eye(30) + design @ design.T
+    parts = [slice(0, 12), slice(12, 30)]
+    expected = 0.0
+    for part in parts:
+        own = np.zeros(30, bool)
+        own[part] = True
+        gain = covariance[np.ix_(own, ~own)] @ np.linalg.inv(covariance[np.ix_(~own, ~own)])
+        left = covariance[np.ix_(own, own)] - gain @ covariance[np.ix_(~own, own)]
+        expected += multivariate_normal.logpdf(data[own], gain @ data[~own], left)
+    found = left_out_log_density(design, data, parts) - 0.5 * 30 * np.log(2.0 * np.pi)
+    assert found == pytest.approx(expected, abs=1e-8)
+
+
+def test_the_posterior_is_that_of_the_joint_density():
+    data, fixed, *_ = _made()
+    found = Posterior.of(fixed, data)
+    gain = fixed.T @ np.linalg.inv(np.eye(30) + fixed @ fixed.T)
+    np.testing.assert_allclose(found.mean, gain @ data, atol=1e-10)
+    np.testing.assert_allclose(found.covariance, np.eye(3) - gain @ fixed, atol=1e-10)
+    alone = log_evidence(fixed.T @ fixed, fixed.T @ data, float(data @ data))
+    assert alone == pytest.approx(_dense(data, fixed), abs=1e-9)
