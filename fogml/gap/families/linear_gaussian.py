@@ -87,6 +87,12 @@ def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatAr
     return np.asarray(0.5 * np.sum(wide * along[..., None, :] / scaled - np.log(scaled), axis=-1))
 
 
+def log_sum_exp(values: FloatArray) -> float:
+    """Logarithm of the sum of exponentials."""
+    most = float(values.max())
+    return most if most == -np.inf else most + float(np.log(np.exp(values - most).sum()))
+
+
 def _by_factors(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
     """The same of one wide block, for which a factor at each size is faster than eigenvectors."""
     found = []

@@ -62,6 +62,7 @@ class Rows:
     by_sample: BySample
     replay_errors: FloatArray
     masked: Mapping[str, int] = field(default_factory=dict)
+    cache: dict[tuple[float, ...] | None, Inputs] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -111,28 +112,39 @@ class Rows:
         meets output and slopes.
         """
         fast = {"rate", "angle", "output", "slopes", "earth"} & set(declared.needs)
+        met = constants if {"output", "slopes"} & set(declared.needs) else None
         if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
-            inputs = self.by_sample.inputs(self.even, temperatures)
-            values = declared.response(_meeting(inputs, constants), **shape)
-            return self.of(self.by_sample.means(np.asarray(values, dtype=np.float64)))
+            inputs = self._by_sample_inputs(temperatures, met)
+            return self.of(self.by_sample.means(np.asarray(declared.response(inputs, **shape), np.float64)))
         inputs = self.even.afresh()
         if temperatures:
             inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
-        values = declared.response(_meeting(inputs, constants), **shape)
+        values = declared.response(_meeting(inputs, met), **shape)
         return self.of(np.broadcast_to(np.asarray(values, dtype=np.float64), self.kept.shape))
+
+    def _by_sample_inputs(
+        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+    ) -> Inputs:
+        """Inputs at the samples; those with the rows' own temperatures are worked out once."""
+        if temperatures:
+            return _meeting(self.by_sample.inputs(self.even, temperatures), constants)
+        key = None if constants is None else tuple(constants.values())
+        if key not in self.cache:
+            self.cache[key] = _meeting(self.by_sample.inputs(self.even, None), constants)
+        return self.cache[key].afresh()
 
     def changed_output(
         self, declared: Effect, amplitude: float, constants: Mapping[str, float]
     ) -> FloatArray:
         """What an effect that meets the output makes of it at an amplitude [deg/h], shape (m,)."""
         assert isinstance(declared, LoopEffect)
-        inputs = _meeting(self.by_sample.inputs(self.even, None), constants)
+        inputs = self._by_sample_inputs(None, constants)
         output = np.asarray(inputs.output)
         return self.of(self.by_sample.means(declared.apply(output, inputs, amplitude) - output))
 
     def delayed(self, delay_s: float, constants: Mapping[str, float]) -> FloatArray:
         """What a delay of the output [s] makes of it [deg/h], shape (m,)."""
-        inputs = _meeting(self.by_sample.inputs(self.even, None), constants)
+        inputs = self._by_sample_inputs(None, constants)
         output = np.asarray(inputs.output)
         late = np.interp(inputs.time - delay_s, inputs.time, output)
         return self.of(self.by_sample.means(late - output))

@@ -7,11 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import logsumexp
 
 from fogml.gap.families.family import Family
 from fogml.gap.families.frame import Field
-from fogml.gap.families.linear_gaussian import LinearGaussian, log_evidence, size_gains
+from fogml.gap.families.linear_gaussian import LinearGaussian, log_evidence, log_sum_exp, size_gains
 from fogml.runs.run import FloatArray
 
 REFINED = 12
@@ -59,7 +58,7 @@ class Explanation:
     @property
     def score(self) -> float:
         """Logarithm of the posterior, up to a constant."""
-        evidence = float(logsumexp(self.by_noise)) if self.by_noise else self.log_evidence
+        evidence = log_sum_exp(np.array(self.by_noise)) if self.by_noise else self.log_evidence
         return self.log_prior + evidence
 
     @property
@@ -130,7 +129,7 @@ class Search:
     def alone(self) -> Mapping[int, float]:
         """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
         across, fits = self._beside(self.field.base)
-        return {f: float(logsumexp(self._gains(f, across, fits) + b.prior)) for f, b in self.blocks.items()}
+        return {f: log_sum_exp(self._gains(f, across, fits) + b.prior) for f, b in self.blocks.items()}
 
     def best_members(self, held: LinearGaussian) -> dict[int, Member]:
         """The node and size that stand for each family beside what is held."""
@@ -202,7 +201,7 @@ class Search:
         """The node and size that stand for a family, its gain averaged over all, and how much that adds."""
         table = gains + self.blocks[f].prior
         row, column = np.unravel_index(int(np.argmax(table)), table.shape)
-        averaged = float(logsumexp(table))
+        averaged = log_sum_exp(table)
         member = Member(f, self.blocks[f].nodes[row], float(self.blocks[f].lengths[column]))
         return member, averaged, averaged - float(gains[row, column])
 
