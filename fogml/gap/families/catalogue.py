@@ -35,6 +35,7 @@ FAMILIES: dict[str, Build] = {
     "clock_skew": other.clock_skew,
     "scale_factor_node": other.scale_factor_node,
     "modulator": other.modulator,
+    "moisture": other.moisture,
 }
 """Families by the names that effects declare; an effect of family ``signature`` has its own signature's."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import combinations
 
 import numpy as np
 
@@ -24,6 +25,8 @@ NEAR = (0.5,)
 """Mixes of the faces that stand for the optics' place, where a slope in temperature is all that acts."""
 MODULATOR_S = (30.0, 300.0)
 """Start-up of a modulator's second loop [s]."""
+MOISTURE_S = (1800.0, 7200.0, 36000.0, 144000.0, 600000.0)
+"""Times in which a coil takes up the air's moisture [s]."""
 LINES = 10
 """Frequencies that stand out and are looked at closely."""
 Constants = Mapping[str, float]
@@ -118,6 +121,22 @@ def bumps_of(x: FloatArray, low: float, high: float) -> FloatArray:
     from fogml.gap.families.thermal_families import bumps
 
     return bumps(x, low, high, 5)
+
+
+def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """What follows the air's humidity late, alike at all temperatures or not."""
+    if "humidity" not in rows.even.drives:
+        yield Block(np.zeros((len(rows), 1)))
+        return
+    time, air = rows.even.time, rows.even.drives["humidity"]
+    u = rows.temperature - 25.0
+    taken = {s: rows.of(air - lag(time, air, s)) for s in MOISTURE_S}
+    for values in taken.values():
+        yield column_block(values)
+    for one, other in combinations(MOISTURE_S, 2):
+        yield column_block(taken[one], taken[other])
+        warm = 0.03 * u
+        yield column_block(taken[one], taken[other], warm * taken[one], warm * taken[other])
 
 
 def power_cycles(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

@@ -21,7 +21,8 @@ class Priors:
     unknown
         Probability that a cause acts that no catalogue holds: about one gap in four.
     other_plant
-        Probability that heat flows otherwise than the model's plant says, beyond what constants take up.
+        Probability that heat flows otherwise than the model's plant says, beyond what constants take up: one
+        unit in twenty.
     least_size, greatest_size, sizes
         Whitened length of what a cause does: log-uniform, in so many values. Under 3 none can be told from
         noise; from 60 on a prior makes no difference, whatever the size is.
@@ -54,7 +55,7 @@ class Priors:
 
     expected_causes: float = 1.0
     unknown: float = 0.25
-    other_plant: float = 0.1
+    other_plant: float = 0.05
     least_size: float = 3.0
     greatest_size: float = 60.0
     sizes: int = 6

@@ -26,7 +26,7 @@ PERIODS_DEGC = (1.5, 40.0)
 CYCLES_APART = 0.4
 """Periods of a bank lie this many cycles over the range apart: between two, the cosine to one is over 0.9."""
 MOST_PERIODS = 56
-TRANSITION_STEP_DEGC, TRANSITION_WIDTHS_DEGC = 5.0, (2.5, 5.0)
+TRANSITION_STEP_DEGC, TRANSITION_WIDTHS_DEGC = 5.0, (2.5, 5.0, 10.0)
 NODE_LAGS_S = (600.0, 1200.0, 2400.0, 3600.0)
 RELAXATIONS_S = (900.0, 2000.0, 4500.0, 9000.0, 15000.0)
 SHUPE_LAGS_S = (0.0, 60.0, 200.0)
@@ -146,7 +146,10 @@ def transition(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block
             for centre in centres.tolist():
                 step = np.tanh((x - centre) / width)
                 shape = {"transition_temperature": centre, "width": width, "place": place.name}
-                yield Block(np.column_stack([step, (1.0 - step**2) * speed]), shape)
+                peak = (1.0 - step**2) * speed
+                # Slopes that differ on the two sides make a peak skewed, and a rate another one beyond.
+                yield Block(np.column_stack([step, peak]), shape)
+                yield Block(np.column_stack([step, peak, step * peak, step * speed]), shape)
 
 
 def hidden_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
@@ -170,12 +173,15 @@ def relaxation(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block
 
 
 def rate_product(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """Temperature times its rate."""
+    """Temperature times its rate, and what a slope that is not straight adds."""
     time = rows.even.time
     for place in scene.coil(rows):
         for late in (0.0, 200.0):
             x = lag(time, place.temperature, late)
-            yield column_block(rows.of((x - 25.0) * rate(time, x)), place=place.name)
+            u = x - 25.0
+            product = rows.of(u * rate(time, x))
+            yield column_block(product, place=place.name)
+            yield column_block(product, 0.012 * rows.of(u) * product, place=place.name)
 
 
 def rate_of_temperature(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

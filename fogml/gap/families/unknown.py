@@ -101,10 +101,17 @@ def _decay(time: FloatArray, kicks: FloatArray, time_constant_s: float) -> Float
 
 
 def _recorded(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    names = sorted(set.intersection(*(set(r.even.drives) for r in scene.runs)) - {"angle", "shaking", "dose"})
+    names = sorted(set.intersection(*(set(r.even.drives) for r in scene.runs)) - _of_candidates())
     for name in names:
         values = rows.even.drives[name]
         yield Block(np.column_stack([rows.of(lag(rows.even.time, values, s)) for s in (0.0, 300.0, 1800.0)]))
+
+
+def _of_candidates() -> set[str]:
+    """Quantities that candidates follow: what goes with them is theirs, in whatever form."""
+    from fogml.twin.registry import effects
+
+    return {name for declared in effects().values() if declared.candidate for name in declared.needs}
 
 
 def unknown_families() -> tuple[Family, ...]:

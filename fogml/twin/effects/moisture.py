@@ -26,6 +26,7 @@ class Moisture(BiasEffect):
 
     id = "moisture"
     code = "B11"
+    family = "moisture"
     place = "coil"
     title = "Moisture in the coil"
     amplitude = Quantity(
