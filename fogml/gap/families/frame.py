@@ -24,6 +24,8 @@ from fogml.twin.twin import Twin
 
 LONGEST_RUNS = 30.0
 """Flicker goes on to this many run lengths: what is slower sets runs apart by a constant."""
+LEAST_ERROR = 0.3
+"""Whitened length under which an error of the readings is left out."""
 IN_CONSTANTS = 1e-4
 """A block that keeps less of its energy beside the constants lies in their span."""
 
@@ -119,12 +121,9 @@ class Whitening:
         for rows in setting.scene.runs[: setting.scene.fitted]:
             span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
             held = Whitener(noise, rows.end_s, rows.row_s, noise.ladder(rows.row_s, LONGEST_RUNS * span))
-            reading = reading_deviation(rows, setting.values)
-            extra = 1.0 / rows.weight**2 - 1.0
+            extra = (1.0 / rows.weight**2 - 1.0) * noise.white_density / rows.row_s
             self._whiteners.append(held)
-            white = noise.white_density / rows.row_s
-            added = (reading**2 + extra * white) / held.deviation**2
-            self._weights.append(1.0 / np.sqrt(1.0 + added))
+            self._weights.append(1.0 / np.sqrt(1.0 + extra / held.deviation**2))
 
     def stacked(self, series: Sequence[FloatArray]) -> FloatArray:
         """Series of each fit run, shape (m_r, ...), whitened and one after the other."""
@@ -142,13 +141,21 @@ class Whitening:
         )
 
 
-def reading_deviation(rows: Rows, constants: Mapping[str, float]) -> FloatArray:
-    """What errors of the smoothed readings make of the replay, a standard deviation [deg/h], shape (m,)."""
-    variance = np.zeros(len(rows.kept))
-    for name, slope in slopes(rows, constants).items():
-        noise = rows.reading_noise.get(name, rows.reading_noise.get("T_in", 0.0) if name == "T" else 0.0)
-        variance = variance + (slope * noise) ** 2
-    return np.asarray(np.sqrt(rows.of(variance)))
+def reading_errors(rows: Rows, constants: Mapping[str, float], white_deg_h: float) -> FloatArray:
+    """What errors of the smoothed readings make of the replay, columns of unit priors, shape (m, k).
+
+    Those far under the white noise of the rows are left out.
+    """
+    told = slopes(rows, constants)
+    columns = []
+    for name, smoothness in rows.smoothness.items():
+        if name not in ("T", "T_in", "T_out") or smoothness.noise == 0.0:
+            continue
+        for error in smoothness.errors(len(rows.kept)).T:
+            column = through_nominal(rows, told, {name: error})
+            if float(column @ column) > (LEAST_ERROR * white_deg_h) ** 2:
+                columns.append(column)
+    return np.column_stack(columns) if columns else np.zeros((len(rows), 0))
 
 
 def fixed_columns(
@@ -174,7 +181,8 @@ def fixed_columns(
     hidden = {n: v - rows.even.temperatures[n] for n, v in rows.readings.items()}
     if coarse:
         columns[0] = columns[0] + _through_each(rows, constants, hidden) * sd
-    lag_s = math.hypot(priors.missed_lag, twin.sensors.common.lag)
+    # Within a sample nothing tells when a reading was taken.
+    lag_s = math.hypot(priors.missed_lag, twin.sensors.common.lag, rows.run.sample_s / math.sqrt(12.0))
     for names in (("T", "T_in"), ("T_out",)):
         own = [n for n in names if n in rows.readings]
         late = {n: lag_s / 60.0 * rate(time, rows.even.temperatures[n]) for n in own}

@@ -9,7 +9,14 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.families.catalogue import families_of
-from fogml.gap.families.frame import Columns, Field, Setting, Whitening, fixed_columns
+from fogml.gap.families.frame import (
+    Columns,
+    Field,
+    Setting,
+    Whitening,
+    fixed_columns,
+    reading_errors,
+)
 from fogml.gap.families.linear_gaussian import Posterior
 from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
@@ -22,6 +29,7 @@ from fogml.gap.families.spectral_lines import outstanding_lines
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
 
 FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
@@ -95,7 +103,7 @@ def infer(
     setting = _setting(model, scene, priors, prior.centre)
     setting = _setting(model, scene, priors, first_noise(setting, prior))
     tell("fitting the noise")
-    points = noise_points(setting, prior, source, 0.5 * priors.hopeless)
+    points = noise_points(setting, prior, source, noise, 0.5 * priors.hopeless)
     setting = _setting(model, scene, priors, points.fit.model)
     scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
     setting = replace(setting, scene=scene)
@@ -129,18 +137,27 @@ def _rows(runs: Sequence[Run], model: TwinModel, most: int) -> tuple[list[Rows],
     return usable, unusable
 
 
-def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: object) -> Setting:
+def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
     """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
     constants = model.constants
     values = {c.name: c.mean for c in constants}
     widened: dict[str, float] = {}
     for _ in range(3):
-        fixed = tuple(
-            fixed_columns(r, i, scene, model.twin, constants, widened, values, priors)
-            for i, r in enumerate(scene.runs)
-        )
+        errors = [
+            reading_errors(r, values, float(np.sqrt(noise.white_density / r.row_s)))
+            for r in scene.runs[: scene.fitted]
+        ]
+        ends = np.cumsum([0, *(e.shape[1] for e in errors)])
+        blocks = []
+        for i, r in enumerate(scene.runs):
+            wide = np.zeros((len(r), int(ends[-1])))
+            if i < scene.fitted:
+                wide[:, ends[i] : ends[i + 1]] = errors[i]
+            own = fixed_columns(r, i, scene, model.twin, constants, widened, values, priors)
+            blocks.append(np.concatenate([own, wide], axis=1))
+        fixed = tuple(blocks)
         setting = Setting(scene, constants, priors, fixed, values, widened)
-        whitening = Whitening(noise, setting)  # type: ignore[arg-type]
+        whitening = Whitening(noise, setting)
         fitted = scene.fitted
         data = whitening.stacked([r.gap for r in scene.runs[:fitted]])
         found = Posterior.of(whitening.stacked(fixed[:fitted]), data)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.gap.families.readings import smoothed, window_difference
+from fogml.gap.families.readings import Smoothness, smoothed, window_difference
 from fogml.gap.families.rows import BySample, Rows
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import FloatArray, Run
@@ -71,7 +71,7 @@ def rows_of(run: Run, twin: Twin, most: int) -> Rows:
     kept &= ~_after_gaps(run, time, row_s)
     if kept.sum() < FEWEST_ROWS:
         raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
-    columns = _constant_columns(samples, even)
+    columns = _constant_columns(samples, even, step)
     return Rows(
         run=run,
         gap=samples.means(run.gyro_deg_h - replayed)[kept],
@@ -83,7 +83,7 @@ def rows_of(run: Run, twin: Twin, most: int) -> Rows:
         even=even,
         kept=kept,
         readings=readings,
-        reading_noise=noise,
+        smoothness=noise,
         by_sample=samples,
         replay_errors=errors[kept],
         masked=masked,
@@ -147,10 +147,10 @@ def _after_gaps(run: Run, time: FloatArray, row_s: float) -> NDArray[np.bool_]:
 
 def _even(
     samples: BySample, time: FloatArray, twin: Twin, replayer: Replayer, row_s: float
-) -> tuple[Inputs, dict[str, FloatArray], dict[str, float]]:
+) -> tuple[Inputs, dict[str, FloatArray], dict[str, Smoothness]]:
     recorded = samples.recorded
     at = samples.means(recorded.time)
-    readings, smooth, noise = {}, {}, {}
+    readings, smooth, noise = {}, {}, dict[str, Smoothness]()
     for name, values in recorded.temperatures.items():
         means = np.interp(time, at, samples.means(values))
         readings[name] = means
@@ -181,12 +181,12 @@ def _even(
     return even, readings, noise
 
 
-def _constant_columns(samples: BySample, even: Inputs) -> FloatArray:
+def _constant_columns(samples: BySample, even: Inputs, sample_s: float) -> FloatArray:
     """Response to each nominal constant on the even rows, shape (e, 8); 0 where a run can't show one."""
     by_sample = samples.inputs(even, None)
     told = dict(nominal_columns(even))
     if np.any(even.table_rate):
         fast = nominal_columns(by_sample)
         told |= {name: samples.means(fast[name]) for name in ("e0", "k1", "k2")}
-    told["m"] = window_difference(even.time, even.temperature("T"), DELTA_WINDOW_S)
+    told["m"] = window_difference(even.time, even.temperature("T"), DELTA_WINDOW_S, 0.5 * sample_s)
     return np.column_stack([told.get(name, np.zeros(len(even.time))) for name in NAMES])

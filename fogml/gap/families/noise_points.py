@@ -10,7 +10,9 @@ import numpy as np
 
 from fogml.gap.families.frame import Columns, Field, Setting
 from fogml.gap.families.linear_gaussian import size_gains
+from fogml.gap.families.static_run import StaticRun
 from fogml.gap.families.unknown import unknown_families
+from fogml.runs.run import Run
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
@@ -34,12 +36,14 @@ class NoisePoints:
     source: str
 
 
-def noise_points(setting: Setting, prior: NoisePrior, source: str, negligible: float) -> NoisePoints:
+def noise_points(
+    setting: Setting, prior: NoisePrior, source: str, static: Run | None, negligible: float
+) -> NoisePoints:
     """Noises to integrate over; those with less than exp(-`negligible`) of the likeliest left out.
 
     White noise is what the runs themselves show, whatever a static run said: it is no evidence of a cause.
-    Flicker and random walk are taken at steps about what was expected of them, each as likely as the prior
-    has it: the runs decide, beside everything that may act.
+    Flicker and random walk are taken at steps about what was expected of them, each as likely as the static
+    run itself has it, or the prior where there is none: the runs decide, beside everything that may act.
     """
     columns = Columns.of([f for f in unknown_families() if f.id in SMOOTH], setting.scene, setting.values)
     held = dict(zip(NAMES, prior.deviations))
@@ -58,13 +62,15 @@ def noise_points(setting: Setting, prior: NoisePrior, source: str, negligible: f
             white = tried[best]
             if best == 1:
                 break
+    told = None if static is None else StaticRun.of(static)
     noises: list[NoiseModel] = []
     log_priors = []
     for b, k in product(offsets[:-1], offsets):
         noise = at(white, b, k)
         if noise not in noises:
             noises.append(noise)
-            log_priors.append(-0.5 * (b * b + k * k))
+            own = replace(noise, N=prior.centre.N)
+            log_priors.append(-0.5 * (b * b + k * k) if told is None else told.log_likelihood(own))
     total = np.array([_score(setting, columns, n) + p for n, p in zip(noises, log_priors)])
     kept = np.flatnonzero(total > total.max() - negligible)
     weights = np.exp(total[kept] - total.max())

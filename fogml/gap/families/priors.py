@@ -67,7 +67,7 @@ class Priors:
     exchange: float = 3.0
     carried: float = 2.0
     doubt: float = 4.0
-    slow_noise: tuple[float, ...] = (-1.0, 0.0, 1.0, 2.0)
+    slow_noise: tuple[float, ...] = (-1.0, 0.0, 0.6, 1.2, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
     most_of_all: int = 4500

@@ -8,43 +8,70 @@ A reading is a smooth course and white noise. The smooth course minimises
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.linalg import solveh_banded
 
 from fogml.runs.run import FloatArray
 
 PENALTIES = np.geomspace(1e-3, 1e8, 23)
+LEAST_PASSED = 0.1
+"""Share of a wave that the smoother lets through under which it is taken for none."""
 _ORDER = 3
 _THIRD = np.array([-1.0, 3.0, -3.0, 1.0])
 
 
-def smoothed(values: FloatArray, share: float = 1.0) -> tuple[FloatArray, float]:
-    """Evenly spaced readings smoothed, shape (n,), and the standard deviation of what noise leaves in it.
+@dataclass(frozen=True)
+class Smoothness:
+    """What cross-validation found: the readings' noise, a standard deviation, and the penalty."""
+
+    noise: float
+    penalty: float
+
+    def errors(self, n: int) -> FloatArray:
+        """What the smooth course may differ by from the true one: columns of unit priors, shape (n, k).
+
+        The posterior covariance of a spline is the noise's variance times the smoother; waves that it hardly
+        lets through are left out.
+        """
+        waves = np.arange(n)
+        passed = 1.0 / (1.0 + self.penalty * (2.0 - 2.0 * np.cos(np.pi * waves / n)) ** _ORDER)
+        kept = waves[(passed > LEAST_PASSED)]
+        basis = np.cos(np.pi * np.outer(np.arange(n) + 0.5, kept) / n)
+        basis *= np.where(kept == 0, np.sqrt(1.0 / n), np.sqrt(2.0 / n))
+        return np.asarray(self.noise * np.sqrt(passed[kept]) * basis)
+
+
+def smoothed(values: FloatArray, share: float = 1.0) -> tuple[FloatArray, Smoothness]:
+    """Evenly spaced readings smoothed, shape (n,), and what cross-validation found.
 
     With a share of the penalty, less so.
     """
     n = len(values)
     if n < 16 or float(np.ptp(values)) == 0.0:
-        return values, 0.0
+        return values, Smoothness(0.0, 0.0)
     bands = _bands(n)
     waves = (2.0 - 2.0 * np.cos(np.pi * np.arange(n) / n)) ** _ORDER
     offset = float(values[0])
-    best: tuple[float, FloatArray, float, float] | None = None
-    for penalty in PENALTIES:
-        system = penalty * bands
-        system[-1] += 1.0
-        smooth = solveh_banded(system, values - offset, check_finite=False) + offset
+    best: tuple[float, FloatArray, Smoothness] | None = None
+    for penalty in PENALTIES.tolist():
+        smooth = _solved(bands, penalty, values - offset) + offset
         free = float(np.sum(1.0 / (1.0 + penalty * waves)))
         square = float(np.sum((values - smooth) ** 2))
         score = n * square / (n - free) ** 2
         if best is None or score < best[0]:
-            best = score, smooth, square / max(n - free, 1.0) * free / n, penalty
+            best = score, smooth, Smoothness(float(np.sqrt(square / max(n - free, 1.0))), penalty)
     assert best is not None
     if share != 1.0:
-        system = share * best[3] * bands
-        system[-1] += 1.0
-        return solveh_banded(system, values - offset, check_finite=False) + offset, float(np.sqrt(best[2]))
-    return best[1], float(np.sqrt(best[2]))
+        return _solved(bands, share * best[2].penalty, values - offset) + offset, best[2]
+    return best[1], best[2]
+
+
+def _solved(bands: FloatArray, penalty: float, values: FloatArray) -> FloatArray:
+    system = penalty * bands
+    system[-1] += 1.0
+    return np.asarray(solveh_banded(system, values, check_finite=False))
 
 
 def _bands(n: int) -> FloatArray:
@@ -56,10 +83,13 @@ def _bands(n: int) -> FloatArray:
     return bands
 
 
-def window_difference(time: FloatArray, values: FloatArray, window_s: float) -> FloatArray:
+def window_difference(
+    time: FloatArray, values: FloatArray, window_s: float, ahead_s: float = 0.0
+) -> FloatArray:
     """Mean over the last window less the mean over the one before, as integrals over time; shape (n,).
 
-    Values are linear between samples, and what they first were before.
+    Values are linear between samples, and what they first were before. Samples that stand for the interval
+    that ends at them hold what was half of it `ahead_s`.
     """
     total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))])
 
@@ -70,5 +100,6 @@ def window_difference(time: FloatArray, values: FloatArray, window_s: float) -> 
         inside = total[i] + step * (values[i] + 0.5 * slope * step)
         return np.where(at < time[0], (at - time[0]) * values[0], inside)
 
-    here, before = integral(time), integral(time - window_s)
-    return np.asarray((here - 2.0 * before + integral(time - 2.0 * window_s)) / window_s)
+    end = time + ahead_s
+    here, before = integral(end), integral(end - window_s)
+    return np.asarray((here - 2.0 * before + integral(end - 2.0 * window_s)) / window_s)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.families.readings import window_difference
+from fogml.gap.families.readings import Smoothness, window_difference
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, LoopEffect
@@ -39,8 +39,8 @@ class Rows:
         Inputs on even rows without a gap, temperatures smooth; which of them are rows.
     readings
         Temperatures as they were read, by name, on the even rows.
-    reading_noise
-        Noise of one even row's smooth temperature, by name [degC].
+    smoothness
+        How they were smoothed, by name.
     replay_errors
         What a lag of the readings of 1 s, and what smoothing leaves, make of the twin's own effects, shape
         (m, 2) [deg/h].
@@ -58,7 +58,7 @@ class Rows:
     even: Inputs
     kept: NDArray[np.bool_]
     readings: Mapping[str, FloatArray]
-    reading_noise: Mapping[str, float]
+    smoothness: Mapping[str, Smoothness]
     by_sample: BySample
     replay_errors: FloatArray
     masked: Mapping[str, int] = field(default_factory=dict)
@@ -191,7 +191,9 @@ def through_nominal(
         if name == DELTA:
             error = errors.get("T", errors.get("T_in"))
             if error is not None:
-                total = total + slope * window_difference(rows.even.time, error, DELTA_WINDOW_S)
+                total = total + slope * window_difference(
+                    rows.even.time, error, DELTA_WINDOW_S, 0.5 * rows.run.sample_s
+                )
             continue
         error = errors.get(name) if name in errors else errors.get({"T": "T_in", "T_in": "T"}.get(name, name))
         if error is not None:

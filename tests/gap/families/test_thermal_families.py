@@ -49,7 +49,8 @@ def test_readings_lose_their_noise_and_keep_their_course():
     course = 30.0 * np.tanh((time - 18000.0) / 3000.0)
     smooth, left = smoothed(np.round(course + 0.03 * rng.standard_normal(1200), 2))
     assert np.std(smooth - course) < 0.012
-    assert 0.5 < left / np.std(smooth - course) < 2.0
+    expected = np.sqrt(np.mean(np.sum(left.errors(1200) ** 2, axis=1)))
+    assert 0.5 < expected / np.std(smooth - course) < 2.0
 
 
 def test_window_differences_are_integrals():
