@@ -34,6 +34,7 @@ from fogml.gap.result import (
 )
 from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import GapOnRun, where
+from fogml.runs.epochs import with_epoch
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.registry import effect
 
@@ -69,6 +70,8 @@ def diagnose(
 
     tell = progress or (lambda what: None)
     check_runs(fit, held_out, noise)
+    # The unit ages from its first run on, whichever it is.
+    fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     part = not held_out
     if part:
         fit, held_out = keep_back(fit)
