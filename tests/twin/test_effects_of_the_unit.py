@@ -140,6 +140,7 @@ def test_light_feeds_noise_gain_and_crosstalk_at_the_same_temperature() -> None:
         leak = {"supply_ratio": 0.0}
         crosstalk = effect("electronic_crosstalk")
         assert crosstalk.signature(dim, **leak) == pytest.approx(more * crosstalk.signature(full, **leak))
+        assert effect("kerr").signature(dim, power_coefficient=-0.05) == pytest.approx(1.0 / more)
         loop, ramp = effect("loop_gain"), 5.0 * at(electronics).time
         slow = loop.signature(dim.with_output(ramp), power_slope=-0.5, leak_time=1e12)
         assert slow[1:] == pytest.approx(-5.0 * more)

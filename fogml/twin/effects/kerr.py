@@ -17,7 +17,7 @@ class Kerr(BiasEffect):
 
     The amplitude A is the bias at 25 degC; it is about zero for a broadband source, whose intensity
     has <I**2> = 2 <I>**2. ``power_coefficient`` c [dB/degC] is that of the light's power, which P_1 - P_2
-    follows.
+    follows; where ``light_power`` is on, the light is the one that it states.
 
     Source: Bergh, Lefevre and Shaw, Optics Letters 7 (1982) 282 (literature); below 1e-3 deg/h with a
     broadband source (engineering).
@@ -39,4 +39,6 @@ class Kerr(BiasEffect):
 
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response per deg/h at 25 degC [deg/h], shape (n,)."""
-        return 10.0 ** (0.1 * shape["power_coefficient"] * inputs.u("T_electronics"))
+        # Per 100 degC, as the unit's light has it.
+        slope = 100.0 * shape["power_coefficient"]
+        return inputs.light.level(inputs.u("T_electronics"), power_slope=slope)

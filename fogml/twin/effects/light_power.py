@@ -17,9 +17,10 @@ class LightPower(BiasEffect):
 
     u = T_electronics - 25. The demodulated signal is in proportion to the light P, what leaks into it is not:
     the constant cross-talk e_0, the amplitude, weighs the more the less light there is. While this effect is
-    on, P is the light of ``arw_physics``, of ``loop_gain`` and of ``electronic_crosstalk`` too, in place of
-    what each states of its own: noise grows, the loop slows down and cross-talk grows at the same
-    temperatures. ``power_loss`` is that of coupling off 25 degC, ``power_slope`` that of source and fibre.
+    on, P is the light of ``arw_physics``, ``loop_gain``, ``electronic_crosstalk`` and ``kerr`` too, in place
+    of what each states of its own: noise grows, the loop slows down and cross-talk grows at the same
+    temperatures. ``power_loss`` is that of coupling off 25 degC, ``power_slope`` that of source and fibre. A
+    noise that the twin states as a number N knows no light; state ``arw_physics`` in its place.
 
     Source: demodulated signal R P sin(phi_m) against an offset (derived); losses of 0.02 to 0.05 dB/degC and
     0.5 to 3 dB over temperature are engineering ranges.

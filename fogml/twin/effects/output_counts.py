@@ -30,7 +30,7 @@ class OutputCounts(LoggerEffect):
     """
 
     id = "output_counts"
-    code = "E11"
+    code = "E12"
     title = "Output in counts"
     amplitude = Quantity("amplitude", "arcsec", (0.01, 1.0), (1e-3, 0.1), "q, one count", (0.0, 1e6))
     needs = ()
