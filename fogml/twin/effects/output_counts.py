@@ -23,8 +23,9 @@ class OutputCounts(LoggerEffect):
     q, the amplitude, is the angle of a count [arcsec]. Nothing is lost: after n samples the sum of the counts
     is the angle to within one of them, so the mean rate has no error, and a mean over tau resolves q / tau. A
     simulation then records the column ``gyro`` in counts a sample, with the fact ``scale_factor`` = dt / q
-    counts per deg/h. Its noise is that of ``quantisation`` with Q = q / sqrt(12), 1 arcsec being 4.85 urad:
-    a twin that counts states no Q.
+    counts per deg/h. Its noise is that of ``quantisation`` with Q = q / sqrt(12), 1 arcsec being 4.85 urad,
+    where noise moves the angle by a count or more a sample; with less of it what is left over beats with the
+    rate, as that of a true counter does. A twin that counts states no Q.
 
     Source: derived; IEEE Std 952, annex C (literature), for its noise; ranges are engineering ones.
     """
