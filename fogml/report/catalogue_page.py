@@ -25,7 +25,8 @@ STAGE_WORDS = {
     "noise": "Random errors",
 }
 
-OVER_RATE = f"Above, what it changes at steady rates, at {RATE_DEGC:g} degC."
+OVER_RATE = ("loop", "readout")
+"""Stages whose effects are shown over the rate too, as every effect is that the programme does not show."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Entry:
     figure: Markup
     programme: str
     words: str
+    curves: list[Markup]
     about: list[tuple[str, str]]
 
 
@@ -47,16 +49,18 @@ def catalogue_page(cards: Sequence[tuple[Mapping[str, Any], Picture, Sequence[Ra
     ----------
     cards
         Card of schema ``fogml.effect/1``, its signature on one programme and its curves over the rate, of
-        each effect in the order of the catalogue. A curve is shown of what the programme does not.
+        each effect in the order of the catalogue.
     """
     stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
     for card, picture, curves in cards:
         drawn = panel(card, picture)
-        figure, where, said = drawn.signature, picture.programme, drawn.words
-        if not drawn.shows:
-            figure = rate_figure(curves[0]) if curves else Markup("")
-            said = f"{said} {OVER_RATE if curves else ''}".strip()
-        entry = Entry(card, quantities_table(card), figure, where, said, about(card))
+        figure = drawn.signature if drawn.shows else Markup("")
+        over_rate = card["stage"] in OVER_RATE or not drawn.shows
+        shapes = [rate_figure(curve) for curve in curves if over_rate]
+        entry = Entry(
+            card, quantities_table(card), figure, picture.programme, drawn.words, shapes, about(card)
+        )
         stages[card["stage"]].append(entry)
     shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
-    return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown)
+    warm = f"{RATE_DEGC:g} degC"
+    return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown, warm=warm)

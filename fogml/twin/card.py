@@ -135,12 +135,17 @@ def prose(declared: Effect) -> Prose:
         if lines.strip() == "::":
             continue
         if lines.startswith(" "):
-            equations.append(textwrap.dedent(lines))
+            equations.append(textwrap.dedent(lines).replace("`", ""))
         elif lines.startswith("Source:"):
-            source = " ".join(lines.removeprefix("Source:").split())
+            source = _plain(lines.removeprefix("Source:"))
         else:
-            remarks.append(" ".join(lines.replace("`", "").split()))
-    return Prose(" ".join(blocks[0].split()), "\n".join(equations), tuple(remarks), source)
+            remarks.append(_plain(lines))
+    return Prose(_plain(blocks[0]), "\n".join(equations), tuple(remarks), source)
+
+
+def _plain(text: str) -> str:
+    """Text in one line without the marks of names."""
+    return " ".join(text.replace("`", "").split())
 
 
 def card_values(declared: Effect) -> dict[str, Any]:
