@@ -75,10 +75,10 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
 
     The ways take turns on each case in this process, unsealed, so that all have loaded what they need.
     """
-    from fogml.gap.blind.folders import BlindFolder, case_files
-    from fogml.gap.blind.make import make_cases
-    from fogml.gap.blind.methods import load_method
-    from fogml.gap.blind.score import score
+    from fogml.blind.folders import BlindFolder, case_files
+    from fogml.blind.make import make_cases
+    from fogml.blind.methods import load_method
+    from fogml.blind.score import score
 
     count = 1 if quick else CASES
     make_cases(folder, count, CASE_SEED, workers=1, kinds=["one"])
@@ -112,7 +112,7 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
 
 def _answered(answer: Callable[[Any, Path], Any], files: Any, out: Path, spent: list[float]) -> str | None:
     """Let a method answer a case and note its time; why it failed, if it did."""
-    from fogml.gap.blind.folders import OUTCOME, OUTCOME_SCHEMA
+    from fogml.blind.folders import OUTCOME, OUTCOME_SCHEMA
 
     begin = time.perf_counter()
     reason = None

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.blind.baselines.answer import Finding, write_answer
-from fogml.gap.blind.baselines.regression import Regression
-from fogml.gap.blind.folders import CaseFiles
+from fogml.blind.baselines.answer import Finding, write_answer
+from fogml.blind.baselines.regression import Regression
+from fogml.blind.folders import CaseFiles
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]

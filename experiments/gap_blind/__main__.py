@@ -21,6 +21,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from fogml.blind.folders import DIAGNOSIS
+from fogml.blind.scoring.marks_file import MARKS, read_marks
 from fogml.cli.blind_job import (
     MakeSettings,
     MergeSettings,
@@ -33,8 +35,6 @@ from fogml.cli.blind_job import (
 )
 from fogml.cli.blind_reports import link_reports
 from fogml.cli.terminal import Terminal
-from fogml.gap.blind.folders import DIAGNOSIS
-from fogml.gap.blind.scoring.marks_file import MARKS, read_marks
 from fogml.outputs import whole_file
 from fogml.report import blind_page
 from fogml.report.error_rates import ERROR_RATES, error_rates

@@ -24,9 +24,9 @@ import numpy as np
 from experiments.gap_blind.limits import gain_bins
 from experiments.gap_blind.per_case import measure_cases, of_seed, true_forms, true_frame, write_page
 from experiments.gap_blind.reach import SHOWN_NATS
+from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.truth import read_truth
 from fogml.gap.basis import build_basis
-from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.truth import read_truth
 from fogml.gap.dictionary import unknown_groups
 from fogml.gap.events import event_groups
 from fogml.gap.evidence import Field, Term, log_sum_exp

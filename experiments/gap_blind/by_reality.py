@@ -15,16 +15,16 @@ from pathlib import Path
 from typing import Any
 
 from experiments.gap_blind.per_case import write_page
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.realities import SAME_TWIN
+from fogml.blind.score import gather
+from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
+from fogml.blind.scoring.marks import Mark
+from fogml.blind.scoring.marks_file import MARKS, read_marks, write_marks
+from fogml.blind.scoring.statistics import proportion
+from fogml.blind.seeds import record_use
 from fogml.cli.blind_job import MakeSettings, RunSettings, make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
-from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
-from fogml.gap.blind.realities import SAME_TWIN
-from fogml.gap.blind.score import gather
-from fogml.gap.blind.scoring.by_reality import ALL, by_form, by_reality
-from fogml.gap.blind.scoring.marks import Mark
-from fogml.gap.blind.scoring.marks_file import MARKS, read_marks, write_marks
-from fogml.gap.blind.scoring.statistics import proportion
-from fogml.gap.blind.seeds import record_use
 from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml

@@ -22,13 +22,13 @@ from pathlib import Path
 import numpy as np
 from sklearn.linear_model import LogisticRegression
 
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.scoring.answers import read_answer
+from fogml.blind.scoring.marks import Mark, mark
+from fogml.blind.scoring.marks_file import read_marks
+from fogml.blind.seeds import is_final, uses
+from fogml.blind.truth import read_truth
 from fogml.errors import InputError
-from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
-from fogml.gap.blind.scoring.answers import read_answer
-from fogml.gap.blind.scoring.marks import Mark, mark
-from fogml.gap.blind.scoring.marks_file import read_marks
-from fogml.gap.blind.seeds import is_final, uses
-from fogml.gap.blind.truth import read_truth
 from fogml.gap.confidence import unknown_features
 from fogml.yaml_text import read_yaml
 

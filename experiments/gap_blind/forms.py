@@ -20,8 +20,8 @@ from typing import Any
 import numpy as np
 
 from experiments.gap_blind.per_case import measure_cases, true_forms, true_frame, write_page
-from fogml.gap.blind.folders import BlindFolder
-from fogml.gap.blind.truth import read_truth
+from fogml.blind.folders import BlindFolder
+from fogml.blind.truth import read_truth
 from fogml.gap.candidate_columns import candidate_columns
 from fogml.gap.screening import Screening
 from fogml.gap.twin_model import TwinModel

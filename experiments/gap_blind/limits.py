@@ -35,11 +35,11 @@ from experiments.gap_blind.reach import (
     shown,
     wrongly_named,
 )
-from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.relatives import Likeness, relatives_of
-from fogml.gap.blind.scoring.answers import read_answer
-from fogml.gap.blind.scoring.marks import mark
-from fogml.gap.blind.truth import Truth, read_contributions, read_truth
+from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.relatives import Likeness, relatives_of
+from fogml.blind.scoring.answers import read_answer
+from fogml.blind.scoring.marks import mark
+from fogml.blind.truth import Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import FloatArray

@@ -34,9 +34,9 @@ from experiments.gap_blind.per_case import HERE, measure_cases, of_seed, true_fo
 from experiments.gap_blind.reach import SHOWN_NATS, STRONG, UNKNOWNS, Figure, effects_and_wrong, shown
 from experiments.gap_blind.strictness import AS_IT_DOES, by_threshold, marks_of
 from experiments.gap_blind.trade import FIRST_WANTED, WRONG_WANTED, Row, best_trade, missed
-from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.relatives import relatives_of
-from fogml.gap.blind.truth import Truth, read_truth
+from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.relatives import relatives_of
+from fogml.blind.truth import Truth, read_truth
 from fogml.gap.classes import SAME_CLASS_NATS
 from fogml.gap.twin_model import TwinModel
 from fogml.outputs import whole_file

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from joblib import Parallel, delayed
 
-from fogml.gap.blind.folders import BlindFolder, case_files
-from fogml.gap.blind.truth import FloatArray, Truth, read_contributions, read_truth
+from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.truth import FloatArray, Truth, read_contributions, read_truth
 from fogml.gap.frame import Frame
 from fogml.gap.observation import observe
 from fogml.gap.run_whitener import RunWhitener

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fogml.gap.blind.scoring.statistics import open_set
+from fogml.blind.scoring.statistics import open_set
 
 SHOWN_NATS = 8.0
 MISSED_FORMS = 0.05

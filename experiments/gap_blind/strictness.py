@@ -13,10 +13,10 @@ from dataclasses import replace
 from typing import Any
 
 from experiments.gap_blind.per_case import HERE, write_page
-from fogml.gap.blind.folders import DIAGNOSIS
-from fogml.gap.blind.scoring.marks import Mark, renamed
-from fogml.gap.blind.scoring.marks_file import read_marks
-from fogml.gap.blind.scoring.table import rows
+from fogml.blind.folders import DIAGNOSIS
+from fogml.blind.scoring.marks import Mark, renamed
+from fogml.blind.scoring.marks_file import read_marks
+from fogml.blind.scoring.table import rows
 from fogml.report.blind_words import value_text, wanted_text
 from fogml.report.words import plural
 

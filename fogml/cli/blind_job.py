@@ -8,16 +8,16 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from pydantic import field_validator
 
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.cli.blind_reports import draw_reports, link_reports
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
-from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.json_files import write_json
 from fogml.outputs import whole_file, whole_folder
 
 if TYPE_CHECKING:
-    from fogml.gap.blind.scoring.marks_file import Marks
+    from fogml.blind.scoring.marks_file import Marks
 
 LEDGER = "experiments/gap_blind/final_uses.json"
 _WANTED = "wanted"
@@ -109,7 +109,7 @@ class ScoreSettings(SuiteSettings):
         """``["figure=value", "wanted", ...]`` as flags give them, or a mapping as YAML does."""
         if not isinstance(value, list):
             return value
-        from fogml.gap.blind.score import wanted_gates
+        from fogml.blind.score import wanted_gates
 
         gates: dict[str, float] = wanted_gates() if _WANTED in value else {}
         for text in value:
@@ -136,7 +136,7 @@ class MergeSettings(Settings):
 
 def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
     """Make cases, and say how many there are."""
-    from fogml.gap.blind.make import make_cases
+    from fogml.blind.make import make_cases
 
     folder, kinds = settings.folder(), settings.kinds or None
     if settings.leave_one_out:
@@ -158,7 +158,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             d_prime=settings.bounds,
         )
     if not settings.relatives_stay:
-        from fogml.gap.blind.without import leave_out_relatives
+        from fogml.blind.without import leave_out_relatives
 
         with terminal.work("leaving out relatives") as work:
             leave_out_relatives(
@@ -166,7 +166,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
                 settings.workers,
                 lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
             )
-    from fogml.gap.blind.form_distance import measure_forms
+    from fogml.blind.form_distance import measure_forms
 
     with terminal.work("measuring forms") as work:
         measure_forms(
@@ -185,9 +185,9 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer cases by each method, and say how many failed."""
-    from fogml.gap.blind.methods import BASELINES, ORACLE
-    from fogml.gap.blind.oracle_run import run_oracle
-    from fogml.gap.blind.run import RunPlan, run_cases
+    from fogml.blind.methods import BASELINES, ORACLE
+    from fogml.blind.oracle_run import run_oracle
+    from fogml.blind.run import RunPlan, run_cases
 
     methods = [m for name in settings.methods for m in (BASELINES if name == _BASELINES else (name,))]
     if len(methods) > 1 and settings.name:
@@ -222,8 +222,8 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
 
 def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     """Score a suite, write ``score.json``, its page and its marks; whether every gate is met."""
-    from fogml.gap.blind.score import gate, gather
-    from fogml.gap.blind.scoring.values import score_values
+    from fogml.blind.score import gate, gather
+    from fogml.blind.scoring.values import score_values
 
     folder = settings.folder()
     methods = settings.methods or list(folder.methods())
@@ -247,8 +247,8 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
 
 def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     """Score the parts of a suite as one, write ``score.json``, its page and its marks."""
-    from fogml.gap.blind.scoring.merging import merged
-    from fogml.gap.blind.scoring.values import score_values
+    from fogml.blind.scoring.merging import merged
+    from fogml.blind.scoring.values import score_values
 
     if not settings.out:
         raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
@@ -261,7 +261,7 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
 
 
 def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str) -> None:
-    from fogml.gap.blind.scoring.marks_file import MARKS, write_marks
+    from fogml.blind.scoring.marks_file import MARKS, write_marks
     from fogml.report.blind_page import blind_page
 
     with whole_folder(out, shared=True) as staging:

@@ -8,15 +8,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.cli.terminal import Terminal
-from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 
 _REPORTS = "reports"
 
 
 def draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], seed: int, terminal: Terminal) -> None:
     """Diagnose the worst cases once more, to draw their pages into the suite's folder ``reports``."""
-    from fogml.gap.blind.run import RunPlan, run_cases
+    from fogml.blind.run import RunPlan, run_cases
 
     names = tuple(case["case"] for case in worst if case["verdict"] != "failed")
     method = "fogml.report.blind_answer:diagnosis_with_page"

@@ -11,7 +11,7 @@ __all__ = ["diagnose"]
 
 
 def __getattr__(name: str) -> Any:
-    # The second reality of the blind suite lives in this package and must not load the twin.
+    # What only reads how sure a diagnosis is need not load the twin.
     if name == "diagnose":
         from fogml.gap.diagnosis import diagnose
 

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fogml.gap.blind.folders import CaseFiles
-from fogml.gap.blind.methods import diagnosis
+from fogml.blind.folders import CaseFiles
+from fogml.blind.methods import diagnosis
 
 
 def diagnosis_with_page(case: CaseFiles, out: Path) -> None:

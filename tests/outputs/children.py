@@ -55,8 +55,8 @@ class HangingRuns:
 
 def blind(home: Path) -> None:
     """Two sealed workers of a blind suite."""
-    from fogml.gap.blind.folders import BlindFolder
-    from fogml.gap.blind.run import RunPlan, run_cases
+    from fogml.blind.folders import BlindFolder
+    from fogml.blind.run import RunPlan, run_cases
 
     plan = RunPlan(BlindFolder(home / "suite"), "hanging:hang", code=home / "code", workers=2)
     run_cases(plan)

@@ -23,11 +23,12 @@ ALLOWED = {
     "validation": FIRST | {"models"},
     "twin": GROUND,
     "gap": GROUND | {"twin"},
+    "blind": GROUND | {"twin", "gap"},
     "tuning": FIRST | {"models", "validation"},
     "export": FIRST | {"models", "validation"},
     "lab": FIRST | {"models", "validation", "twin"},
     "fleet": FIRST | {"models", "validation", "tuning", "twin", "gap"},
-    "report": FIRST | {"models", "validation", "twin", "gap", "tuning", "export", "lab", "fleet"},
+    "report": FIRST | {"models", "validation", "twin", "gap", "blind", "tuning", "export", "lab", "fleet"},
     "testing": FIRST | {"models", "validation", "twin", "gap"},
 }
 ALLOWED["cli"] = set(ALLOWED) - {"testing"}

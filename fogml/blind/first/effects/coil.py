@@ -1,0 +1,180 @@
+"""Bias of the winding: gradients, strain, glass transition, leads."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import erf
+
+from fogml.blind.first.recurrences import lag, recurrence
+from fogml.blind.frame.form import Additive, Demands, Shape
+from fogml.blind.frame.record import FloatArray, World
+
+_LEAD_DEG_H_PER_M = 0.525
+
+
+def _winding_weights(shells: int, cubic: float) -> FloatArray:
+    """Weights of the shells in Shupe's integral: odd about the middle, sum of the outer half 1."""
+    x = np.linspace(-1.0, 1.0, shells)
+    w = x + cubic * x**3
+    return np.asarray(2.0 * w / np.abs(w).sum())
+
+
+class WarmupStretched(Additive):
+    """A stretched exponential of the time since power-on."""
+
+    name, form, demands = "warmup_bias", "stretched exponential", Demands(power_on=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Time constant and exponent."""
+        return {"time_constant": rng.uniform(300.0, 1500.0), "exponent": rng.uniform(0.6, 0.9)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """exp(-(t / tau)**beta)."""
+        t = np.maximum(world.time_on, 0.0)
+        return np.exp(-((t / shape["time_constant"]) ** shape["exponent"]))
+
+
+class ShupeShells(Additive):
+    """Shupe's integral over all shells of the winding."""
+
+    name, form, unit, faces = "shupe_pure", "integral over shells", "deg/h/(degC/min)", True
+    fine_sensors = True
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Cubic part of the weights over the thickness."""
+        return {"cubic": rng.uniform(0.0, 0.4)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Outer half's rate less inner half's, weighted; scaled to faces' rates for a straight profile."""
+        shells = world.shell_rates.shape[1]
+        w = _winding_weights(shells, shape["cubic"])
+        straight = float(w @ np.linspace(0.0, 1.0, shells))
+        return world.shell_rates @ w / straight
+
+
+class MohrCurved(Additive):
+    """Strain of the winding whose sensitivity to the rate grows exponentially over temperature."""
+
+    name, form = "shupe_mohr", "exponential over temperature"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Slope and curvature of the sensitivity's logarithm."""
+        sign = 1.0 if rng.random() < 0.5 else -1.0
+        return {"slope": sign * rng.uniform(0.008, 0.016), "curvature": rng.uniform(-3e-5, 3e-5)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """exp(a u + c u**2) dT/dt of the winding's mean."""
+        u = world.nodes["T_coil"] - 25.0
+        growth = np.exp(np.clip(u * (shape["slope"] + shape["curvature"] * u), -2.0, 2.0))
+        return growth * world.rates["T_coil"]
+
+
+class RateProduct(Additive):
+    """Product of the winding's mean temperature and its rate, bending over at the ends."""
+
+    name, form, unit = "temperature_rate_product", "saturating product", "deg/h/degC/(degC/min)"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Middle and bend of the product."""
+        return {"middle": rng.uniform(20.0, 30.0), "bend": rng.uniform(90.0, 200.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """u / sqrt(1 + (u / bend)**2) dT/dt."""
+        u = world.nodes["T_coil"] - shape["middle"]
+        return u / np.sqrt(1.0 + (u / shape["bend"]) ** 2) * world.rates["T_coil"]
+
+
+class GlassGaussian(Additive):
+    """A Gaussian peak of the sensitivity to the rate, and a static step by the error function."""
+
+    name, form, unit = "glass_transition", "Gaussian peak and error function", "deg/h/(degC/min)"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Transition, width, static part, shift of the transition per decade of rate."""
+        return {
+            "transition_temperature": rng.uniform(-25.0, 55.0),
+            "width": rng.uniform(3.0, 10.0),
+            "static_ratio": rng.uniform(0.0, 0.2),
+            "shift": rng.uniform(2.0, 4.0),
+        }
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """dT/dt exp(-0.75 x**2) + r (1 + erf(x)) / 2 with x = (T - T_g) / w."""
+        rate = world.rates["T_in"]
+        transition = shape["transition_temperature"] + shape["shift"] * np.log10(np.hypot(rate, 0.02))
+        x = (world.nodes["T_in"] - transition) / shape["width"]
+        return rate * np.exp(-0.75 * x * x) + 0.5 * shape["static_ratio"] * (1.0 + erf(x))
+
+
+class Leads(Additive):
+    """Leads along the way from the electronics to the hub and to the case."""
+
+    name, form = "pigtail_shupe", "leads past hub and case"
+    records, fine_sensors = ("T_electronics", "T_case"), True
+    demands = Demands(power_steps=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Ratio of the lengths, share of the hub in what the first lead feels, lag of its jacket [s]."""
+        ratio, share = rng.uniform(0.3, 2.0), rng.uniform(0.0, 0.03)
+        return {"length_ratio": ratio, "hub_share": share, "jacket": rng.uniform(10.0, 40.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """n c_T (l_1 (dT_1/dt - dT_coil/dt) - l_2 (dT_case/dt - dT_coil/dt)) / D."""
+        h, coil = shape["hub_share"], world.rates["T_coil"]
+        around = (1.0 - h) * world.rates["T_electronics"] + h * world.rates["T_hub"]
+        first = lag(world.sample_s, around, shape["jacket"])
+        second = world.rates["T_case"] - coil
+        return _LEAD_DEG_H_PER_M * (first - coil - shape["length_ratio"] * second)
+
+
+class SideWind(Additive):
+    """A gradient across the coil's diameter, from air that blows from one side."""
+
+    name, form, unit, faces = "azimuthal_gradient", "integral over shells", "deg/h/(degC/min)", True
+    fine_sensors = True
+    demands = Demands(slow_turns=True)
+    records = ("angle",)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Direction of the air."""
+        return {"phase": rng.uniform(0.0, 360.0), "cubic": rng.uniform(0.0, 0.4)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """cos(angle - phase) d(T_out - T_in)/dt."""
+        return world.mean_cosine(1.0, shape["phase"]) * ShupeShells().response(world, shape, rng)
+
+
+class SlipEvents(Additive):
+    """Single slips of random height while the winding's rate is above a threshold; they creep back."""
+
+    name, form = "thermal_shock", "single slips of random height"
+    demands, quick_plant = Demands(shock=True), True
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Threshold and time of creeping back."""
+        return {"threshold": rng.uniform(3.0, 5.0), "time_constant": rng.uniform(1800.0, 36000.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Relaxing sum of slips: as many as chance has it, gamma distributed in height."""
+        rate = world.rates["T_in"]
+        excess = np.sign(rate) * np.maximum(np.abs(rate) - shape["threshold"], 0.0)
+        # Four slips per degC of mean height 1/4 keep the mean of the catalogue's form. They are counted: of a
+        # process without a smallest slip a short excess would show 1e-60 of what a longer one does.
+        travelled = excess * world.sample_s / 60.0
+        count = rng.poisson(4.0 * np.abs(travelled))
+        heights = rng.gamma(np.maximum(4.0 * count, 1.0), 1.0 / 16.0)
+        slips = np.where(count > 0, heights, 0.0) * np.sign(travelled)
+        decay = np.full(len(slips), world.sample_s / shape["time_constant"])
+        return recurrence(decay, slips, 0.0)
+
+
+FORMS = (
+    WarmupStretched,
+    ShupeShells,
+    MohrCurved,
+    RateProduct,
+    GlassGaussian,
+    Leads,
+    SideWind,
+    SlipEvents,
+)

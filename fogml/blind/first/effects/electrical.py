@@ -1,0 +1,206 @@
+"""Bias that electronics, supply, chamber machines and fields drive; static bias over temperature."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fogml.blind.first.recurrences import lag
+from fogml.blind.frame.form import Additive, Demands, Shape
+from fogml.blind.frame.record import FloatArray, World
+
+
+class PolarisationChirped(Additive):
+    """A beat over the electronics' temperature whose period drifts over it."""
+
+    name, form, unit = "polarization_nonreciprocity", "beat with a drifting period", "deg/h"
+    records = ("T_electronics",)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Period and phase at 25 degC, relative change of the period per degC."""
+        return {
+            "period": float(np.exp(rng.uniform(np.log(2.0), np.log(15.0)))),
+            "phase": rng.uniform(0.0, 360.0),
+            "drift": rng.uniform(-2e-4, 2e-4),
+        }
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """sin(2 pi u (1 + drift u) / period + phase)."""
+        u = world.nodes["T_electronics"] - 25.0
+        turns = u * (1.0 + shape["drift"] * u) / shape["period"]
+        return np.sin(2.0 * np.pi * turns + np.radians(shape["phase"]))
+
+
+class BiasCurve(Additive):
+    """Static bias of third to sixth order."""
+
+    name, form, unit = "bias_polynomial", "orders three to six", "deg/h"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Ratios of the higher orders to the third."""
+        ratios = {"quartic_ratio": rng.uniform(-1.0, 1.0), "quintic_ratio": rng.uniform(-1.0, 1.0)}
+        return ratios | {"sixth_ratio": rng.uniform(-0.1, 0.1)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """v**3 + r4 v**4 + r5 v**5 + r6 v**6 with v = u / 50."""
+        v = (world.nodes["T_in"] - 25.0) / 50.0
+        higher = shape["quartic_ratio"] + v * (shape["quintic_ratio"] + v * shape["sixth_ratio"])
+        return np.asarray(v**3 * (1.0 + v * higher))
+
+
+class MachinePickup(Additive):
+    """Pick-up of heater and compressor, a little bent over their duty and a little late."""
+
+    name, form, unit = "chamber_pickup", "bent over the duty", "deg/h"
+    records = ("heater", "compressor")
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Exponent over the duty, delay [s]."""
+        return {"exponent": rng.uniform(0.95, 1.05), "delay": rng.uniform(0.5, 3.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """heater**p + compressor, lagged."""
+        duty = world.drives["heater"] ** shape["exponent"] + world.drives["compressor"]
+        return lag(world.sample_s, duty, shape["delay"])
+
+
+class FieldBent(Additive):
+    """Sensitivity to a field behind a shield that saturates a little."""
+
+    name, form, unit = "magnetic", "shield that saturates", "deg/h/G"
+    records = ("B_x", "B_y", "B_z")
+    demands = Demands(slow_turns=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Direction, ratio of the axial part, bend of the shield over the field."""
+        return {
+            "phase": rng.uniform(0.0, 360.0),
+            "axial_ratio": rng.uniform(0.1, 0.5),
+            "bend": rng.uniform(0.0, 0.05),
+        }
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """B / (1 - bend B / 50 uT) of the field along the sensitive direction [G]."""
+        psi = np.radians(shape["phase"])
+        d = world.drives
+        along = np.cos(psi) * d["B_x"] + np.sin(psi) * d["B_y"] + shape["axial_ratio"] * d["B_z"]
+        return along * (1.0 + shape["bend"] * np.abs(along) / 50.0) / 100.0
+
+
+class SupplyTriangle(Additive):
+    """Supply voltage and a ripple of triangular form."""
+
+    name, form, unit = "supply_ripple", "triangular ripple", "deg/h/V"
+    records = ("supply",)
+    demands = Demands(power_steps=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Size of the ripple, its alias, its phase."""
+        return {
+            "ripple": rng.uniform(0.05, 0.5),
+            "alias_frequency": float(np.exp(rng.uniform(np.log(1e-4), np.log(1e-2)))),
+            "phase": rng.uniform(0.0, 360.0),
+        }
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """V - V_0 + a triangle(t)."""
+        turn = shape["alias_frequency"] * world.time + shape["phase"] / 360.0
+        wave = 2.0 * np.arcsin(np.sin(2.0 * np.pi * turn)) / np.pi
+        supply = world.drives["supply"]
+        return np.asarray(supply - supply[0] + shape["ripple"] * wave)
+
+
+class Crosstalk(Additive):
+    """Cross-talk that grows with the electronics' temperature, a little more when hot."""
+
+    name, form, unit = "electronic_crosstalk", "bent over temperature", "deg/h/degC"
+    records = ("T_electronics", "supply")
+    demands = Demands(power_steps=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Part of the supply, bend over temperature."""
+        return {"supply_ratio": rng.uniform(-20.0, 20.0), "bend": rng.uniform(-1e-3, 1e-3)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """u (1 + bend u) + ratio (V - V_0)."""
+        u = world.nodes["T_electronics"] - 25.0
+        supply = world.drives["supply"]
+        return np.asarray(u * (1.0 + shape["bend"] * u) + shape["supply_ratio"] * (supply - supply[0]))
+
+
+class TurnOn(Additive):
+    """Another bias after each power-on, from Student's distribution."""
+
+    name, form, several_runs = "turn_on_bias", "Student's distribution", True
+    drawn_per_run = True
+    demands = Demands(power_on=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Degrees of freedom."""
+        return {"freedom": rng.uniform(4.0, 10.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """A constant of this run."""
+        return np.full(len(world.time), rng.standard_t(shape["freedom"]))
+
+
+class Rectification(Additive):
+    """Vibration rectified by a power near two."""
+
+    name, form, unit, records = "vibration_rectification", "power near two", "deg/h/g2", ("vibration",)
+    largest = 5.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """The power."""
+        return {"exponent": rng.uniform(1.8, 2.2)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """(g / 0.1)**p * 0.01, which is g**2 at 0.1 g."""
+        return 0.01 * (world.drives["vibration"] / 0.1) ** shape["exponent"]
+
+
+class DriftBent(Additive):
+    """A steady drift."""
+
+    name, stage, form, unit = "rate_ramp", "noise", "line", "deg/h/h"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """None."""
+        return {}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Hours since the first sample."""
+        return world.time / 3600.0
+
+
+class WanderingLine(Additive):
+    """A line whose phase wanders a little."""
+
+    name, stage, form, unit = "sinusoidal", "noise", "line of wandering phase", "deg/h"
+    drawn_per_run = True
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Frequency and phase."""
+        return {
+            "frequency": float(np.exp(rng.uniform(np.log(1e-3), np.log(2e-2)))),
+            "wander": rng.uniform(0.0, 0.2),
+        }
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """sin(2 pi f t + phase + random walk of `wander` rad per sqrt(h))."""
+        steps = rng.standard_normal(len(world.time)) * np.sqrt(world.sample_s / 3600.0)
+        phase = 2.0 * np.pi * rng.random() + shape["wander"] * np.cumsum(steps)
+        return np.sin(2.0 * np.pi * shape["frequency"] * world.time + phase)
+
+
+FORMS = (
+    PolarisationChirped,
+    BiasCurve,
+    MachinePickup,
+    FieldBent,
+    SupplyTriangle,
+    Crosstalk,
+    TurnOn,
+    Rectification,
+    DriftBent,
+    WanderingLine,
+)

@@ -1,0 +1,69 @@
+"""Sensors that don't show what they sit on."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from fogml.blind.first.recurrences import lag
+from fogml.blind.frame.form import Sensing, Shape
+from fogml.blind.frame.record import FloatArray, World
+
+
+class LagOfTwoStages(Sensing):
+    """A sensor behind glue and housing: two stages of lag."""
+
+    name, form, unit, fine_sensors = "sensor_lag", "two stages", "s", True
+    greatest: ClassVar[float] = 900.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Share of the second stage."""
+        return {"second_share": rng.uniform(0.1, 0.5)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """Two lags whose time constants add up to the amplitude."""
+        share = shape["second_share"]
+        first = lag(world.sample_s, temperature, amplitude * (1.0 - share))
+        return lag(world.sample_s, first, amplitude * share)
+
+
+class CoarseSteps(Sensing):
+    """A converter with whole steps that it cuts off rather than rounds."""
+
+    name, form, unit = "sensor_quantisation", "truncation", "degC"
+    greatest: ClassVar[float] = 2.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Where the steps lie."""
+        return {"offset": rng.uniform(0.0, 1.0)}
+
+    def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
+        """Whole steps, in the mean unbiased."""
+        steps = np.floor(values / amplitude + shape["offset"])
+        return np.round(amplitude * (steps + 0.5 - shape["offset"]), 7)
+
+
+class Elsewhere(Sensing):
+    """Sensors that feel the case as well, the outer ones more."""
+
+    name, form, unit, fine_sensors = "sensor_placement", "outer sensors more", "1", True
+    records = ("T_case",)
+    greatest: ClassVar[float] = 1.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """How much more the outer ones feel it."""
+        return {"outer": rng.uniform(0.9, 1.2)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """A mix of the place and the case."""
+        outer = name in ("T_out", "T2", "T4")
+        share = amplitude * (shape["outer"] if outer else 1.0)
+        return temperature + share * (world.nodes["T_case"] - temperature)
+
+
+FORMS = (LagOfTwoStages, CoarseSteps, Elsewhere)

@@ -1,0 +1,157 @@
+"""What turning shows: scale factor, dead zone, table, mount."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
+from fogml.blind.frame.record import EARTH_DEG_H, FloatArray, World
+
+
+class SourceBent(ScaleFactor):
+    """Wavelength of the source, a little curved over its temperature."""
+
+    name, form, unit, records = "source_wavelength", "curved", "ppm/degC", ("T_electronics",)
+    demands = Demands(turns=True, power_steps=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Curvature [1/degC]."""
+        return {"bend": rng.uniform(-1.5e-3, 1.5e-3)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """-u (1 + bend u)."""
+        u = world.nodes["T_electronics"] - 25.0
+        return -u * (1.0 + shape["bend"] * u)
+
+
+class ModulatorLoop(ScaleFactor):
+    """Half-wave voltage behind a 2 pi loop that converges hyperbolically."""
+
+    name, form, unit, records = "halfwave_voltage", "hyperbolic convergence", "ppm/degC", ("T_electronics",)
+    demands = Demands(turns=True, power_steps=True, power_on=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """What the loop leaves, its time constant."""
+        return {"residual": rng.uniform(0.01, 0.03), "time_constant": rng.uniform(1.0, 60.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """u (1 + (1 / rho - 1) / (1 + t / tau)**3)."""
+        late = np.maximum(world.time_on, 0.0) / shape["time_constant"]
+        unlearned = (1.0 / shape["residual"] - 1.0) / (1.0 + late) ** 3
+        return (world.nodes["T_electronics"] - 25.0) * (1.0 + unlearned)
+
+
+class PowerLaw(ScaleFactor):
+    """Scale factor that grows with a power of the rate."""
+
+    name, form = "sf_nonlinearity", "power law"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """The power, from linear to quadratic."""
+        return {"exponent": rng.uniform(1.0, 2.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """(|Omega| / 100 deg/s)**p."""
+        return (np.abs(world.rate_deg_h) / 360000.0) ** shape["exponent"]
+
+
+class Asymmetry(ScaleFactor):
+    """Scale factors of the two directions, with an algebraic transition at zero."""
+
+    name, form, unit = "sf_asymmetry", "algebraic transition", "ppm"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Width of the transition [deg/h]."""
+        return {"width": rng.uniform(0.3, 3.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """w / sqrt(w**2 + width**2)."""
+        w = world.rate_deg_h
+        return w / np.hypot(w, shape["width"])
+
+
+class DeadZone(Distorting):
+    """A soft dead zone: what it swallows is gone a little beyond it."""
+
+    name, stage, form, unit = "deadband", "loop", "exponential knee", "deg/h"
+    demands, horizontal = Demands(turns=True, small_rates=True), True
+    greatest: ClassVar[float] = 20.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Sharpness of the knee."""
+        return {"knee": rng.uniform(1.0, 2.0)}
+
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """w (1 - exp(-|w / w_d|**(2 n))), with w_d the amplitude and n the knee."""
+        return -output * np.expm1(-(np.abs(output / amplitude) ** (2.0 * shape["knee"])))
+
+
+class Skew(Distorting):
+    """Samples that carry the time of later ones; the skew grows, so that no one number of it compares."""
+
+    name, stage, form = "logger_skew", "logger", "growing skew"
+    greatest: ClassVar[float] = 300.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Growth per hour."""
+        return {"growth": rng.uniform(0.0, 0.3)}
+
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """y(t - d), straight between samples."""
+        delay = amplitude * (1.0 + shape["growth"] * world.time / 3600.0)
+        return np.interp(world.time - delay, world.time, output)
+
+
+def _pick_up(world: World, direction_deg: float) -> FloatArray:
+    """Earth rate that an upright axis picks up per radian of tilt carried round by the table [deg/h]."""
+    north = EARTH_DEG_H * np.cos(np.radians(world.set_up.latitude))
+    return north * world.mean_cosine(1.0, -direction_deg)
+
+
+class Cone(Additive):
+    """An input axis that goes round on a cone, the cone a little elliptic."""
+
+    name, stage, form, unit = "input_axis_misalignment", "rig", "elliptic cone", "mrad"
+    records, demands = ("angle",), Demands(slow_turns=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Direction, second harmonic."""
+        return {"direction": rng.uniform(0.0, 360.0), "ellipse": rng.uniform(0.0, 0.1)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Pick-up per mrad, and a second harmonic."""
+        north = EARTH_DEG_H * np.cos(np.radians(world.set_up.latitude))
+        second = shape["ellipse"] * world.mean_cosine(2.0, -2.0 * shape["direction"])
+        return np.asarray(1e-3 * (_pick_up(world, shape["direction"]) + north * second))
+
+
+class UnevenTable(Additive):
+    """A table that turns unevenly, with a harmonic of the harmonic."""
+
+    name, stage, form, unit = "table_rate_error", "rig", "two harmonics", "ppm"
+    records, demands = ("angle",), Demands(slow_turns=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Periods a turn, phase, share of twice the harmonic."""
+        harmonic = float(rng.choice([1, 2, 3, 4, 6, 8, 12]))
+        return {"harmonic": harmonic, "phase": rng.uniform(0.0, 360.0), "second": rng.uniform(0.0, 0.2)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """rate (cos(k angle + phase) + share cos(2 k angle + phase))."""
+        k, phase = shape["harmonic"], -shape["phase"]
+        uneven = world.mean_cosine(k, phase) + shape["second"] * world.mean_cosine(2.0 * k, phase)
+        return np.asarray(3600e-6 * world.table_rate * uneven)
+
+
+FORMS = (
+    SourceBent,
+    ModulatorLoop,
+    PowerLaw,
+    Asymmetry,
+    DeadZone,
+    Skew,
+    Cone,
+    UnevenTable,
+)

@@ -1,0 +1,164 @@
+"""Thermometers: each with a gain and an offset of its own, a small lag, noise and steps."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.blind.frame import nominal
+from fogml.blind.frame.operators import late
+from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.strength import Scales
+from fogml.blind.frame.unit import Unit, UnitRun
+
+_AT_REST, _IN_TURNS = 0.1, 0.4
+"""What the thermometers' noise may add to the gyro's white noise in a sample, rms, in shares of it."""
+
+_LAG_D_PRIME = 1.0
+"""Largest d' of what the thermometers' own lags do to a replay: where nothing is missing, nothing shows."""
+
+
+@dataclass(frozen=True)
+class Thermometer:
+    """Readings are (1 + ``gain``) T + ``offset`` degC of what it feels ``lag_s`` late."""
+
+    place: str
+    gain: float
+    offset: float
+    lag_s: float
+
+
+@dataclass(frozen=True)
+class Instruments:
+    """What is recorded of a unit, and how well.
+
+    Attributes
+    ----------
+    layout, others, noise, resolution
+        As `fogml.blind.frame.unit.Thermometers` has them.
+    each
+        Thermometers by recorded name.
+    """
+
+    layout: str
+    others: tuple[str, ...]
+    noise: float
+    resolution: float
+    each: dict[str, Thermometer]
+
+    @property
+    def coil(self) -> dict[str, str]:
+        """Recorded coil sensors to the face each sits on."""
+        return {name: one.place for name, one in self.each.items() if name not in self.others}
+
+    @property
+    def two_faces(self) -> bool:
+        """Whether there is a sensor on the outer face."""
+        return self.layout != "one"
+
+
+def draw_instruments(
+    rng: np.random.Generator,
+    faces: bool,
+    fine: bool,
+    needed: tuple[str, ...],
+    white: float,
+    slopes: tuple[float, float],
+) -> Instruments:
+    """A unit's instruments: as good as its gyro takes them, so that a replay's error is lost in the noise.
+
+    Parameters
+    ----------
+    faces, fine, needed
+        Whether both faces of the coil are wanted, whether good sensors are, and which further columns.
+    white
+        The gyro's white noise in a sample, rms [deg/h].
+    slopes
+        What a degree does to a replay's output, rms, at rest and in a fast turn [deg/h/degC].
+    """
+    layout = str(rng.choice(["two", "two", "four"] if faces else ["one", "two", "four"]))
+    chance = {"T_case": 0.4, "T_chamber": 0.6, "T_electronics": 0.3, "supply": 0.25, "humidity": 0.25}
+    chance |= {"compressor": 0.3, "heater": 0.3, "vibration": 0.2, "power": 0.3}
+    others = [name for name, p in chance.items() if (rng.random() < p) | (name in needed)]
+    others += [name for name in needed if name not in chance]
+    rest, turning = slopes
+    most = min(_AT_REST * white / (rest + 1e-30), _IN_TURNS * white / (turning + 1e-30))
+    error = min(float(np.exp(rng.uniform(np.log(1e-3), np.log(8e-3)))) * (0.3 if fine else 1.0), most)
+    steps = [q for q in (0.02, 0.01, 0.005, 0.002, 0.001, 1e-4) if q < 2.0 * error]
+    coil = {"one": ("T",), "two": ("T_in", "T_out"), "four": ("T1", "T2", "T3", "T4")}[layout]
+    places = {name: "T_out" if name in ("T_out", "T2", "T4") else "T_in" for name in coil}
+    places |= {name: name for name in others if name.startswith("T_")}
+
+    def thermometer(name: str, place: str) -> Thermometer:
+        lag = 2.0 if name in coil else 10.0
+        gain, offset = rng.normal(0.0, 1e-3), rng.normal(0.0, 0.1)
+        return Thermometer(place, float(gain), float(offset), float(lag * rng.uniform(0.2, 1.0)))
+
+    each = {name: thermometer(name, place) for name, place in places.items()}
+    return Instruments(layout, tuple(others), error, max(steps, default=1e-5), each)
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What a run's thermometers feel, by recorded name [degC], shape (n,) each; their noise."""
+
+    felt: dict[str, FloatArray]
+    noise: dict[str, FloatArray]
+    instruments: Instruments
+
+    def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """Recorded columns; of other `felt` temperatures with the same noise, if given."""
+        q, exact = self.instruments.resolution, self.exact(felt)
+        return {n: np.round(np.round((x + self.noise[n]) / q) * q, 7) for n, x in exact.items()}
+
+    def exact(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """The same without noise and steps."""
+        each = self.instruments.each
+        held = self.felt if felt is None else felt
+        return {name: (1.0 + each[name].gain) * x + each[name].offset for name, x in held.items()}
+
+
+def slower(instruments: Instruments, factor: float) -> Instruments:
+    """The same thermometers with all their lags times a factor."""
+    each = {name: replace(one, lag_s=factor * one.lag_s) for name, one in instruments.each.items()}
+    return replace(instruments, each=each)
+
+
+def sense(rng: np.random.Generator, world: World, instruments: Instruments) -> Sensed:
+    """The thermometers of one run."""
+    noise = {name: instruments.noise * rng.standard_normal(len(world.time)) for name in instruments.each}
+    return Sensed(felt_by(instruments, world), noise, instruments)
+
+
+def felt_by(instruments: Instruments, world: World) -> dict[str, FloatArray]:
+    """What thermometers feel, by recorded name [degC]."""
+    each = instruments.each.items()
+    return {name: late(world.nodes[one.place], one.lag_s, world.sample_s) for name, one in each}
+
+
+def quick_enough(unit: Unit, instruments: Instruments) -> Unit:
+    """The unit with thermometers so quick that what their lag alone does to a replay is lost in the noise."""
+
+    def falsified(run: UnitRun) -> FloatArray:
+        assert isinstance(run.sensed, Sensed)
+        replayed = nominal.output(unit.constants, unit.seen(run, run.sensed.exact()))
+        missed = unit.output(run) - replayed
+        return missed[unit.skipped :]
+
+    length = Scales(unit).projected().length([falsified(run) for run in unit.fit])
+    if length <= _LAG_D_PRIME:
+        return unit
+    quicker = slower(instruments, 0.8 * _LAG_D_PRIME / length)
+
+    def again(run: UnitRun) -> UnitRun:
+        assert isinstance(run.sensed, Sensed)
+        return replace(run, sensed=Sensed(felt_by(quicker, run.world), run.sensed.noise, quicker))
+
+    return replace(
+        unit,
+        instruments=quicker,
+        fit=tuple(again(run) for run in unit.fit),
+        held_out=tuple(again(run) for run in unit.held_out),
+        static=again(unit.static) if unit.static else None,
+    )

@@ -1,0 +1,173 @@
+"""One unit and its runs, in the form in which every reality draws them: no effect is in them yet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Protocol
+
+import numpy as np
+
+from fogml.blind.frame import nominal
+from fogml.blind.frame.record import FloatArray, SetUp, World
+from fogml.blind.frame.whitening import NoiseLaw, Whitening
+
+
+class Thermometers(Protocol):
+    """What a unit's thermometers are.
+
+    Attributes
+    ----------
+    layout
+        Sensors on the coil: ``one`` for T, ``two`` for T_in and T_out, ``four`` for T1 to T4.
+    others
+        Further columns of the run format that are recorded.
+    noise, resolution
+        Of the temperature sensors [degC].
+    """
+
+    @property
+    def layout(self) -> str: ...
+
+    @property
+    def others(self) -> tuple[str, ...]: ...
+
+    @property
+    def noise(self) -> float: ...
+
+    @property
+    def resolution(self) -> float: ...
+
+    @property
+    def coil(self) -> dict[str, str]:
+        """Recorded coil sensors to the face each sits on."""
+
+    @property
+    def two_faces(self) -> bool:
+        """Whether there is a sensor on the outer face."""
+
+
+class Readings(Protocol):
+    """What a run's thermometers feel before noise and rounding, by recorded name [degC]."""
+
+    @property
+    def felt(self) -> dict[str, FloatArray]: ...
+
+    def recorded(self, felt: dict[str, FloatArray] | None = None) -> dict[str, FloatArray]:
+        """Recorded columns; of other `felt` temperatures with the same noise, if given."""
+
+
+@dataclass(frozen=True, eq=False)
+class UnitRun:
+    """One run of a unit: what happened, what its sensors felt, its noise.
+
+    Attributes
+    ----------
+    name
+        Base name of the file.
+    noise
+        Realised [deg/h], shape (n,).
+    seed
+        Of whatever an effect draws for this run.
+    """
+
+    name: str
+    world: World
+    sensed: Readings
+    noise: FloatArray
+    seed: int
+
+
+@dataclass(frozen=True, eq=False)
+class Unit:
+    """A unit with its runs, before any effect.
+
+    Attributes
+    ----------
+    constants, noise
+        Of its nominal gyro in the thermal runs.
+    fit, held_out, static
+        Runs.
+    plant
+        Of the reality's own kind.
+    earth_stated
+        Whether the side files state latitude and axis.
+    shown
+        Recorded columns beside the time, the gyro, the table and the temperatures.
+    first_day
+        Day and time of the first run in UTC, where the side files state when runs began; else None.
+    """
+
+    plant: Any
+    constants: nominal.Constants
+    noise: NoiseLaw
+    instruments: Thermometers
+    set_up: SetUp
+    earth_stated: bool
+    sample_s: float
+    fit: tuple[UnitRun, ...]
+    held_out: tuple[UnitRun, ...]
+    static: UnitRun | None
+    shown: tuple[str, ...] = ()
+    first_day: datetime | None = None
+
+    def output(self, run: UnitRun) -> FloatArray:
+        """The nominal gyro's true output without noise [deg/h], shape (n,)."""
+        world = run.world
+        outer = world.nodes["T_out"] if self.instruments.two_faces else None
+        seen = nominal.Seen(world.nodes["T_in"], outer, world.deltas["T_in"], world.rate_deg_h)
+        return nominal.output(self.constants, seen)
+
+    def seen(self, run: UnitRun, recorded: dict[str, FloatArray]) -> nominal.Seen:
+        """What a replay of `recorded` temperatures [degC] acts on."""
+        inner, outer = faces(recorded, self.instruments.layout)
+        delta = nominal.delta_of_record(run.world.time, inner)
+        return nominal.Seen(inner, outer, delta, run.world.rate_deg_h)
+
+    @property
+    def runs(self) -> tuple[UnitRun, ...]:
+        """All thermal runs."""
+        return (*self.fit, *self.held_out)
+
+    @property
+    def turning(self) -> bool:
+        """Whether the table turns in any of them."""
+        return any(run.world.table_rate.any() for run in self.runs)
+
+    @property
+    def constant_names(self) -> tuple[str, ...]:
+        """Nominal constants that show in the runs."""
+        return nominal.names(self.turning, self.instruments.two_faces)
+
+    @property
+    def skipped(self) -> int:
+        """Rows at a run's start that count for nothing: the windows of DeltaT are not full there."""
+        return int(np.ceil(2.0 * nominal.WINDOW_S / self.sample_s))
+
+    def columns(self, run: UnitRun, recorded: dict[str, FloatArray]) -> FloatArray:
+        """Responses of a replay of `recorded` temperatures to the nominal constants, on the rows that count.
+
+        Shape (n - skipped, p).
+        """
+        return nominal.columns(self.seen(run, recorded), self.constant_names)[self.skipped :]
+
+    def whitening(self, run: UnitRun) -> Whitening:
+        """The true whitening of a run's rows that count."""
+        count = len(run.world.time) - self.skipped
+        inner = run.world.nodes["T_in"][self.skipped :] - 25.0
+        rate = 1e-6 * run.world.rate_deg_h[self.skipped :]
+        c, tools = self.constants, self.instruments
+        # DeltaT and the difference of the faces see little of it; a scale factor over temperature does.
+        slope = c.b1 + 2.0 * c.b2 * inner + rate * (c.k1 + 2.0 * c.k2 * inner)
+        sensors = 2.0 if tools.layout == "four" else 1.0
+        variance = (tools.noise**2 + tools.resolution**2 / 12.0) / sensors
+        return Whitening(self.noise, count, self.sample_s, self.skipped, slope**2 * variance)
+
+
+def faces(recorded: dict[str, FloatArray], layout: str) -> tuple[FloatArray, FloatArray | None]:
+    """Inner and outer face as the run format has them: means of the odd and of the even sensors."""
+    if layout == "one":
+        return recorded["T"], None
+    if layout == "two":
+        return recorded["T_in"], recorded["T_out"]
+    return 0.5 * (recorded["T1"] + recorded["T3"]), 0.5 * (recorded["T2"] + recorded["T4"])

@@ -1,0 +1,98 @@
+"""Methods that answer blind cases, by name: the diagnosis and the baselines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from fogml.blind.folders import DIAGNOSIS, CaseFiles
+from fogml.errors import InputError
+from fogml.json_files import write_json
+
+Method = Callable[[CaseFiles, Path], Any]
+"""Reads a case's runs and writes ``gap.json`` into a folder."""
+
+_PACKAGE = "fogml.blind"
+FAMILIES = "families"
+"""The diagnosis on families."""
+METHODS = {
+    DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
+    FAMILIES: f"{_PACKAGE}.methods:families",
+    "bic": f"{_PACKAGE}.baselines.forward:bic",
+    "bic-unwhitened": f"{_PACKAGE}.baselines.forward:bic_unwhitened",
+    "bic-fixed-nominal": f"{_PACKAGE}.baselines.forward:bic_fixed_nominal",
+    "stlsq": f"{_PACKAGE}.baselines.sparse:stlsq",
+    "random-forest": f"{_PACKAGE}.baselines.forest:random_forest",
+    "gp-discrepancy": f"{_PACKAGE}.baselines.process:gp_discrepancy",
+    "abstain": f"{_PACKAGE}.baselines.abstain:abstain",
+}
+"""Name of each method to ``module:function``; all of them run sealed."""
+ORACLE = "oracle"
+"""The baseline that is given the truth, and so can't run sealed."""
+BASELINES = (*(name for name in METHODS if name not in (DIAGNOSIS, FAMILIES)), ORACLE)
+
+
+def load_method(text: str) -> Method:
+    """The method of a name of `METHODS`, or of ``package.module:function``.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    module, colon, name = METHODS.get(text, text).partition(":")
+    if not colon:
+        known = ", ".join(METHODS)
+        raise InputError(f"no method '{text}'; known are {known}, or name one as module:function")
+    try:
+        method: Method = getattr(import_module(module), name)
+    except (ImportError, AttributeError) as error:
+        raise InputError(f"method '{text}' does not load: {error}") from None
+    return method
+
+
+def diagnosis(case: CaseFiles, out: Path) -> Any:
+    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page.
+
+    What is withheld is nothing that its catalogue holds: not even as a doubt about what looks like it.
+    """
+    from fogml.gap.diagnosis import diagnose
+    from fogml.gap.twin_model import TwinModel
+    from fogml.runs.reading import read_run
+    from fogml.twin.twin_file import load_twin
+
+    model = TwinModel(load_twin(case.twin), case.without)
+    found = diagnose(
+        model,
+        [read_run(path) for path in case.fit],
+        [read_run(path) for path in case.held_out],
+        noise=read_run(case.noise) if case.noise else None,
+        seed=case.seed,
+        plan=False,
+    )
+    write_json(out / "gap.json", found.as_dict(), indent=None)
+    found.write_model(model, out / "twin.yaml")
+    return found
+
+
+def families(case: CaseFiles, out: Path) -> Any:
+    """The diagnosis on families; as `diagnosis`."""
+    from fogml.gap.families.answer import diagnose
+    from fogml.gap.twin_model import TwinModel
+    from fogml.runs.reading import read_run
+    from fogml.twin.twin_file import load_twin
+
+    model = TwinModel(load_twin("nominal"), case.without)
+    found = diagnose(
+        model,
+        [read_run(path) for path in case.fit],
+        [read_run(path) for path in case.held_out],
+        noise=read_run(case.noise) if case.noise else None,
+        without=case.without,
+        seed=case.seed,
+    )
+    write_json(out / "gap.json", found.as_dict(), indent=None)
+    found.write_model(model, out / "twin.yaml")
+    return found

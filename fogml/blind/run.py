@@ -1,0 +1,258 @@
+"""Answers to blind cases: each by a sealed process that gets the case's files and nothing else."""
+
+from __future__ import annotations
+
+import queue
+import shutil
+import threading
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor, as_completed, wait
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import fogml
+from fogml.blind.code_state import code_state
+from fogml.blind.folders import DIAGNOSIS, OUTCOME, OUTCOME_SCHEMA, BlindFolder, case_files, read_json
+from fogml.blind.pool import Worker, WorkerLost
+from fogml.blind.sealing import own_roots, within
+from fogml.errors import InputError
+from fogml.json_files import write_json
+from fogml.outputs import whole_folder
+from fogml.runs.sources import sources_stamp
+
+_FILES = "files"
+LIMIT_S = 600.0
+"""Time that a case may take unless told otherwise [s]."""
+Progress = Callable[[str], None]
+"""Told the number of each case that is done."""
+
+
+@dataclass(frozen=True)
+class RunPlan:
+    """Which cases of a suite are to be answered, and how.
+
+    Attributes
+    ----------
+    folder
+        The suite.
+    method
+        Name of a method, or ``module:function``.
+    name
+        What its answers are called; the method's name unless told otherwise.
+    code
+        Folder of the method's own code, where that is not installed.
+    workers, threads
+        Processes, and threads of each.
+    limit_s
+        Time that a case may take [s].
+    shard
+        ``(i, n)``: every n-th case from the i-th on, i from 1; for n machines on one folder.
+    retry
+        Whether cases that failed before are tried again.
+    only
+        Numbers of the cases, where not all are wanted.
+    into
+        Folder of the answers, where it is not the method's.
+    seed
+        Of what a method draws.
+    """
+
+    folder: BlindFolder
+    method: str = DIAGNOSIS
+    name: str | None = None
+    code: Path | None = None
+    workers: int = 1
+    threads: int = 1
+    limit_s: float = LIMIT_S
+    shard: tuple[int, int] = (1, 1)
+    retry: bool = False
+    only: tuple[str, ...] | None = None
+    into: Path | None = None
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        i, n = self.shard
+        if not 1 <= i <= n:
+            raise InputError(f"shard {i}/{n}: write i/n with i from 1 to n")
+        if self.workers < 1 or self.threads < 1 or not self.limit_s > 0:
+            raise InputError("workers, threads and the time limit must be positive")
+
+    @property
+    def answers(self) -> Path:
+        """Where the answers go."""
+        return self.into or self.folder.answers(self.name or self.method)
+
+    def left(self) -> tuple[str, ...]:
+        """Numbers of the cases of the shard that have no answer yet."""
+        i, n = self.shard
+        names = self.folder.names() if self.only is None else self.only
+        return tuple(name for name in names[i - 1 :: n] if not self._answered(name))
+
+    def _answered(self, name: str) -> bool:
+        outcome = self.answers / name / OUTCOME
+        if not outcome.is_file():
+            return False
+        told = read_json(outcome)
+        if _FILES in told and told[_FILES] != case_stamp(self.folder.cases / name):
+            return False  # the case is another one by now
+        return not self.retry or told.get("done") is True
+
+
+@dataclass
+class _Shared:
+    """What the keepers of the workers share."""
+
+    plan: RunPlan
+    code: str
+    waiting: queue.SimpleQueue[str]
+    progress: Progress | None
+    failed: int = 0
+    workers: list[Worker] = field(default_factory=list)
+    stop: threading.Event = field(default_factory=threading.Event)
+    lock: threading.Lock = field(default_factory=threading.Lock)
+
+    def begun(self, worker: Worker) -> None:
+        """Note a worker whose process runs; one that begins after the stop is ended at once."""
+        self.workers.append(worker)
+        if self.stop.is_set():
+            worker.kill()
+
+
+def run_cases(plan: RunPlan, progress: Progress | None = None) -> tuple[int, int]:
+    """Answer the cases that are left; returns how many were answered now, and how many of them failed.
+
+    Each answer appears whole, so that an interrupted run goes on where it was. A case that
+    crashes its process, exceeds its time or writes no ``gap.json`` is recorded as failed, and the
+    process is started anew.
+
+    Raises
+    ------
+    InputError
+        If a sealed process could read the truth where it lies, or the method does not load.
+    """
+    check_out_of_reach(plan)
+    left = plan.left()
+    waiting: queue.SimpleQueue[str] = queue.SimpleQueue()
+    for name in left:
+        waiting.put(name)
+    shared = _Shared(plan, code_state(plan.method, plan.code), waiting, progress)
+    with ThreadPoolExecutor(max_workers=plan.workers) as pool:
+        keepers = [pool.submit(_keep, shared) for _ in range(min(plan.workers, len(left)))]
+        try:
+            for keeper in as_completed(keepers):
+                keeper.result()
+        except BaseException:
+            shared.stop.set()
+            # Their keepers then leave what they are at, unwritten.
+            for worker in list(shared.workers):
+                worker.kill()
+            # Of futures, not of threads: a join that a signal interrupts takes its thread for ended.
+            wait(keepers)
+            raise
+    return len(left), shared.failed
+
+
+def check_out_of_reach(plan: RunPlan) -> None:
+    """Refuse a suite whose truth lies among what a sealed process may read.
+
+    Raises
+    ------
+    InputError
+        Naming the folder.
+    """
+    roots = (*own_roots(), *([plan.code.resolve()] if plan.code else []))
+    if within(plan.folder.truth, roots):
+        raise InputError(
+            f"{plan.folder.truth}: lies in a folder that every process may read (Python's, the system's or "
+            "the method's own code); move the suite elsewhere"
+        )
+
+
+def outcome_of(
+    case: str, method: str, answer: dict[str, Any], locks: str, samples: int, code: str, files: str
+) -> dict[str, Any]:
+    """The values of ``outcome.json``, schema ``fogml.blind_outcome/1``; `files` is the case's stamp."""
+    return {
+        "schema": OUTCOME_SCHEMA,
+        "case": case,
+        "method": method,
+        "done": answer["done"],
+        "reason": answer["reason"],
+        "message": answer["message"],
+        "seconds": answer["seconds"],
+        "samples": samples,
+        "sealed_by": locks,
+        "version": fogml.__version__,
+        "code": code,
+        _FILES: files,
+    }
+
+
+def case_stamp(folder: Path) -> str:
+    """A hash of all files of a case: an answer is to these."""
+    return sources_stamp(sorted(path for path in folder.iterdir() if path.is_file()))
+
+
+def count_samples(folder: Path) -> int:
+    """Samples in all runs of a case: lines less one header each."""
+    files = case_files(folder)
+    return sum(_lines(path) - 1 for path in (*files.fit, *files.held_out))
+
+
+def _lines(path: Path) -> int:
+    with path.open("rb") as file:
+        return sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
+
+
+def _keep(shared: _Shared) -> None:
+    """Take cases from the queue until none is left, with one worker after another."""
+    worker: Worker | None = None
+    plan = shared.plan
+    try:
+        while not shared.stop.is_set():
+            try:
+                name = shared.waiting.get_nowait()
+            except queue.Empty:
+                return
+            if worker is None:
+                worker = Worker(plan.method, plan.code, plan.threads, shared.begun)
+            if not _one(shared, worker, name):
+                worker.end()
+                worker = None
+    finally:
+        if worker is not None:
+            worker.end()
+
+
+def _one(shared: _Shared, worker: Worker, name: str) -> bool:
+    """Answer one case; False where the worker is lost."""
+    plan, usable = shared.plan, True
+    source, case, out = plan.folder.cases / name, worker.home / name, worker.home / "answer"
+    # A copy, not a link: nothing in it leads back to the suite.
+    shutil.copytree(source, case)
+    files = case_stamp(case)
+    out.mkdir()
+    try:
+        answer = worker.ask({"case": name, "out": out.name, "seed": plan.seed}, plan.limit_s)
+        if answer["done"] and not (out / "gap.json").is_file():
+            answer |= {"done": False, "reason": "no answer", "message": "no gap.json was written"}
+    except WorkerLost as lost:
+        usable = False
+        seconds = plan.limit_s if lost.reason == "timed out" else None
+        answer = {"done": False, "reason": lost.reason, "message": str(lost), "seconds": seconds}
+    if shared.stop.is_set():
+        return False
+    method, samples = plan.name or plan.method, count_samples(case)
+    values = outcome_of(name, method, answer, worker.locks, samples, shared.code, files)
+    plan.answers.mkdir(parents=True, exist_ok=True)
+    with whole_folder(plan.answers, shared=True) as staging:
+        shutil.copytree(out, staging / name)
+        write_json(staging / name / OUTCOME, values, indent=1)
+    shutil.rmtree(case)
+    shutil.rmtree(out)
+    with shared.lock:
+        shared.failed += not answer["done"]
+        if shared.progress:
+            shared.progress(name)
+    return usable

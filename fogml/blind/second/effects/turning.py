@@ -1,0 +1,145 @@
+"""What turning shows: scale factor, dead zone, clock, table, axis."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
+from fogml.blind.frame.operators import late
+from fogml.blind.frame.record import EARTH_DEG_H, FloatArray, World
+
+
+class SourceOwnHeat(ScaleFactor):
+    """Wavelength of a source that follows its own chip, not the board."""
+
+    name, form, records = "source_wavelength", "the chip's temperature", ("T_electronics",)
+    demands = Demands(turns=True, power_steps=True)
+    ranges = {"bend": (-3e-3, 3e-3)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """-u (1 + bend u) of the source."""
+        u = world.nodes["T_source"] - 25.0
+        return -u * (1.0 + shape["bend"] * u)
+
+
+class ModulatorBehind(ScaleFactor):
+    """Half-wave voltage of the chip on the optics, behind a loop that learns slowly."""
+
+    name, form, records = "halfwave_voltage", "the optics, behind a loop", ("T_electronics",)
+    demands = Demands(turns=True, power_steps=True, power_on=True)
+    ranges = {"learns": (200.0, 1500.0), "left": (0.1, 0.6)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """What the loop has not yet followed, and a share that it never does."""
+        u = world.nodes["T_optics"] - 25.0
+        return u - (1.0 - shape["left"]) * late(u, shape["learns"], world.sample_s)
+
+
+class SineResidual(ScaleFactor):
+    """The sine of an open-loop rest, and closed-loop steps of the ramp."""
+
+    name, form = "sf_nonlinearity", "sine and ripple"
+    ranges = {"full": (120.0, 400.0), "ripple": (0.0, 0.3), "step": (7.0, 40.0), "phase": (0.0, 6.28)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """1 - sinc(rate / full) and a ripple over the rate."""
+        rate = np.abs(world.rate_deg_h) / 3600.0
+        ripple = shape["ripple"] * np.sin(2.0 * np.pi * rate / shape["step"] + shape["phase"])
+        return (1.0 - np.sinc(rate / shape["full"])) * 6.0 + 0.1 * ripple
+
+
+class CubicRoot(ScaleFactor):
+    """A rest that grows with the root of the rate."""
+
+    name, form = "sf_nonlinearity", "root of the rate"
+    ranges = {"exponent": (0.3, 0.8)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """(|Omega| / 100 deg/s)**p."""
+        return (np.abs(world.rate_deg_h) / 360000.0) ** shape["exponent"]
+
+
+class AsymmetryWithRate(ScaleFactor):
+    """The two directions differ, at high rates by less."""
+
+    name, form = "sf_asymmetry", "fading with the rate"
+    ranges = {"fades": (30.0, 300.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """sgn(rate) / (1 + |rate| / fades)."""
+        rate = world.rate_deg_h / 3600.0
+        return np.tanh(rate / 1e-4) / (1.0 + np.abs(rate) / shape["fades"])
+
+
+class LockIn(Distorting):
+    """A zone in which two waves lock: nothing within it, and the root of the squares' difference beyond."""
+
+    name, stage, form, unit = "deadband", "loop", "lock-in", "deg/h"
+    demands, horizontal = Demands(turns=True, small_rates=True), True
+    greatest: ClassVar[float] = 20.0
+
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """sgn(w) sqrt(w**2 - w_d**2) beyond w_d."""
+        return np.sign(output) * np.sqrt(np.maximum(output**2 - amplitude**2, 0.0))
+
+
+class BufferSkew(Distorting):
+    """A logger that stamps by blocks: the delay grows through a block, and blocks come later and later."""
+
+    name, stage, form = "logger_skew", "logger", "blocks"
+    greatest: ClassVar[float] = 300.0
+    ranges = {"block": (200.0, 1800.0), "saw": (0.0, 0.8)}
+
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """y(t - d), d a share of a saw-tooth and the rest held."""
+        saw = (world.time / shape["block"]) % 1.0
+        delay = amplitude * (1.0 - shape["saw"] + 2.0 * shape["saw"] * saw)
+        return np.interp(world.time - delay, world.time, output)
+
+
+class Wobble(Additive):
+    """An axis that is off, on a bearing that wobbles twice a turn."""
+
+    name, stage, form, unit = "input_axis_misalignment", "rig", "with a wobble", "mrad"
+    records, demands = ("angle",), Demands(slow_turns=True)
+    ranges = {"direction": (0.0, 360.0), "wobble": (0.0, 0.3), "at": (0.0, 360.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Earth's horizontal rate picked up per mrad."""
+        north = 1e-3 * EARTH_DEG_H * np.cos(np.radians(world.set_up.latitude))
+        once = world.mean_cosine(1.0, -shape["direction"])
+        return north * (once + shape["wobble"] * world.mean_cosine(2.0, shape["at"]))
+
+
+class MotorPoles(Additive):
+    """A motor whose poles pull: a triangle over the angle."""
+
+    name, stage, form = "table_rate_error", "rig", "triangle over the angle"
+    records, demands = ("angle",), Demands(slow_turns=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Poles and phase."""
+        return {"poles": float(rng.choice([1, 2, 3, 4, 6])), "phase": float(rng.uniform(0.0, 360.0))}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """rate times the triangle's first three odd harmonics."""
+        pull = sum(
+            (world.mean_cosine(k * shape["poles"], k * shape["phase"]) / k**2 for k in (1.0, 3.0, 5.0)),
+            np.zeros_like(world.time),
+        )
+        return 3600e-6 * world.table_rate * pull
+
+
+FORMS = (
+    SourceOwnHeat,
+    ModulatorBehind,
+    SineResidual,
+    CubicRoot,
+    AsymmetryWithRate,
+    LockIn,
+    BufferSkew,
+    Wobble,
+    MotorPoles,
+)

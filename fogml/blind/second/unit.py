@@ -1,0 +1,110 @@
+"""Drawing a unit and its runs, days apart: to show given effects, without any of them yet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+
+from fogml.blind.frame import nominal
+from fogml.blind.frame.form import Demands, Form
+from fogml.blind.frame.record import SetUp, World
+from fogml.blind.frame.state_noise import StateNoise
+from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
+from fogml.blind.frame.unit import Unit, UnitRun
+from fogml.blind.second.chamber import draw_chamber
+from fogml.blind.second.noise import draw_noise
+from fogml.blind.second.plant import Plant, draw_plant
+from fogml.blind.second.programme import Programme, draw_programme, static_programme
+from fogml.blind.second.world import happen
+
+_ANOTHER_DAY, _FALSE, _FALSE_SHARE = 1.2, 2.0, 0.12
+"""Noise of the static run relative to the others': usually, and where that run is not of this set-up."""
+
+
+def draw_unit(
+    rng: np.random.Generator, forms: Sequence[type[Form]], runs: int, static: bool, sample_s: float
+) -> Unit:
+    """A unit whose programmes and instruments show the given forms; `runs` to fit on, one held out."""
+    plant = Plant(draw_plant(rng, any(f.quick_plant for f in forms)))
+    noise = draw_noise(rng)
+    demands = _draw_demands(rng, forms)
+    set_up = _draw_set_up(rng, forms)
+    faces = any(f.faces for f in forms)
+    constants = nominal.draw_constants(rng, True)
+    rest, turning = nominal.temperature_slopes(constants, sample_s)
+    turning *= demands.top_rate * float(demands.turns and not demands.small_rates)
+    white = noise.N / np.sqrt(sample_s / 3600.0)
+    needed = tuple(dict.fromkeys(column for f in forms for column in f.records))
+    fine = any(f.fine_sensors for f in forms)
+    instruments = draw_instruments(rng, faces, fine, needed, white, (rest, turning))
+    if not instruments.two_faces:
+        constants = nominal.Constants(**(constants.as_dict() | {"g": 0.0}))
+    chamber = draw_chamber(rng)
+    begin, past = 0.0, tuple(rng.uniform((-20.0, 20.0, 15.0), (15.0, 55.0, 30.0)).tolist())
+
+    def run(name: str, programme: Programme, of: StateNoise, place: int) -> UnitRun:
+        world = happen(rng, plant, chamber, programme, set_up, sample_s, place, begin, past)
+        series = of.series(rng, len(world.time), sample_s)
+        return UnitRun(name, world, sense(rng, world, instruments), series, int(rng.integers(2**62)))
+
+    names = [*(f"fit-{k + 1}.csv" for k in range(runs)), "held-out-1.csv"]
+    thermal = []
+    for place, name in enumerate(names):
+        one = run(name, draw_programme(rng, demands, sample_s), noise, place)
+        thermal.append(one)
+        past = _remembered(past, one.world)
+        begin += float(one.world.time[-1]) + 86400.0 * float(np.exp(rng.uniform(np.log(0.3), np.log(20.0))))
+    quiet = None
+    if static:
+        other = noise.of_another_day(rng, _FALSE if rng.random() < _FALSE_SHARE else _ANOTHER_DAY)
+        quiet = run("static.csv", static_programme(rng, sample_s), other, len(names))
+    stated = datetime(2026, 1, 5, 6, 0, tzinfo=UTC) + timedelta(hours=float(rng.uniform(0.0, 5000.0)))
+    unit = Unit(
+        plant,
+        constants,
+        noise,
+        instruments,
+        set_up,
+        bool(rng.random() < 0.8),
+        sample_s,
+        tuple(thermal[:-1]),
+        tuple(thermal[-1:]),
+        quiet,
+        shown=tuple(name for name in instruments.others if name in thermal[0].world.drives),
+        first_day=stated.replace(microsecond=0) if rng.random() < 0.7 else None,
+    )
+    return quick_enough(unit, instruments)
+
+
+def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:
+    """Where the winding turned, with the run's own extremes and its end; then back to the room."""
+    winding = world.nodes["T_coil"]
+    low, high = int(winding.argmin()), int(winding.argmax())
+    turned = [float(winding[k]) for k in sorted((low, high))]
+    return (*past, *turned, float(winding[-1]), 22.0)
+
+
+def _draw_set_up(rng: np.random.Generator, forms: Sequence[type[Form]]) -> SetUp:
+    latitude = float(rng.uniform(-55.0, 62.0))
+    if any(f.horizontal for f in forms):
+        return SetUp(latitude, float(rng.choice([90.0, 270.0])))
+    if any(f.demands.slow_turns for f in forms) or rng.random() < 0.6:
+        return SetUp(latitude, None)
+    return SetUp(latitude, float(rng.uniform(0.0, 360.0)))
+
+
+def _draw_demands(rng: np.random.Generator, forms: Sequence[type[Form]]) -> Demands:
+    """What the forms ask for, and the rest by chance."""
+    kinds = [name for name, value in vars(Demands()).items() if isinstance(value, bool)]
+    asked = {name: any(getattr(f.demands, name) for f in forms) for name in kinds}
+    by_chance = rng.random(len(kinds))
+    chance = {"turns": 0.3, "power_steps": 0.3}
+    if any(f.name == "logger_skew" for f in forms):
+        chance["turns"] = 0.0
+    drawn = {
+        name: bool(wanted or draw < chance.get(name, 0.0))
+        for (name, wanted), draw in zip(asked.items(), by_chance)
+    }
+    return Demands(**drawn, top_rate=float(np.exp(rng.uniform(np.log(5.0), np.log(100.0)))))

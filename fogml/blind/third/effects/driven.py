@@ -1,0 +1,195 @@
+"""What optics, electronics, machines, table and thermometers add."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Sensing, Shape
+from fogml.blind.frame.operators import late
+from fogml.blind.frame.record import FloatArray, World
+
+_OUTER = ("T_out", "T2", "T4")
+
+
+class PolarisationProduct(Additive):
+    """Two couplings that multiply: a product of two periods on the optics."""
+
+    name, form = "polarization_nonreciprocity", "product of two periods"
+    ranges = {"period": (4.0, 15.0), "other": (20.0, 60.0), "a": (0.0, 6.28), "b": (0.0, 6.28)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """cos times (1 + cos) of the slower one."""
+        turn = 2.0 * np.pi * world.nodes["T_optics"]
+        slow = 1.0 + np.cos(turn / shape["other"] + shape["b"])
+        return slow * np.cos(turn / shape["period"] + shape["a"])
+
+
+class PolarisationCreeping(Additive):
+    """A beat over the source's temperature whose phase creeps with time."""
+
+    name, form = "polarization_nonreciprocity", "creeping phase"
+    ranges = {"period": (3.0, 12.0), "phase": (0.0, 6.28), "creep": (-1.5, 1.5)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """sin(2 pi T / period + phase + creep sqrt(t))."""
+        hours = (world.time + 1.0) / 3600.0
+        turn = 2.0 * np.pi * world.nodes["T_source"] / shape["period"]
+        return np.sin(turn + shape["phase"] + shape["creep"] * np.sqrt(hours))
+
+
+class BiasOfSpline(Additive):
+    """A static bias through random values a few degrees apart."""
+
+    name, form = "bias_polynomial", "spline through random values"
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Distance of the values and they themselves."""
+        found: Shape = {"apart": float(rng.uniform(16.0, 35.0))}
+        return found | {f"value_{k}": float(rng.standard_normal()) for k in range(10)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """The spline at the inner annulus."""
+        at = -70.0 + shape["apart"] * np.arange(10)
+        curve = CubicSpline(at, [shape[f"value_{k}"] for k in range(10)])
+        return np.asarray(curve(world.nodes["T_inner"]))
+
+
+class BiasResonant(Additive):
+    """A static bias with one broad dispersion."""
+
+    name, form = "bias_polynomial", "broad dispersion"
+    ranges = {"at": (-20.0, 50.0), "width": (12.0, 35.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """x / (1 + x**2)."""
+        x = (world.nodes["T_coil"] - shape["at"]) / shape["width"]
+        return x / (1.0 + x * x)
+
+
+class ValvePickup(Additive):
+    """Each pulse of the valve moves the bias, behind a filter in the gyro."""
+
+    name, form = "chamber_pickup", "a valve's pulses"
+    ranges = {"filter": (5.0, 120.0)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Filtered valve."""
+        return late(world.drives["compressor"], shape["filter"], world.sample_s)
+
+
+class SourceWithPump(ScaleFactor):
+    """Wavelength by the source's temperature and by the power that pumps it."""
+
+    name, form, records = "source_wavelength", "with its pump", ("T_electronics",)
+    demands = Demands(turns=True, power_steps=True)
+    ranges = {"pump": (-10.0, 10.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """-(T_source - 25) and a part of the relative power."""
+        power = world.drives["power"]
+        return 25.0 - world.nodes["T_source"] + shape["pump"] * (power / power.mean() - 1.0)
+
+
+class HysteresisOfRate(ScaleFactor):
+    """Scale factor that bends with the square of the rate, more when warm."""
+
+    name, form = "sf_nonlinearity", "square, by temperature"
+    ranges = {"slope": (-0.01, 0.01)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """(Omega / 100 deg/s)**2 (1 + s u)."""
+        warm = 1.0 + shape["slope"] * (world.nodes["T_board"] - 25.0)
+        return (world.rate_deg_h / 360000.0) ** 2 * warm
+
+
+class AsymmetryOfStages(ScaleFactor):
+    """Another gain of the two directions beyond a rate at which a stage is switched."""
+
+    name, form = "sf_asymmetry", "beyond a rate"
+    ranges = {"from": (1.0, 6.0)}
+
+    def error(self, world: World, shape: Shape) -> FloatArray:
+        """Sign of the rate where it exceeds the switch."""
+        rate = world.rate_deg_h / 3600.0
+        return np.sign(rate) * (np.abs(rate) > shape["from"])
+
+
+class CreepingClock(Distorting):
+    """A clock that drifts by the logger's temperature, so that the delay grows unevenly."""
+
+    name, stage, form = "logger_skew", "logger", "clock by temperature"
+    greatest: ClassVar[float] = 300.0
+    ranges = {"by_heat": (0.0, 0.05), "growth": (0.0, 0.4)}
+
+    def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
+        """y(t - d) with d growing by time and heat."""
+        hours = world.time / 3600.0
+        warm = 1.0 + shape["by_heat"] * (world.nodes["T_chamber"] - 25.0) * hours / 8.0
+        delay = amplitude * np.maximum(warm + shape["growth"] * hours, 0.0)
+        return np.interp(world.time - delay, world.time, output)
+
+
+class LagBesideContact(Sensing):
+    """A thermometer that touches with a part of itself and lags with the rest."""
+
+    name, form, fine_sensors = "sensor_lag", "part in touch", True
+    greatest: ClassVar[float] = 3000.0
+    ranges = {"touching": (0.1, 0.6)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """A share at once, the rest late."""
+        share = shape["touching"]
+        return share * temperature + (1.0 - share) * late(temperature, amplitude, world.sample_s)
+
+
+class StepsThatStick(Sensing):
+    """A converter with a hysteresis of one step: it moves on only when half a step beyond."""
+
+    name, form, unit = "sensor_quantisation", "sticking steps", "degC"
+    greatest: ClassVar[float] = 2.0
+
+    def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
+        """The code held until the value is a whole step away."""
+        held, out = float(np.round(values[0] / amplitude)), np.empty(len(values))
+        for k, value in enumerate((values / amplitude).tolist()):
+            if abs(value - held) > 0.8:
+                held = float(np.round(value))
+            out[k] = held
+        return np.round(amplitude * out, 7)
+
+
+class FeelsTheMount(Sensing):
+    """Inner thermometers feel the hub, outer ones the cover."""
+
+    name, form, fine_sensors, records = "sensor_placement", "hub and cover", True, ("T_case",)
+    greatest: ClassVar[float] = 1.0
+    ranges = {"inner": (0.2, 1.0)}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """A mix of the place with its neighbour."""
+        share = amplitude * (1.0 if name in _OUTER else shape["inner"])
+        beside = world.nodes["T_cover" if name in _OUTER else "T_hub"]
+        return temperature + share * (beside - temperature)
+
+
+FORMS = (
+    PolarisationProduct,
+    PolarisationCreeping,
+    BiasOfSpline,
+    BiasResonant,
+    ValvePickup,
+    SourceWithPump,
+    HysteresisOfRate,
+    AsymmetryOfStages,
+    CreepingClock,
+    LagBesideContact,
+    StepsThatStick,
+    FeelsTheMount,
+)

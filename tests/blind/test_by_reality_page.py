@@ -1,0 +1,37 @@
+"""The experiment by reality: what its suites are, and its page of hand-made marks."""
+
+from __future__ import annotations
+
+import json
+
+import yaml
+
+from experiments.gap_blind import by_reality as experiment
+from fogml.blind.realities import REALITIES, SAME_TWIN
+from fogml.blind.seeds import is_final
+from tests.blind.test_by_reality import MARKS, marked
+from tests.blind.test_marks import answer
+
+CONFIG = yaml.safe_load((experiment.HERE / "by_reality.yaml").read_text(encoding="utf-8"))
+
+
+def test_the_suites_are_of_every_reality_and_the_seeds_are_apart() -> None:
+    assert tuple(CONFIG["realities"]) == REALITIES
+    assert not is_final(CONFIG["seed"]) and is_final(CONFIG["final"]["seed"])
+    counts = {part["name"]: CONFIG["final"]["share"] * part["count"] for part in CONFIG["parts"]}
+    for name in ("one_strong", "one_weak", "two", "nothing", "unknown", "unknown_and_known"):
+        assert len(REALITIES) * counts[name] >= 400, name
+
+
+def test_the_page_tells_what_was_found_of_each_reality() -> None:
+    own = marked("nothing", "", answer(("c", 0.6)), of=SAME_TWIN)
+    values = experiment.told([*MARKS, own], ["first", "second", SAME_TWIN], 3, "diagnosis", False)
+    assert values["cases"] == {"first": 5, "second": 6, SAME_TWIN: 1}
+    assert json.loads(json.dumps(values)) == values
+    page = experiment.page(values)
+    (row,) = [line for line in page.splitlines() if line.startswith("| nothing missing, something named")]
+    # What a twin's own runs give stands by itself.
+    assert "| ≤ 2 % | 50.0 % " in row and row.count("; 2 |") == 2
+    assert "| first | under 0.8 | 20–60 | 1 | 100 % | 100 % | 0 % |" in page
+    assert "| 10 s | 1 case | 0 % (0 % … 79.3 %) | c | explained |" in page
+    assert "no final figures" in page

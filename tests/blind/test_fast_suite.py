@@ -1,0 +1,55 @@
+"""A small blind suite with gates: what the diagnosis must not fall behind.
+
+The figures of the full suite are under ``experiments/gap_blind``; so few cases bound them loosely.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from fogml.blind.folders import BlindFolder
+from fogml.blind.make import make_cases
+from fogml.blind.run import RunPlan, run_cases
+from fogml.blind.score import gate, score
+
+SEED = 20
+KINDS = ("nothing", "one", "unknown_left_out", "unknown_invented")
+COUNT = 16
+
+
+@pytest.fixture(scope="module")
+def values(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """The score of the small suite."""
+    folder = tmp_path_factory.mktemp("blind")
+    for number, kind in enumerate(KINDS):
+        part = folder / kind
+        make_cases(part, COUNT // len(KINDS), SEED + number, sample_s=20.0, workers=1, kinds=[kind])
+    scored = {}
+    for kind in KINDS:
+        suite = BlindFolder(folder / kind)
+        answered, failed = run_cases(RunPlan(suite, workers=1))
+        assert (answered, failed) == (COUNT // len(KINDS), 0)
+        scored[kind] = score(suite)
+    return scored
+
+
+def _reached(values: dict[str, Any], kind: str, key: str, limit: float) -> None:
+    outcome = gate(values[kind], {key: limit}, "diagnosis")[0]
+    assert outcome["met"], outcome
+
+
+def test_nothing_is_named_where_nothing_is_missing(values: dict[str, Any]) -> None:
+    _reached(values, "nothing", "nothing_named", 0.0)
+
+
+def test_single_effects_are_named(values: dict[str, Any]) -> None:
+    _reached(values, "one", "one_top", 0.5)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_classes_are_small(values: dict[str, Any], kind: str) -> None:
+    rows = {row["key"]: row for row in values[kind]["methods"]["diagnosis"]["rows"]}
+    size = rows["class_size"]["value"]
+    assert size is None or size <= 3.0

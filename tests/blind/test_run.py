@@ -1,0 +1,151 @@
+"""Sealed processes: what they can't reach, and what becomes of those that fail."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from fogml.blind.folders import BlindFolder
+from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
+from fogml.blind.sealing import own_roots
+from fogml.errors import InputError
+
+CHEAT = """
+import ctypes, json, os, subprocess
+from pathlib import Path
+
+def ways(truth):
+    link = Path("link")
+    yield "open", lambda: open(truth / "0001.json").read()
+    yield "os.open", lambda: os.open(truth / "0001.json", os.O_RDONLY)
+    yield "listdir", lambda: os.listdir(truth)
+    yield "scandir", lambda: list(os.scandir(truth))
+    yield "above", lambda: os.listdir(truth.parent)
+    yield "chdir", lambda: os.chdir(truth)
+    yield "link", lambda: (link.symlink_to(truth / "0001.json"), link.read_text())
+    yield "hard link", lambda: os.link(truth / "0001.json", "hard")
+    yield "by way of /proc", lambda: open(f"/proc/self/root{truth}/0001.json").read()
+    yield "parent's folder", lambda: os.listdir(f"/proc/{os.getppid()}/cwd")
+    yield "system", lambda: os.system(f"cat {truth}/0001.json")
+    yield "child", lambda: subprocess.run(["cat", truth / "0001.json"])
+    yield "fork", lambda: os.fork()
+
+def below_python(truth):
+    library = ctypes.CDLL(None, use_errno=True)
+    return library.open(str(truth / "0001.json").encode(), 0)
+
+def peek(case, out):
+    # The test tells where the truth lies; the runner does not.
+    truth = Path((Path(__file__).parent / "where.txt").read_text())
+    told = {}
+    for name, way in ways(truth):
+        try:
+            told[name] = f"reached: {way()!r}"
+        except PermissionError:
+            told[name] = "refused"
+    told["arguments"] = " ".join([*__import__("sys").argv, *os.environ.values(), os.getcwd()])
+    told["below"] = below_python(truth)
+    told["own file"] = case.fit[0].read_text()[:4]
+    (out / "gap.json").write_text(json.dumps(told))
+
+def ends(case, out):
+    if case.name == "0002":
+        os._exit(7)
+    if case.name == "0003":
+        raise ValueError("no such luck")
+    if case.name == "0004":
+        return
+    if case.name == "0005":
+        __import__("time").sleep(60)
+    (out / "gap.json").write_text("{}")
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> BlindFolder:
+    suite = BlindFolder(tmp_path / "suite")
+    for number in range(1, 7):
+        case = suite.cases / f"{number:04d}"
+        case.mkdir(parents=True)
+        (case / "fit-1.csv").write_text("time [s],gyro [deg/h],T [degC]\n0,1,2\n1,1,2\n")
+    suite.truth.mkdir()
+    (suite.truth / "0001.json").write_text("secret")
+    code = tmp_path / "code"
+    code.mkdir()
+    (code / "cheat.py").write_text(CHEAT)
+    (code / "where.txt").write_text(str(suite.truth))
+    return suite
+
+
+def outcome(plan: RunPlan, name: str) -> dict[str, object]:
+    values: dict[str, object] = json.loads((plan.answers / name / "outcome.json").read_text())
+    return values
+
+
+def test_a_sealed_process_cannot_reach_the_truth(folder: BlindFolder, tmp_path: Path) -> None:
+    code = tmp_path / "code"
+    plan = RunPlan(folder, "cheat:peek", name="cheat", code=code, only=("0001",))
+    assert run_cases(plan) == (1, 0), outcome(plan, "0001")
+    told = json.loads((plan.answers / "0001" / "gap.json").read_text())
+    assert str(folder.path) not in told.pop("arguments")
+    assert told.pop("own file") == "time"
+    below = told.pop("below")
+    if outcome(plan, "0001")["sealed_by"] == "landlock and audit":
+        assert below < 0
+    assert set(told.values()) == {"refused"}, told
+
+
+def test_failures_are_recorded_and_the_rest_goes_on(folder: BlindFolder, tmp_path: Path) -> None:
+    code = tmp_path / "code"
+    plan = RunPlan(folder, "cheat:ends", name="ends", code=code, limit_s=2.0, workers=2)
+    done: list[str] = []
+    assert run_cases(plan, done.append) == (6, 4)
+    assert sorted(done) == list(folder.names())
+    reasons = {name: outcome(plan, name)["reason"] for name in folder.names()}
+    assert reasons == {
+        "0001": None,
+        "0002": "crashed",
+        "0003": "error",
+        "0004": "no answer",
+        "0005": "timed out",
+        "0006": None,
+    }
+    assert "status 7" in str(outcome(plan, "0002")["message"])
+    assert outcome(plan, "0001")["samples"] == 2
+    # Everything has an outcome: nothing is left but what is to be tried again.
+    assert plan.left() == ()
+    again = RunPlan(folder, "cheat:ends", name="ends", code=code, retry=True)
+    assert again.left() == ("0002", "0003", "0004", "0005")
+
+
+def test_a_case_that_has_changed_is_answered_again(folder: BlindFolder, tmp_path: Path) -> None:
+    plan = RunPlan(folder, "cheat:ends", code=tmp_path / "code", only=("0001", "0006"))
+    assert run_cases(plan) == (2, 0)
+    assert plan.left() == ()
+    side = folder.cases / "0006" / "fit-1.yml"
+    side.write_text("latitude: 39.9\n")
+    assert plan.left() == ("0006",)
+    assert run_cases(plan) == (1, 0)
+    assert plan.left() == ()
+
+
+def test_shards_share_the_cases(folder: BlindFolder) -> None:
+    parts = [RunPlan(folder, "abstain", shard=(i, 4)).left() for i in (1, 2, 3, 4)]
+    assert sorted(name for part in parts for name in part) == list(folder.names())
+    with pytest.raises(InputError, match="i/n"):
+        RunPlan(folder, "abstain", shard=(5, 4))
+
+
+def test_a_truth_among_readable_folders_is_refused(folder: BlindFolder) -> None:
+    check_out_of_reach(RunPlan(folder, "abstain"))
+    with pytest.raises(InputError, match="move the suite"):
+        check_out_of_reach(RunPlan(BlindFolder(own_roots()[0] / "suite"), "abstain"))
+    with pytest.raises(InputError, match="move the suite"):
+        check_out_of_reach(RunPlan(folder, "cheat:peek", code=folder.path))
+
+
+def test_a_method_that_does_not_load_is_said_at_once(folder: BlindFolder) -> None:
+    with pytest.raises(InputError, match="did not start"):
+        run_cases(RunPlan(folder, "nowhere:nothing"))

@@ -1,0 +1,132 @@
+"""A hand-made suite through baselines, oracle, relatives, score, page and command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from fogml.blind.baselines.abstain import abstain
+from fogml.blind.baselines.forward import bic, bic_fixed_nominal
+from fogml.blind.baselines.oracle import oracle
+from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.methods import METHODS, load_method
+from fogml.blind.relatives import relatives_of
+from fogml.blind.score import gate, score, wanted_gates
+from fogml.blind.scoring.table import BY_KEY
+from fogml.blind.truth import read_truth
+from fogml.cli.main import app
+from fogml.errors import InputError
+from fogml.report import blind_page
+from tests.blind.suites import HandMade, make_suite
+
+HYSTERESIS = {"thermal_hysteresis": (0.06, {"half_width": 9.0})}
+RELAXATION = {"stress_relaxation": (0.004, {"time_constant": 3000.0})}
+CASES = [
+    HandMade("nothing"),
+    HandMade("one", HYSTERESIS),
+    HandMade("unknown_left_out", HYSTERESIS, ("thermal_hysteresis",)),
+    HandMade("unknown_and_known", HYSTERESIS | RELAXATION, ("thermal_hysteresis",)),
+]
+
+
+@pytest.fixture(scope="module")
+def suite(tmp_path_factory: pytest.TempPathFactory) -> BlindFolder:
+    folder = make_suite(tmp_path_factory.mktemp("blind") / "suite", CASES)
+    for name in folder.names():
+        case = case_files(folder.cases / name)
+        for method, function in (("abstain", abstain), ("bic", bic)):
+            out = folder.answers(method) / name
+            out.mkdir(parents=True)
+            function(case, out)
+        out = folder.answers("oracle") / name
+        out.mkdir(parents=True)
+        oracle(folder, read_truth(folder.truth / f"{name}.json"), out)
+    return folder
+
+
+def answer(suite: BlindFolder, method: str, name: str) -> dict:
+    return json.loads((suite.answers(method) / name / "gap.json").read_text())
+
+
+def named(gap: dict) -> list[str]:
+    return [item["effect"] for item in gap["which"] if item["probability"] >= 0.5]
+
+
+def test_forward_selection_finds_an_effect_of_the_twin_itself(suite: BlindFolder) -> None:
+    assert named(answer(suite, "bic", "0001")) == []
+    gap = answer(suite, "bic", "0002")
+    assert named(gap) == ["thermal_hysteresis"]
+    fitted = gap["which"][0]["amplitude"]
+    assert fitted["value"] == pytest.approx(0.06, rel=0.1) and fitted["unit"] == "deg/h"
+    assert gap["how_far"][0]["closed"] == pytest.approx(1.0, abs=0.1)
+
+
+def test_constants_held_fixed_name_what_is_not_there(suite: BlindFolder, tmp_path: Path) -> None:
+    bic_fixed_nominal(case_files(suite.cases / "0001"), tmp_path)
+    assert named(json.loads((tmp_path / "gap.json").read_text()))
+
+
+def test_left_out_is_not_offered(suite: BlindFolder) -> None:
+    assert "thermal_hysteresis" not in named(answer(suite, "bic", "0003"))
+
+
+def test_oracle_tells_the_known_from_the_unknown(suite: BlindFolder) -> None:
+    assert answer(suite, "oracle", "0001")["verdict"] == "no_gap"
+    assert named(answer(suite, "oracle", "0002")) == ["thermal_hysteresis"]
+    assert answer(suite, "oracle", "0003")["verdict"] == "unknown"
+    mixed = answer(suite, "oracle", "0004")
+    assert named(mixed) == ["stress_relaxation"] and mixed["verdict"] == "partly_explained"
+
+
+def test_relatives_are_those_of_like_signature(suite: BlindFolder) -> None:
+    assert relatives_of(suite, read_truth(suite.truth / "0002.json")) is None
+    relative = relatives_of(suite, read_truth(suite.truth / "0003.json"))
+    assert relative is not None
+    # The true form is the twin's own here: it must find itself, off its grid of shapes.
+    assert relative("thermal_hysteresis")
+    assert not relative("bias_polynomial") and not relative("no_such_effect")
+
+
+def test_score_page_and_gates(suite: BlindFolder) -> None:
+    values = score(suite)
+    assert set(values["methods"]) == {"abstain", "bic", "oracle"}
+    assert values["cases"] == 4 and values["kinds"]["one"] == 1
+    figures = {row["key"]: row["value"] for row in values["methods"]["oracle"]["rows"]}
+    assert figures["one_exact"] == figures["auroc"] == 1.0 and figures["nothing_named"] == 0.0
+    assert [g["met"] for g in gate(values, {"one_exact": 0.95, "nothing_named": 0.02}, "oracle")] == [
+        True,
+        True,
+    ]
+    assert not gate(values, {"one_exact": 0.95}, "abstain")[0]["met"]
+    with pytest.raises(InputError, match="no figure"):
+        gate(values, {"some": 1.0}, "bic")
+    assert set(wanted_gates()) == {k for k, f in BY_KEY.items() if f.low is not None or f.high is not None}
+    page = blind_page(values)
+    assert "://" not in page.split("<script>")[0]
+    assert all(row["words"].split(",")[0] in page for row in values["methods"]["bic"]["rows"])
+
+
+def test_the_command_ends_with_1_where_a_gate_fails(suite: BlindFolder, tmp_path: Path) -> None:
+    base = ["blind", "score", str(suite.path), "--method", "bic", "--out", str(tmp_path), "-q"]
+    runner = CliRunner()
+    assert runner.invoke(app, [*base, "--gate", "one_exact=0.9"]).exit_code == 0
+    assert json.loads((tmp_path / "score.json").read_text())["schema"] == "fogml.blind_score/1"
+    assert runner.invoke(app, [*base, "--gate", "auroc=1.1"]).exit_code == 1
+    assert runner.invoke(app, [*base, "--gate", "nonsense"]).exit_code == 2
+    assert runner.invoke(app, [*base, "--final"]).exit_code == 2
+
+
+def test_a_truth_that_changed_is_not_scored(tmp_path: Path) -> None:
+    folder = make_suite(tmp_path / "suite", CASES[:1])
+    path = folder.truth / "0001.json"
+    path.write_text(path.read_text().replace('"nothing"', '"one"'))
+    with pytest.raises(InputError, match="changed since"):
+        score(folder, ["abstain"])
+
+
+@pytest.mark.parametrize("name", METHODS)
+def test_every_method_loads(name: str) -> None:
+    assert callable(load_method(name))
