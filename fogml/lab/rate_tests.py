@@ -35,6 +35,8 @@ class Criteria:
         add little to the scale factor.
     doubt
         Standard error of a share beyond which noise, not the gyro, answers, and the rate is left out.
+    errors
+        Standard errors that a share has to lie beyond a limit: 2 are 95 %.
     """
 
     answers: float = 0.5
@@ -42,6 +44,7 @@ class Criteria:
     range_error: float = 0.01
     small: float = 0.02
     doubt: float = 0.2
+    errors: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -227,25 +230,33 @@ def step_answers(
 
 
 def least_seen(answers: Sequence[Answer], criteria: Criteria) -> Bracket | None:
-    """The size from which on all are seen: threshold of rates, resolution of steps; None without a test."""
+    """The size from which on all are seen: threshold of rates, resolution of steps; None without a test.
+
+    One that noise leaves open is neither seen nor unseen.
+    """
     if not answers:
         return None
-    unseen = [one.size for one in answers if one.share < criteria.answers]
-    last = max(unseen, default=None)
-    seen = [one.size for one in answers if last is None or one.size > last]
-    return Bracket(last, min(seen, default=None))
+    slack = criteria.errors
+    last = max((one.size for one in answers if one.share + slack * one.se < criteria.answers), default=None)
+    seen = [one.size for one in answers if one.share - slack * one.se >= criteria.answers]
+    return Bracket(last, min((size for size in seen if last is None or size > last), default=None))
 
 
 def dead_zone(answers: Sequence[Answer], criteria: Criteria) -> Bracket | None:
     """Width of the zone about zero in which the output does not change with the rate; None without a test.
 
-    Between neighbouring sizes the output changes by less than `dead` of what is expected.
+    The zone reaches as far as less than `dead` of the rate shows, as noise allows, and it has ended where the
+    output changes by that share of a change of the rate, beyond noise.
     """
     if not answers:
         return None
     size = np.array([0.0, *(one.size for one in answers)])
-    output = size * np.array([0.0, *(one.share for one in answers)])
-    changes = np.diff(output) >= criteria.dead * np.diff(size)
-    first = int(np.argmax(changes)) if changes.any() else len(changes)
-    outside = 2.0 * float(size[first + 1]) if changes.any() else None
-    return Bracket(2.0 * float(size[first]), outside)
+    share, se = (np.array([0.0, *(getattr(one, part) for one in answers)]) for part in ("share", "se"))
+    noise = criteria.errors * se
+    silent = (share - noise < criteria.dead) & (share + noise < criteria.answers)
+    inside = len(silent) if silent.all() else int(np.argmin(silent))
+    changed = np.diff(size * share) - np.hypot((size * noise)[1:], (size * noise)[:-1])
+    ends = np.flatnonzero(changed >= criteria.dead * np.diff(size))
+    ends = ends[ends >= inside - 1]
+    outside = 2.0 * float(size[ends[0] + 1]) if len(ends) else None
+    return Bracket(2.0 * float(size[inside - 1]), outside)

@@ -159,6 +159,7 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
         ("a zone is dead below", f"{stated(told['dead'])} of the expected change (IEEE Std 952)"),
         ("the range ends at", f"{stated(told['range_error'])} off the line of the rates below"),
         ("rates about zero", f"below {stated(told['small'])} of the greatest"),
+        ("beyond a limit is", f"what lies {stated(told['errors'])} standard errors beyond it"),
         ("left out as noise", f"answers with a standard error above {stated(told['doubt'])}"),
     ]
 

@@ -17,6 +17,7 @@ from fogml.lab.rate_response import bandwidth, gain_of
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.optics import Coil
+from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
 
@@ -74,6 +75,18 @@ def test_a_lag_is_no_slew_limit() -> None:
     assert not told["slew"]["limited"]
     # From 10 to 90 % an exponential takes ln 9 time constants.
     assert told["bandwidth"]["first_order_hz"] == pytest.approx(1.0 / (2.0 * math.pi * 5e-3), rel=0.01)
+
+
+def test_the_ladder_that_ships_tells_a_dead_zone_through_noise() -> None:
+    twin = Twin().with_noise(N=0.002).with_effect("deadband", 0.3).with_effect("sf_asymmetry", 50.0)
+    facts = Facts(latitude=-20.0, input_axis="west", table_axis="west")
+    for seed in range(3):
+        run = simulate("rate-ladder", twin, seed=seed, facts=facts, columns=("T_in", "rate")).run
+        told = rate_json([run], source="ladder")
+        zone, threshold = told["dead_zone"], told["threshold"]
+        assert zone["above_deg_h"] <= 0.6 <= zone["below_deg_h"] <= 1.0
+        assert threshold["above_deg_h"] <= 2.0 / math.sqrt(3.0) * 0.3 <= threshold["below_deg_h"]
+        assert told["scale_factor"]["asymmetry_ppm"] == pytest.approx(100.0, abs=2.0)
 
 
 def test_noise_hides_small_rates_and_the_answer_says_so() -> None:
