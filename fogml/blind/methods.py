@@ -84,7 +84,7 @@ def families(case: CaseFiles, out: Path) -> Any:
     from fogml.runs.reading import read_run
     from fogml.twin.twin_file import load_twin
 
-    model = TwinModel(load_twin("nominal"), case.without)
+    model = TwinModel(load_twin(case.twin), case.without)
     found = diagnose(
         model,
         [read_run(path) for path in case.fit],
