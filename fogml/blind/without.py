@@ -1,7 +1,7 @@
 """Leaves out with a library effect what can't be told from it.
 
 A relative that stays a candidate would be named in its place, rightly, and nothing would be learned
-about how an unknown is met. The second reality knows no library, so this is a step of its own.
+about how an unknown is met. No reality knows a library, so this is a step of its own.
 """
 
 from __future__ import annotations

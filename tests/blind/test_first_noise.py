@@ -1,4 +1,4 @@
-"""Noise and whitening of the second reality, against spectra and dense covariances."""
+"""Noise and whitening of the first reality, against spectra and dense covariances."""
 
 from __future__ import annotations
 
