@@ -102,7 +102,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row]) -> str:
     lines = [
         "# A known effect beside an unknown one",
         "",
-        f"Synthetic cases of the second reality with a known effect and an unknown one, {len(both)} in all. "
+        f"Synthetic cases of the first reality with a known effect and an unknown one, {len(both)} in all. "
         "What the known effect's true form adds to the evidence of the runs: beside the true form of the "
         "unknown, as one has it who knows everything (`limits.md`), and beside the diagnosis's dictionary of "
         "the unknown, as one has it who knows the effect's true form alone.",

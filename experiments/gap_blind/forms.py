@@ -1,6 +1,6 @@
 """How much of what truly acts the catalogue's best form holds: what a diagnosis loses before it begins.
 
-The second reality has other forms of the same effects. For each known effect of a suite, the share of its
+The first reality has other forms of the same effects. For each known effect of a suite, the share of its
 true contribution, whitened by the true noise and beside the nominal constants and ordinary sensors' errors,
 that the best node of the catalogue's candidate makes with the best coefficients of its columns ::
 
@@ -79,12 +79,12 @@ def _page(rows: Sequence[Row], cases: int) -> str:
     lines = [
         "# What the catalogue's forms hold of what truly acts",
         "",
-        f"Synthetic cases of the second reality: {cases}, with {len(rows)} known effects of a d′ of "
+        f"Synthetic cases of the first reality: {cases}, with {len(rows)} known effects of a d′ of "
         f"{LEAST_D_PRIME:g} or more. Share of an effect's true contribution, whitened and beside the nominal "
         "constants and ordinary sensors' errors, that the best node of the catalogue's form holds; and what "
         f"is lost with the rest. Where more than {NATS:g} nats are lost, another name may be as good.",
         "",
-        "What coarse sensors (`sensor_quantisation`) truly add is taken from the second reality's own "
+        "What coarse sensors (`sensor_quantisation`) truly add is taken from the first reality's own "
         "replay, whose windows of the temperature difference are not the twin's: of the gap that a "
         "diagnosis sees, the form holds more.",
         "",

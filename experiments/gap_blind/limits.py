@@ -148,7 +148,7 @@ def _page(everything: Sequence[Row], wrong: Sequence[Row], asked: Sequence[Row])
     lines = [
         "# What the data allow",
         "",
-        f"Synthetic cases of the second reality: {len(asked)}, with {len(effects)} known effects.",
+        f"Synthetic cases of the first reality: {len(asked)}, with {len(effects)} known effects.",
         "",
         "## How much of what the data show is named",
         "",

@@ -13,7 +13,7 @@ one takes so many nats away that it would be named, as anybody has to who is to 
 what it took wherever L / E**g is under a limit: g = 0 is a limit in nats, g = 1 one on the share of the
 signal. Who asks more of a second effect takes fewer pairs for an unknown, and finds fewer pairs that act.
 
-Coarse sensors count as named: what they truly add is taken from the second reality's own replay, of which the
+Coarse sensors count as named: what they truly add is taken from the first reality's own replay, of which the
 catalogue's form holds less than of the gap that a diagnosis sees.
 
 ``python -m experiments.gap_blind.one_or_unknown DIR/PART`` writes ``one_or_unknown-PART.json`` beside itself,
@@ -122,7 +122,7 @@ def _page(rows: Sequence[Row], limits: Sequence[Row], diagnosis: Tables) -> str:
     lines = [
         "# One effect of the catalogue, or something unknown",
         "",
-        f"Synthetic cases of the second reality with a d′ over {STRONG:g}: {ones} with one effect that acts "
+        f"Synthetic cases of the first reality with a d′ over {STRONG:g}: {ones} with one effect that acts "
         f"alone, {len(rows) - ones} with an unknown. The oracle sees what acts without noise, E nats, and "
         "knows the catalogue's forms but not the true ones. It takes the candidate that leaves the least, or "
         "two where the second takes enough nats away, and names them wherever what is left, L nats, has "
