@@ -103,19 +103,16 @@ class SpectrumModel:
         used: NDArray[np.bool_] | None = None,
     ) -> None:
         self.spectrum, self.terms, self.filter = spectrum, terms, output_filter
-        rows = len(spectrum.power)
-        self.used = np.ones(rows, dtype=np.bool_) if used is None else used
+        self.used = np.ones(len(spectrum.power), dtype=np.bool_) if used is None else used
         self._single = len(spectrum.values)
         self._cycles = spectrum.frequency_hz * spectrum.sample_s
         # A filter that lets nothing of the whole spectrum pass is told from no other.
         self._lowest_corner = float(np.log(np.pi * np.min(self._cycles, initial=0.5)))
         shapes = term_shapes(spectrum.frequency_hz, spectrum.sample_s, terms)
         self._before = [i for i, name in enumerate(terms.names) if name not in AFTER]
-        after = [i for i, name in enumerate(terms.names) if name in AFTER]
         self._ends = [i for i, name in enumerate(terms.names) if name == "E"]
         self._shapes, self._end_shapes = shapes[..., self._before], shapes[..., self._ends]
-        self._design = np.empty((rows, len(terms.names)))
-        self._design[:, after] = shapes[..., after].mean(axis=1)
+        self._design = shapes.mean(axis=1)
         freedom = spectrum.count
         if output_filter.kind == "mean":
             # A row with a zero of the response stands on fewer coefficients.
@@ -126,17 +123,16 @@ class SpectrumModel:
     def design(self, log_corner: float) -> tuple[FloatArray, FloatArray | None]:
         """Density of each term of coefficient 1, shape (rows, terms); slopes of those over the corner."""
         if self.filter.kind == "none":
-            self._design[:, self._before] = self._shapes.mean(axis=1)
-            return self._design.copy(), None
+            return self._design, None
         gain, slope = self.filter.response(self._cycles, log_corner)
         design = self._design.copy()
-        design[:, self._before] = (self._shapes * gain[..., None]).mean(axis=1)
+        design[:, self._before] = _row_means(self._shapes, gain)
         # Only where the filter lets next to nothing pass do the ends count.
-        design[:, self._ends] = (self._end_shapes * ((1.0 - gain) ** 2)[..., None]).mean(axis=1)
+        design[:, self._ends] = _row_means(self._end_shapes, (1.0 - gain) ** 2)
         if not self.filter.free:
             return design, None
         slopes = np.zeros_like(design)
-        slopes[:, self._before] = (self._shapes * slope[..., None]).mean(axis=1)
+        slopes[:, self._before] = _row_means(self._shapes, slope)
         return design, slopes
 
     def fit(
@@ -172,7 +168,7 @@ class SpectrumModel:
         coefficients = np.zeros(terms) if start is None else start.coefficients.copy()
         if held is not None:
             coefficients[held[0]] = held[1]
-        density = design @ coefficients if start is not None else self._smoothed()
+        density = design @ coefficients
         begun = start is not None and bool(np.all(density[self.used] > 0.0))
         if not begun:
             density = self._smoothed()
@@ -273,6 +269,11 @@ class SpectrumModel:
             ratio = np.maximum(s.power[high], 1e-300) / density[high]
             loss += 0.5 * float(freedom[high] @ (ratio - 1.0 - np.log(ratio)))
         return loss, power, constants, covariance
+
+
+def _row_means(shapes: FloatArray, gain: FloatArray) -> FloatArray:
+    """Means over the frequencies of each row of shapes behind a gain, shape (rows, terms)."""
+    return np.asarray(np.einsum("rkt,rk->rt", shapes, gain)) / max(gain.shape[1], 1)
 
 
 def term_shapes(frequency_hz: FloatArray, sample_s: float, terms: SpectrumTerms) -> FloatArray:
