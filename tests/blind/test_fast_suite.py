@@ -16,7 +16,7 @@ from fogml.blind.score import gate, score
 
 SEED = 20
 KINDS = ("nothing", "one", "unknown_left_out", "unknown_invented")
-COUNT = 16
+COUNT = 8
 
 
 @pytest.fixture(scope="module")
