@@ -120,6 +120,7 @@ class Tally:
         """Count one."""
         count = self.counts.setdefault(kind, Counter())
         count["inputs"] += 1
+        count["milliseconds"] += round(1000.0 * outcome.seconds)
         count["compared"] += outcome.compared
         count[f"exit {outcome.status}" if outcome.status in (0, 1, 2) else "no exit of these"] += 1
         for fault in outcome.faults:
@@ -128,6 +129,7 @@ class Tally:
     def line(self) -> str:
         """All faults in one line."""
         total: Counter[str] = sum(self.counts.values(), Counter())
+        del total["milliseconds"]
         return ", ".join(f"{name} {number}" for name, number in sorted(total.items()))
 
     def values(self, seconds: float) -> dict[str, Any]:

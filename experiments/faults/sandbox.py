@@ -56,12 +56,13 @@ class Limits:
     wall_s
         Time after which a process that waits is killed [s]; on a busy machine all takes longer.
     memory_bytes
-        Growth of the process's memory [bytes].
+        Growth of the process's memory [bytes]. A page of a Parquet file states its size in 31 bits, and
+        room for that much is taken before its checksum is known to be wrong.
     """
 
     cpu_s: float = 10.0
     wall_s: float = 120.0
-    memory_bytes: int = 1 << 30
+    memory_bytes: int = 9 << 28
 
 
 @dataclass
@@ -279,7 +280,8 @@ def _check_left(
     new = sorted(set(after) - set(before))
     changed = sorted(name for name, held in before.items() if after.get(name) != held)
     # A study's journal is written to as trials come, also where the sweep then ends with an error.
-    new = [name for name in new if not name.endswith(_GROW)]
+    growing = {name.rpartition("/")[0] for name in new if name.endswith(_GROW)}
+    new = [name for name in new if not name.endswith(_GROW) and name not in growing]
     changed = [name for name in changed if not name.endswith(_GROW)]
     hidden = [name for name in new if name.rpartition("/")[2].startswith((".partial-", ".commit-"))]
     if hidden or (new and status not in (0, 1)):

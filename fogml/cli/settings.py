@@ -8,7 +8,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from fogml import __version__
 from fogml.errors import InputError, quoted
@@ -35,7 +35,15 @@ class Settings(BaseModel):
     """Settings that name files or folders to write."""
     config_option: ClassVar[str] = "--config "
     """What stands before a configuration file on the command line."""
-    seed: int = Field(0, ge=0)
+    seed: int = Field(0, ge=0, lt=1 << 32)
+
+    @field_validator("*")
+    @classmethod
+    def _named(cls, value: Any, info: ValidationInfo) -> Any:
+        is_path = info.field_name in (*cls.path_keys, *cls.written_keys)
+        if is_path and (value == "" or (isinstance(value, list) and "" in value)):
+            raise ValueError("an empty name; a file or folder was expected")
+        return value
 
     @classmethod
     def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -11,7 +13,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 import fogml
-from fogml.escaping import markup, script_data
+from fogml.escaping import figure_text, markup, script_data
 from fogml.report import words
 
 
@@ -56,10 +58,27 @@ class _Drawings:
 
     def __call__(self, drawing: Drawing) -> Markup:
         self.count += 1
-        data = script_data(drawing.figure.to_json())
+        data = script_data(json.dumps(_as_shown(json.loads(drawing.figure.to_json())), ensure_ascii=False))
         template = _environment().get_template("figure.html")
         height = drawing.figure.layout.height or 400
         return Markup(template.render(drawing=drawing, number=self.count, data=data, height=height))
+
+
+_MARKS = ("<br>", "<extra>", "</extra>")
+_MARK = re.compile("(" + "|".join(_MARKS) + ")")
+
+
+def _as_shown(value: Any) -> Any:
+    """What a figure holds, its texts as plotly shows them letter by letter, but for the pages' own marks."""
+    if isinstance(value, str):
+        return "".join(part if part in _MARKS else figure_text(part) for part in _MARK.split(value))
+    if isinstance(value, list):
+        return [_as_shown(item) for item in value] if any(map(_may_hold_text, value)) else value
+    return {key: _as_shown(item) for key, item in value.items()} if isinstance(value, dict) else value
+
+
+def _may_hold_text(value: Any) -> bool:
+    return isinstance(value, str | list | dict)
 
 
 @cache

@@ -38,15 +38,16 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
     ------
     InputError
         If the suffix is not known, the place can't be written, or a side file of that stem
-        states other facts.
+        states other facts, or a value of a known column is not finite.
     """
     path = Path(path)
     suffix = _checked_suffix(path)
     cells = header_cells(run)
     if suffix in (".csv", ".parquet"):
         with BlockWriter(path, run.facts) as writer:
-            writer.write({cell: run.columns[name] for name, cell in cells.items()})
+            writer.write(run)
         return
+    _check_finite(path, {cell: run.columns[name] for name, cell in cells.items()}, carried_cells(run))
     with _with_side_file(path, run.facts) as partial:
         if suffix == ".mat":
             from fogml.runs.mat_files import write_mat
@@ -56,6 +57,20 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
             from fogml.runs.hdf5_files import write_hdf5
 
             write_hdf5(run, cells, partial)
+
+
+def _check_finite(
+    path: Path, block: Mapping[str, NDArray[np.generic]], carried: Collection[str], first: int = 0
+) -> None:
+    """Refuse a block from row `first` on with a value that is no result, but in columns that are carried."""
+    for cell, values in block.items():
+        sound = np.isfinite(values) if cell not in carried else np.ones(0, dtype=np.bool_)
+        if not sound.all():
+            row = int(np.argmin(sound))
+            raise InputError(
+                f"{path.name}, column '{cell}', row {first + row + 1}: comes out as {values[row]}, which is "
+                f"no result; {FAR_OFF}"
+            )
 
 
 def header_cells(run: Run) -> dict[str, str]:
@@ -138,8 +153,9 @@ class BlockWriter:
             carried = carried_cells(block)
             block = {cell: block.columns[name] for name, cell in header_cells(block).items()}
         arrays = {cell: np.asarray(values) for cell, values in block.items()}
-        self._check_finite({cell: values for cell, values in arrays.items() if cell not in carried})
+        _check_finite(self.path, arrays, carried, self._rows)
         table = arrow.table(arrays)
+        self._rows += len(table)
         if self._schema is None:
             self._schema = table.schema
             if self.facts is not None:
@@ -151,17 +167,6 @@ class BlockWriter:
                 f"{self.path.name}: a block's columns {table.column_names} are not the first block's"
             )
         self._append(table)
-
-    def _check_finite(self, block: Mapping[str, NDArray[np.generic]]) -> None:
-        for cell, values in block.items():
-            sound = np.isfinite(values)
-            if not sound.all():
-                row = int(np.argmin(sound))
-                raise InputError(
-                    f"{self.path.name}, column '{cell}', row {self._rows + row + 1}: comes out as "
-                    f"{values[row]}, which is no result; {FAR_OFF}"
-                )
-        self._rows += len(next(iter(block.values()), ()))
 
     def _opened(self, schema: Schema) -> Any:
         if self.path.suffix.lower() == ".parquet":

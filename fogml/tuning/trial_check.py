@@ -31,16 +31,24 @@ class _Attributes(BaseModel):
     parameters: dict[str, Any] = {}
     fold_errors: list[list[FiniteFloat]] = []
     fold_rows: list[list[FiniteFloat]] = []
+    fold_means: list[list[FiniteFloat]] | None = None
     bytes: FiniteFloat | None = None
     operations: FiniteFloat | None = None
     reason: str = ""
     place: int = 0
     worker: _Worker | None = None
+    reference: str | None = None
 
     @model_validator(mode="after")
     def _of_one_length(self) -> _Attributes:
         if [len(fold) for fold in self.fold_errors] != [len(fold) for fold in self.fold_rows]:
             raise ValueError("each fold needs as many errors as numbers of rows")
+        lengths = [(len(errors), 0) for errors in self.fold_errors]
+        if self.fold_means is not None and (
+            len(self.fold_means) != len(lengths)
+            or any(len(means) not in kinds for means, kinds in zip(self.fold_means, lengths))
+        ):
+            raise ValueError("each fold needs as many means as errors, or none")
         if any(rows <= 0.0 for fold in self.fold_rows for rows in fold):
             raise ValueError("numbers of rows are positive")
         return self
@@ -71,7 +79,7 @@ def _fault(trial: FrozenTrial, objectives: int) -> str:
         return f"{'.'.join(str(part) for part in first['loc'][:2])}: {first['msg']}".lstrip(": ")
     if trial.state.name != "COMPLETE":
         return ""
-    if not {"model", "features"} <= told.model_fields_set:
+    if "model" not in told.model_fields_set or told.features is None:
         return "it names no model and features"
     if len(trial.values or ()) != objectives:
         return f"{objectives} values were expected"

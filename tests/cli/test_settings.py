@@ -148,6 +148,9 @@ def test_settings_that_are_written_are_read_back():
         ("repair: 1", "'repair': .*boolean"),
         ("model: 5", "'model': .*string"),
         ("averaging: 010", "'010' begins with a zero"),
+        ("seed: 4294967296", "'seed': .*less than 4294967296"),
+        ("runs: [a.csv, '']", "'runs': .*empty name; a file or folder was expected"),
+        ("out: ''", "'out': .*empty name"),
     ],
 )
 def test_a_value_of_another_type_is_told(tmp_path, values, told):

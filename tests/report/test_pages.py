@@ -8,10 +8,12 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 
 from fogml.report import compare_page, index_page, inspect_page, noise_page, train_page
 from fogml.report.compare_page import ranked
+from fogml.report.page import Drawing, _Drawings
 from fogml.report.reduce import DRAWN_POINTS
 from fogml.report.words import number
 from fogml.runs.findings import Finding
@@ -101,6 +103,18 @@ def test_names_from_files_cannot_become_markup() -> None:
     html = train_page(judged)
     assert "<script>alert" not in html and "<img" not in html and "<b>" not in html
     assert name in Page(html).text
+
+
+def test_names_in_figures_are_shown_letter_by_letter() -> None:
+    """plotly takes marks in its texts for markup, whatever the page's own escaping."""
+    bars = go.Bar(x=["<b>u</b>"], y=[1.0], name="<a href='x'>a & b</a>", hovertemplate="%{y}<extra></extra>")
+    figure = go.Figure(bars, layout={"xaxis": {"title": {"text": "unit<br>[deg/h]"}}})
+    (drawn,) = Page(str(_Drawings()(Drawing(figure, "bars")))).figures
+    trace = drawn["data"][0]
+    assert trace["x"] == ["&lt;b&gt;u&lt;/b&gt;"]
+    assert trace["name"] == "&lt;a href='x'&gt;a &amp; b&lt;/a&gt;"
+    assert trace["hovertemplate"] == "%{y}<extra></extra>"
+    assert drawn["layout"]["xaxis"]["title"]["text"] == "unit<br>[deg/h]"
 
 
 def test_the_train_page_states_the_figures_of_the_judgement() -> None:
