@@ -94,17 +94,19 @@ def noise_report(
     default = _default_times(first.sample_s, max(part.stop - part.start for part in segments))
     whole = allan(default, True)
     listed = whole if overlapping and taus is None else allan(default if taus is None else taus, overlapping)
-    terms = noise_terms(spectrum_of_runs(series), whole, LEVEL, least_tau_s=first.new_s)
+    moves = [moving_temperatures(one) for one in runs]
     moving: dict[str, float] = {}
-    for one in runs:
-        moving |= moving_temperatures(one)
-    alone = [_alone(one) for one in series] if len(series) > 1 else []
+    for one in moves:
+        moving |= one
+    spectrum = spectrum_of_runs(series, [bool(one) for one in moves])
+    terms = noise_terms(spectrum, whole, LEVEL, least_tau_s=first.new_s, ramps=len(series))
+    alone = [_alone(one, bool(m)) for one, m in zip(series, moves)] if len(series) > 1 else []
     steady = stationarity(first.stretches, first.new_s) if len(series) == 1 else None
     warnings = [
         *(
             warning
-            for one in series
-            for warning in _warnings(one.run, moving_temperatures(one.run), one.segments)
+            for one, spans in zip(series, moves)
+            for warning in _warnings(one.run, spans, one.segments)
         ),
         *doubts_of(terms, steady, alone),
     ]
@@ -139,11 +141,11 @@ def noise_report(
     }
 
 
-def _alone(series: NoiseSeries) -> NoiseTerms:
+def _alone(series: NoiseSeries, moves: bool) -> NoiseTerms:
     values, segments = joined([series])
     times = _default_times(series.sample_s, max(part.stop - part.start for part in segments))
     allan = allan_deviation(values, series.sample_s, times, segments=segments, level=LEVEL)
-    return noise_terms(spectrum_of_runs([series]), allan, LEVEL, least_tau_s=series.new_s)
+    return noise_terms(spectrum_of_runs([series], [moves]), allan, LEVEL, least_tau_s=series.new_s, ramps=1)
 
 
 def _default_times(sample_s: float, samples: int) -> FloatArray:

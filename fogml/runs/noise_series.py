@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.thermal_columns import thermal_columns
 from fogml.signals.holds import hold_of
 from fogml.signals.noise_spectrum import Spectrum, spectrum_of
 
@@ -68,14 +69,23 @@ def joined(series: Sequence[NoiseSeries]) -> tuple[FloatArray, list[slice]]:
     return np.concatenate([one.run.error_deg_h for one in series]), segments
 
 
-def spectrum_of_runs(series: Sequence[NoiseSeries]) -> Spectrum:
-    """Spectrum of all stretches, each run with a ramp of its own."""
+def spectrum_of_runs(series: Sequence[NoiseSeries], moving: Sequence[bool]) -> Spectrum:
+    """Spectrum of all stretches, each run with a ramp of its own; those are the first columns.
+
+    Behind them is what a drift may follow in runs whose temperature is moving.
+    """
+    follows = [thermal_columns(one.run) if moves else None for one, moves in zip(series, moving, strict=True)]
     columns = []
     for place, one in enumerate(series):
         for time in one.times:
             ramp = np.zeros((len(time), len(series)))
             ramp[:, place] = time
-            columns.append(ramp)
+            drifts = [
+                (one_of(time) if other == place else np.zeros((len(time), one_of(time[:1]).shape[1])))
+                for other, one_of in enumerate(follows)
+                if one_of is not None
+            ]
+            columns.append(np.column_stack([ramp, *drifts]))
     stretches = [part for one in series for part in one.stretches]
     return spectrum_of(stretches, series[0].new_s, columns)
 

@@ -161,8 +161,7 @@ def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[Noise
         tried = [
             NoiseChoice(m, m.scanned(corners if m.filter.free else corners[:1]), penalty) for m in models
         ]
-        # What lets more past than it holds back is no filter.
-        return [c for c in tried if c.fit["W"] <= 0.5 * c.fit["N"]]
+        return [c for c in tried if _holds_back(c)]
 
     found = fitted(first, _STARTS, None)
     if all(c.fit.loss > plain.fit.loss - _WORTH for c in found):
@@ -177,6 +176,19 @@ def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[Noise
         used = np.asarray(ends <= _ENDS * best.density)
         found = fitted(first, begin, used)
     return found + fitted([form for form in LOW_PASSES if form not in first], begin, used)
+
+
+def _holds_back(choice: NoiseChoice) -> bool:
+    """Whether most of a model's white noise is that behind its filter, and not what comes after it.
+
+    Noise after the filter that makes more of the output's power is the gyro's own, and what looks like noise
+    held back is a drift, or correlated noise.
+    """
+    model, fit = choice.model, choice.fit
+    density = model.design(fit.log_corner)[0] * fit.coefficients
+    names = list(fit.terms.names)
+    held, after = (float(model.spectrum.count @ density[:, names.index(name)]) for name in ("N", "W"))
+    return after <= 0.5 * held
 
 
 def _running_mean(spectrum: Spectrum) -> OutputFilter | None:

@@ -112,13 +112,18 @@ class NoiseTerms:
 
 
 def noise_terms(
-    spectrum: Spectrum, allan: AllanResult, level: float = 0.9, *, least_tau_s: float = 0.0
+    spectrum: Spectrum,
+    allan: AllanResult,
+    level: float = 0.9,
+    *,
+    least_tau_s: float = 0.0,
+    ramps: int | None = None,
 ) -> NoiseTerms:
     """Noise terms from the spectrum of a rate in deg/h.
 
     The density of quantisation, white noise, flicker and random walk (IEEE Std 952, annex C) behind an
     output filter if the data show one, of greatest likelihood with coefficients that are not negative; the
-    ramp is the constant of the spectrum's only columns, straight lines. Intervals are those of the profile
+    ramp is the constant of the spectrum's first columns, straight lines. Intervals are those of the profile
     likelihood, with models weighed by their evidence; where rows scatter more than they should, the excess
     counts as error of every row.
 
@@ -129,13 +134,16 @@ def noise_terms(
     Parameters
     ----------
     spectrum
-        Of values in deg/h, with the lines that the ramp of each run makes [s] as columns.
+        Of values in deg/h, with the lines that the ramp of each run makes [s] as columns, and behind them
+        what else is kept out.
     allan
         Overlapping Allan deviation of the same values.
     level
         Coverage of the intervals.
     least_tau_s
         Averaging time below which the Allan deviation says nothing, as values are repeated [s].
+    ramps
+        Number of columns that are straight lines; all if None.
 
     Raises
     ------
@@ -153,7 +161,7 @@ def noise_terms(
         low, high = _interval(search, name, level)
         fitted, lower, upper = (_SCALES[name] * float(np.sqrt(v)) for v in (search.best[name], low, high))
         terms[name] = NoiseTerm(fitted if fitted > 0 else None, lower, upper, _UNITS[name], fitted)
-    terms["R"] = _ramp(search.best, spectrum.removed, level)
+    terms["R"] = _ramp(search.best, spectrum.removed, level, ramps)
     taus = allan.taus_s
     holds = _holds_from(search, taus)
     seen = (allan.adev > 0) & (taus >= max(holds, least_tau_s) * (1.0 - 1e-9))
@@ -257,16 +265,16 @@ def _crossing(
     return c
 
 
-def _ramp(fit: SpectrumFit, removed: FloatArray, level: float) -> NoiseTerm:
+def _ramp(fit: SpectrumFit, removed: FloatArray, level: float, ramps: int | None) -> NoiseTerm:
     """The ramp, from the slopes of all runs: their root mean square where there are several."""
     from scipy.special import ndtri
 
-    count = len(fit.constants)
+    count = len(fit.constants) if ramps is None else min(ramps, len(fit.constants))
     if count == 0:
         return NoiseTerm(None, 0.0, 0.0, _UNITS["R"], 0.0)
     z = float(ndtri(0.5 + 0.5 * level))
-    size = float(np.sqrt(np.mean((fit.constants + removed) ** 2))) * _SCALES["R"]
-    error = float(np.sqrt(np.trace(fit.covariance) / count)) / np.sqrt(count) * _SCALES["R"]
+    size = float(np.sqrt(np.mean((fit.constants + removed)[:count] ** 2))) * _SCALES["R"]
+    error = float(np.sqrt(np.trace(fit.covariance[:count, :count]) / count)) / np.sqrt(count) * _SCALES["R"]
     lower, upper = max(size - z * error, 0.0), size + z * error
     return NoiseTerm(size if lower > 0.0 else None, lower, upper, _UNITS["R"], size if lower > 0.0 else 0.0)
 

@@ -11,13 +11,9 @@ from fogml.errors import InputError
 from fogml.runs.noise_of_run import moving_temperatures
 from fogml.runs.noise_series import AT_REST_DEG_S
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.signals.floor import Columns, Floor, FloorModel, floor_model
-from fogml.signals.memory import Lag
+from fogml.runs.thermal_columns import thermal_columns
+from fogml.signals.floor import Columns, Floor, FloorModel, IntArray, floor_model
 
-_LAGS_S = (60.0, 300.0, 1200.0, 3600.0)
-"""Time constants of the temperature's lags that a drift may follow [s]: those of coils and housings."""
-_COARSE = 4096
-"""Rows at which the slow temperatures are worked out, at least."""
 _KEPT = "_floor_models"
 
 
@@ -95,7 +91,7 @@ def _model(
             raise InputError(f"{run.name}: no three samples in a row count; a noise floor needs more")
         starts, stops = segments[long].T
         moves = bool(moving_temperatures(run))
-        columns = _thermal(run, rows) if moves else None
+        columns = _at_rows(run, rows) if moves else None
         # Without a temperature nobody knows whether a slow change is the gyro's own.
         drifts = moves or (not static and not run.temperature_columns)
         kept[key] = floor_model(
@@ -105,21 +101,7 @@ def _model(
     return found
 
 
-def _thermal(run: Run, rows: np.ndarray) -> Columns:
-    """What a drift may follow: temperature, its powers, its lags, and products with its rate."""
-    temperature = run.temperature("T")
-    width = max(len(run) // _COARSE // 2, 1)
-    at = np.arange(0, len(run), width)
-    coarse = np.add.reduceat(temperature, at) / np.diff(np.append(at, len(run)))
-    time = np.add.reduceat(run.time, at) / np.diff(np.append(at, len(run)))
-    scale = float(np.std(coarse)) or 1.0
-    t = (coarse - coarse.mean()) / scale
-    step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
-    lags = [Lag(max(lag_s, step), step).push(time, t)[0] for lag_s in _LAGS_S]
-    table = np.column_stack((t, t**2, t**3, *lags, t * (t - lags[0]), t * (t - lags[1])))
-
-    def columns(places: np.ndarray) -> FloatArray:
-        wanted = run.time[rows[places]]
-        return np.column_stack([np.interp(wanted, time, column) for column in table.T])
-
-    return columns
+def _at_rows(run: Run, rows: IntArray) -> Columns:
+    """What a drift may follow, by places among rows."""
+    follows = thermal_columns(run)
+    return lambda places: follows(run.time[rows[places]])

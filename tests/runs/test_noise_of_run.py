@@ -180,3 +180,21 @@ def test_noise_that_changes_and_gaps_are_told():
     assert report["stationarity"]["thirds"][0] < report["stationarity"]["thirds"][2]
     gapped = noise_report(run.with_columns(time=run.time + np.repeat([0.0, 50.0, 400.0], 10_000)))
     assert gapped["gaps"] == {"count": 2, "lost_s": pytest.approx(400.0)}
+
+
+@pytest.mark.parametrize("recorded", [True, False])
+def test_drift_over_a_cycle_is_no_noise_behind_a_filter(recorded):
+    """White noise of 0.01 deg/sqrt(h) beside a drift of 1.5 deg/h with temperature, that recorded or not."""
+    time = 0.5 * np.arange(7200)
+    temperature = 20.0 + 30.0 * (0.5 - 0.5 * np.cos(2 * np.pi * time / time[-1]))
+    noise = 0.01 * 60.0 * np.sqrt(2.0) * np.random.default_rng(1).normal(size=len(time))
+    columns = {"time": time, "gyro": 7.0 + 0.05 * temperature + noise, "T": temperature}
+    if not recorded:
+        del columns["T"]
+    report = noise_report(Run("cycle.csv", columns))
+    assert report["filter"] is None
+    assert report["terms"]["N"]["value"] == pytest.approx(0.01, rel=0.03)
+    if recorded:
+        low, high = report["terms"]["N"]["ci"]
+        assert low < 0.01 < high
+        assert report["terms"]["B"]["ci"][0] == 0.0
