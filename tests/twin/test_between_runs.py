@@ -32,6 +32,8 @@ REMEMBERING = (
     "warmup_bias",
     "sf_hysteresis",
     "hidden_thermal_node",
+    "shupe_winding",
+    "axial_gradient",
     "rate_ramp",
 )
 
