@@ -207,6 +207,7 @@ def unit_facts(twin: Twin) -> dict[str, Any]:
         "wavelength_nm": 1e9 * coil.wavelength,
         "winding": coil.winding,
         "layers": coil.layers,
+        "leads_m": [coil.lead_1, coil.lead_2],
         "sagnac_s": coil.sagnac_s,
         "phase_urad_per_deg_h": 1e6 * coil.phase_per_deg_h,
         "transit_us": 1e6 * coil.transit_s,

@@ -186,6 +186,7 @@ def _unit(facts: Mapping[str, Any] | None) -> Table | None:
     rows = [Row((name, number(facts[key], 4), unit)) for key, name, unit in _UNIT]
     caption = (
         f"{stated(facts['length_m'])} m of fibre on {stated(facts['diameter_m'])} m, "
-        f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers."
+        f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers, "
+        f"leads of {' and '.join(stated(length) for length in facts['leads_m'])} m."
     )
     return Table((("", "", "text"), ("Value", "", "figure"), ("Unit", "", "text")), tuple(rows), caption)

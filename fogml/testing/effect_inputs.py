@@ -13,6 +13,7 @@ from fogml.runs.run import FloatArray
 from fogml.twin.effect import SET_UP
 from fogml.twin.inputs import REST, STAND_INS, Inputs
 from fogml.twin.memory import Memory
+from fogml.twin.optics import Coil
 from fogml.twin.plant.standard import standard_network
 
 SAMPLE_S = 10.0
@@ -93,6 +94,7 @@ def _programme() -> Inputs:
         powered_on_s=0.0,
         power_ons_s=(27000.0,),
         drives=drives,
+        coil=Coil(lead_1=0.5, lead_2=0.3),
         output=shaped,
         slopes=slopes,
     )

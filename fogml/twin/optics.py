@@ -45,6 +45,8 @@ class Coil:
         How it is wound, and in how many layers.
     pitch, diffusivity
         Distance of neighbouring layers [m], and how heat goes across them [m**2/s].
+    lead_1, lead_2
+        Fibre outside of the coil [m]: beside the electronics at its far end, along the case at its near end.
     """
 
     length: float = 1000.0
@@ -57,11 +59,13 @@ class Coil:
     layers: int = 32
     pitch: float = 0.25e-3
     diffusivity: float = 2e-7
+    lead_1: float = 0.0
+    lead_2: float = 0.0
 
     def __post_init__(self) -> None:
         for entry in fields(self):
             value = getattr(self, entry.name)
-            if entry.name == "winding":
+            if entry.name == "winding" or (entry.name.startswith("lead") and value == 0.0):
                 continue
             lowest = -math.inf if entry.name in ("index_slope", "expansion") else 0.0
             if not (math.isfinite(value) and value > lowest):

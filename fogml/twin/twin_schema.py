@@ -42,6 +42,8 @@ COIL = (
     _quantity("expansion", "1/degC", -1e-3, 1e-3),
     _quantity("pitch", "m", 1e-6, 1e-2),
     _quantity("diffusivity", "m2/s", 1e-9, 1e-3),
+    _quantity("lead_1", "m", 0.0, 1e3),
+    _quantity("lead_2", "m", 0.0, 1e3),
 )
 RECEIVER = (
     _quantity("line_width", "m", 1e-12, 1e-6),
