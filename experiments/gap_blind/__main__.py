@@ -94,7 +94,8 @@ def _do(
     """The stages of one part."""
     directory = str(Path(given.directory) / part["name"])
     if "make" in stages:
-        drawn = {key: part[key] for key in ("first", "kinds", "least_d_prime") if key in part}
+        keys = ("first", "kinds", "least_d_prime", "d_prime", "reality")
+        drawn = {key: part[key] for key in keys if key in part}
         make_and_tell(
             MakeSettings(
                 directory=directory,
