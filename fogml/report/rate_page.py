@@ -89,10 +89,12 @@ def _ladder(values: Mapping[str, Any]) -> tuple[str, Markup, str] | None:
     figure = line_figure(
         [Curve(rate / 3600.0, shown, style.BLUE, dots=True)],
         "rate [deg/s]",
-        "off the line [ppm of the greatest]",
+        "off the line [ppm]",
         "Output less the line through it, over the rate",
     )
-    words = "Within the range; a step about zero is asymmetry, a bend nonlinearity."
+    words = (
+        "In ppm of the greatest rate, within the range; a kink about zero is asymmetry, a bend nonlinearity."
+    )
     return "Output over the rate", figure, words
 
 

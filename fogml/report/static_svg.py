@@ -13,6 +13,8 @@ from fogml.escaping import markup
 
 FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
+_DIGIT = 6.2
+"""Width of a digit of a label."""
 _LEGEND, _LEGEND_COLUMNS = 15.0, 3
 
 
@@ -85,7 +87,11 @@ def line_figure(
     for value in _ticks_of(x_span, "x" in log, about=8):
         x = f"{float(across(value)):.1f}"
         parts.append(f'<path d="M{x},{top}V{height - _BOTTOM}" stroke="#E4E7EB"/>')
-        parts.append(f'<text x="{x}" y="{height - _BOTTOM + 13}" text-anchor="middle">{_tick(value)}</text>')
+        label = _tick(value)
+        # A long label at the right edge would reach out of the picture.
+        anchor = "end" if float(x) + 0.5 * _DIGIT * len(label) > width else "middle"
+        at = f'x="{width if anchor == "end" else x}" y="{height - _BOTTOM + 13}" text-anchor="{anchor}"'
+        parts.append(f"<text {at}>{label}</text>")
     for value in _ticks_of(y_span, "y" in log, about=4):
         y = float(up(value))
         parts.append(f'<path d="M{_LEFT},{y:.1f}H{width - _RIGHT}" stroke="#E4E7EB"/>')
