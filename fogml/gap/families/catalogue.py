@@ -6,6 +6,7 @@ from collections.abc import Iterable
 
 from fogml.gap.families import other_families as other
 from fogml.gap.families import thermal_families as thermal
+from fogml.gap.families import turning_families as turning
 from fogml.gap.families.family import Build, Family
 from fogml.gap.families.places import Scene, steps_are_coarse
 from fogml.gap.families.unknown import unknown_families
@@ -33,8 +34,12 @@ FAMILIES: dict[str, Build] = {
     "sensor_placement": other.sensor_placement,
     "sensor_steps": other.sensor_steps,
     "clock_skew": other.clock_skew,
-    "scale_factor_node": other.scale_factor_node,
-    "modulator": other.modulator,
+    "scale_factor_node": turning.scale_factor_node,
+    "modulator": turning.modulator,
+    "even_in_rate": turning.even_in_rate,
+    "odd_in_rate": turning.odd_in_rate,
+    "vibration": turning.vibration,
+    "leads": turning.leads,
     "moisture": other.moisture,
 }
 """Families by the names that effects declare; an effect of family ``signature`` has its own signature's."""

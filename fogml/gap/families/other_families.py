@@ -23,8 +23,6 @@ CYCLE_S = (60.0, 1500.0)
 """Periods of a chamber's own cycle [s]."""
 NEAR = (0.5,)
 """Mixes of the faces that stand for the optics' place, where a slope in temperature is all that acts."""
-MODULATOR_S = (30.0, 300.0)
-"""Start-up of a modulator's second loop [s]."""
 MOISTURE_S = (1800.0, 7200.0, 36000.0, 144000.0, 600000.0)
 """Times in which a coil takes up the air's moisture [s]."""
 LINES = 10
@@ -91,36 +89,6 @@ def _at(
         return rows.response(declared, shape, temperatures, constants)
     about = shape[AT_AMPLITUDE]
     return rows.changed_output(declared, about, constants) / about
-
-
-def scale_factor_node(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """A scale factor that follows the temperature of the source or the modulator, or any curve of it."""
-    speed = 1e-6 * rows.of(rows.even.input_rate_deg_h * np.ones(len(rows.kept)))
-    low, high = scene.range_degc
-    for place in scene.optics(rows, NEAR):
-        x = rows.of(place.temperature)
-        yield Block(speed[:, None] * (x - 25.0)[:, None], {"place": place.name}, place.weight)
-        yield Block(speed[:, None] * bumps_of(x, low, high), {"place": place.name}, 0.3 * place.weight)
-
-
-def modulator(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """A scale factor that follows the modulator's temperature, and finds its second loop after power-on."""
-    speed = 1e-6 * rows.of(rows.even.input_rate_deg_h * np.ones(len(rows.kept)))
-    on = np.isfinite(rows.even.powered_on_s)
-    found = [rows.of(rows.even.unwarmed(s)) * 100.0 if on else np.zeros(len(rows)) for s in MODULATOR_S]
-    for place in scene.optics(rows, NEAR):
-        x = rows.of(place.temperature) - 25.0
-        yield Block(speed[:, None] * x[:, None], {"place": place.name}, place.weight)
-        yield Block(
-            speed[:, None] * np.column_stack([x, *found]), {"place": place.name, "starts": True}, place.weight
-        )
-
-
-def bumps_of(x: FloatArray, low: float, high: float) -> FloatArray:
-    """Five smooth bumps over a range, shape (n, 5)."""
-    from fogml.gap.families.thermal_families import bumps
-
-    return bumps(x, low, high, 5)
 
 
 def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

@@ -133,6 +133,10 @@ class Rows:
             self.cache[key] = _meeting(self.by_sample.inputs(self.even, None), constants)
         return self.cache[key].afresh()
 
+    def samples(self, values: FloatArray) -> FloatArray:
+        """Means of a series over the samples, shape (n,) to (m,)."""
+        return self.of(self.by_sample.means(values))
+
     def changed_output(
         self, declared: Effect, amplitude: float, constants: Mapping[str, float]
     ) -> FloatArray:

@@ -197,10 +197,14 @@ def rate_of_temperature(rows: Rows, scene: Scene, constants: Constants) -> Itera
 
 
 def shupe(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """The rate of the difference between the faces of the winding."""
+    """The rate of the difference between the faces of the winding, and between can and winding."""
     difference = rows.even.temperature("T_out") - rows.even.temperature("T_in")
+    middle = 0.5 * (rows.even.temperature("T_out") + rows.even.temperature("T_in"))
+    can = rows.even.temperature("T_case") - middle
     for late in SHUPE_LAGS_S:
-        yield column_block(rows.of(rate(rows.even.time, lag(rows.even.time, difference, late))), lag=late)
+        faces = rows.of(rate(rows.even.time, lag(rows.even.time, difference, late)))
+        yield column_block(faces, lag=late)
+        yield column_block(faces, rows.of(rate(rows.even.time, lag(rows.even.time, can, late))), lag=late)
 
 
 def static(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

@@ -26,6 +26,7 @@ class PigtailShupe(BiasEffect):
 
     id = "pigtail_shupe"
     code = "B6"
+    family = "leads"
     place = "leads"
     title = "Shupe effect of the leads"
     amplitude = Quantity("amplitude", "m", (0.1, 1.0), (0.005, 0.1), "l_1", (-100.0, 100.0), signed=True)

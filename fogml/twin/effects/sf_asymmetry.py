@@ -28,6 +28,7 @@ class SfAsymmetry(ScaleFactorEffect):
 
     id = "sf_asymmetry"
     code = "D5"
+    family = "even_in_rate"
     place = "electronics"
     title = "Asymmetry of the scale factor"
     amplitude = Quantity("amplitude", "ppm", (10.0, 200.0), (0.5, 10.0), "k_a", (-1e5, 1e5), signed=True)

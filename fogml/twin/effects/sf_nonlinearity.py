@@ -29,6 +29,7 @@ class SfNonlinearity(ScaleFactorEffect):
 
     id = "sf_nonlinearity"
     code = "D5"
+    family = "odd_in_rate"
     place = "electronics"
     title = "Non-linearity of the scale factor"
     amplitude = Quantity("amplitude", "ppm", (50.0, 500.0), (1.0, 20.0), "c", (-1e5, 1e5), signed=True)

@@ -25,6 +25,7 @@ class VibrationRectification(BiasEffect):
 
     id = "vibration_rectification"
     code = "F1"
+    family = "vibration"
     place = "mount"
     title = "Vibration rectification"
     amplitude = Quantity("amplitude", "deg/h/g2", (0.01, 1.0), (1e-4, 2e-2), "k_v", (-1e6, 1e6), signed=True)
