@@ -20,6 +20,7 @@ from fogml.gap.model import Constant
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
+from fogml.twin.nominal import DELTA
 from fogml.twin.twin import Twin
 
 LONGEST_RUNS = 30.0
@@ -147,9 +148,13 @@ def reading_errors(rows: Rows, constants: Mapping[str, float], white_deg_h: floa
     Those far under the white noise of the rows are left out.
     """
     told = slopes(rows, constants)
+    steepest = sum(float(np.abs(slope).max()) * (2.0 if n == DELTA else 1.0) for n, slope in told.items())
     columns = []
     for name, smoothness in rows.smoothness.items():
-        if name not in ("T", "T_in", "T_out") or smoothness.noise == 0.0:
+        if name not in ("T", "T_in", "T_out"):
+            continue
+        # The waves are of length 1: none makes more than the steepest slope of it.
+        if smoothness.noise * steepest < LEAST_ERROR * white_deg_h:
             continue
         for error in smoothness.errors(len(rows.kept)).T:
             column = through_nominal(rows, told, {name: error})

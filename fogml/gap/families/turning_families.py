@@ -18,7 +18,6 @@ MODULATOR_S = (30.0, 300.0)
 """Start-up of a modulator's second loop [s]."""
 BEHIND_S = (300.0, 1200.0)
 """How far a node near a place may lag behind it [s]."""
-_PPM = 3600e-6
 Constants = Mapping[str, float]
 
 
@@ -60,7 +59,8 @@ def even_in_rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
     """What does not change sign with the rate, by any power of it."""
     most = max(float(np.abs(r.by_sample.recorded.table_rate).max(initial=0.0)) for r in scene.runs) or 1.0
     speed = np.abs(rows.by_sample.recorded.input_rate_deg_h * np.ones(len(rows.by_sample.row)))
-    powers = [rows.samples(1e-6 * speed * (speed / (3600.0 * most)) ** p) for p in (0.0, 1.0, -0.5)]
+    full = 3600.0 * most
+    powers = [rows.samples(1e-6 * full * (speed / full) ** p) for p in (1.0, 2.0, 0.5)]
     yield column_block(powers[0])
     yield column_block(*powers)
 

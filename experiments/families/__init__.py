@@ -1,0 +1,1 @@
+"""The diagnosis on families beside the present one, on the same blind cases."""

@@ -1,0 +1,98 @@
+"""The diagnosis on families beside the present one: every wanted figure, on the cases that both answered.
+
+``python -m experiments.families DIR...`` reads the suites in the folders, made by ``fogml blind make`` and
+answered by ``fogml blind run --method diagnosis --method families``, and writes ``results.md`` and
+``results.json``. Of a suite that one method alone has answered, that method alone stands in the table.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.results import write_results
+from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.gap.blind.methods import FAMILIES
+from fogml.gap.blind.score import marks_of
+from fogml.gap.blind.scoring.by_reality import ALL, by_reality
+from fogml.gap.blind.scoring.marks import Mark
+from fogml.gap.blind.truth import read_truth
+from fogml.report.blind_words import figure_text, wanted_text
+from fogml.report.words import MISSING
+
+HERE = Path(__file__).parent
+METHODS = (DIAGNOSIS, FAMILIES)
+
+
+def main() -> None:
+    """Score both methods and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("suites", type=Path, nargs="+", help="folders of blind suites")
+    parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    given = parser.parse_args()
+    alone: dict[str, list[Mark]] = {method: [] for method in METHODS}
+    both: dict[str, list[Mark]] = {method: [] for method in METHODS}
+    seeds: set[int] = set()
+    for suite in given.suites:
+        folder = BlindFolder(suite)
+        answered = {m: _answered(folder, m) for m in METHODS}
+        shared = answered[DIAGNOSIS] & answered[FAMILIES]
+        for method in METHODS:
+            names = sorted(answered[method])
+            truths = [read_truth(folder.truth / f"{name}.json") for name in names]
+            seeds |= {truth.seed for truth in truths}
+            marks = marks_of(folder, [method], truths, workers=given.workers)[method] if truths else []
+            alone[method] += marks
+            both[method] += [m for m in marks if m.truth.case in shared]
+    values: dict[str, Any] = {"seeds": sorted(seeds)}
+    values["shared"] = {m: by_reality(both[m]) for m in METHODS if both[m]}
+    values["cases"] = {m: len(alone[m]) for m in METHODS} | {"shared": len(both[FAMILIES])}
+    values["families"] = by_reality(alone[FAMILIES])
+    write_results(HERE, values, page(values))
+
+
+def _answered(folder: BlindFolder, method: str) -> set[str]:
+    answers = folder.answers(method)
+    return {name for name in folder.names() if (answers / name / "gap.json").is_file()}
+
+
+def page(values: Mapping[str, Any]) -> str:
+    """``results.md`` of what ``results.json`` holds."""
+    lines = [
+        "# Families beside the present diagnosis",
+        "",
+        f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no final "
+        "figures, and families were widened with failures among these cases in view. Each figure with its "
+        "95 % interval (Wilson's for shares) and what it rests on.",
+        "",
+    ]
+    if values["shared"]:
+        lines += [
+            f"## Cases that both answered ({values['cases']['shared']})",
+            "",
+            *_table({f"{m}, {ALL}": parts[ALL] for m, parts in values["shared"].items()}),
+            "",
+        ]
+    lines += [
+        f"## Families on all cases that they answered ({values['cases'][FAMILIES]}), by reality",
+        "",
+        *_table(values["families"]),
+        "",
+    ]
+    return "\n".join(lines)
+
+
+def _table(columns: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:
+    names = list(columns)
+    rows = [f"| figure | wanted | {' | '.join(names)} |", f"|---|---:|{'---:|' * len(names)}"]
+    for place, row in enumerate(columns[names[0]]):
+        cells = [columns[name][place] for name in names]
+        told = [MISSING if c["value"] is None else f"{figure_text(c)}; {c['n']}" for c in cells]
+        rows.append(f"| {row['words']} | {wanted_text(row)} | {' | '.join(told)} |")
+    return rows
+
+
+if __name__ == "__main__":
+    main()
