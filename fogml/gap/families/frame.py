@@ -156,11 +156,9 @@ def reading_errors(rows: Rows, constants: Mapping[str, float], white_deg_h: floa
         # The waves are of length 1: none makes more than the steepest slope of it.
         if smoothness.noise * steepest < LEAST_ERROR * white_deg_h:
             continue
-        for error in smoothness.errors(len(rows.kept)).T:
-            column = through_nominal(rows, told, {name: error})
-            if float(column @ column) > (LEAST_ERROR * white_deg_h) ** 2:
-                columns.append(column)
-    return np.column_stack(columns) if columns else np.zeros((len(rows), 0))
+        found = through_nominal(rows, told, {name: smoothness.errors(len(rows.kept))})
+        columns.append(found[:, np.sum(found**2, axis=0) > (LEAST_ERROR * white_deg_h) ** 2])
+    return np.concatenate([np.zeros((len(rows), 0)), *columns], axis=1)
 
 
 def fixed_columns(

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.gap.families.readings import Smoothness, smoothed, window_difference
+from fogml.gap.families.readings import Smoothness, at_points, smoothed, window_difference
 from fogml.gap.families.rows import BySample, Rows
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import FloatArray, Run
@@ -59,11 +59,12 @@ def rows_of(run: Run, twin: Twin, most: int) -> Rows:
     count = int(row[-1]) + 1
     replayer = Replayer(run)
     counts = np.bincount(row[usable], minlength=count).astype(np.float64)
-    samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts)
+    spread = (row_s**2 - step**2) / 12.0
+    samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
     even, readings, noise = _even(samples, time, twin, replayer, row_s)
     replayed = replayer.with_temperatures(
-        {name: np.interp(run.time, time, even.temperatures[name]) for name in readings}
+        {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
     ).output(twin)
     errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed)
     kept = counts >= LEAST_FULL * width
@@ -110,7 +111,9 @@ def _replay_errors(
     late = {n: even.temperatures[n] + np.gradient(even.temperatures[n], even.time) for n in readings}
     rougher = {n: smoothed(values, ROUGHER)[0] for n, values in readings.items()}
     for moved in (late, rougher):
-        other = replayer.with_temperatures({n: np.interp(run.time, even.time, v) for n, v in moved.items()})
+        other = replayer.with_temperatures(
+            {n: at_points(even.time, v, run.time, samples.spread) for n, v in moved.items()}
+        )
         columns.append(samples.means(other.output(twin) - replayed))
     return np.column_stack(columns)
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
 from fogml.runs.run import FloatArray
@@ -86,20 +87,27 @@ def _bands(n: int) -> FloatArray:
 def window_difference(
     time: FloatArray, values: FloatArray, window_s: float, ahead_s: float = 0.0
 ) -> FloatArray:
-    """Mean over the last window less the mean over the one before, as integrals over time; shape (n,).
+    """Mean over the last window less the mean over the one before, as integrals over time; shape as given.
 
-    Values are linear between samples, and what they first were before. Samples that stand for the interval
-    that ends at them hold what was half of it `ahead_s`.
+    Values are a cubic spline between samples, and what they first were before. Samples that stand for the
+    interval that ends at them hold what was half of it `ahead_s`.
     """
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(time))])
+    total = CubicSpline(time, values).antiderivative()
 
     def integral(at: FloatArray) -> FloatArray:
-        i = np.clip(np.searchsorted(time, at, side="right") - 1, 0, len(time) - 2)
-        step = at - time[i]
-        slope = (values[i + 1] - values[i]) / (time[i + 1] - time[i])
-        inside = total[i] + step * (values[i] + 0.5 * slope * step)
-        return np.where(at < time[0], (at - time[0]) * values[0], inside)
+        before = np.multiply.outer(np.minimum(at - time[0], 0.0), values[0])
+        return np.asarray(before + total(np.maximum(at, time[0])))
 
     end = time + ahead_s
     here, before = integral(end), integral(end - window_s)
     return np.asarray((here - 2.0 * before + integral(end - 2.0 * window_s)) / window_s)
+
+
+def at_points(time: FloatArray, means: FloatArray, at: FloatArray, spread: float) -> FloatArray:
+    """A smooth course at points, from its means over spans about `time`.
+
+    A mean over a span exceeds the middle's value by half the second derivative times `spread`, the mean
+    square of the span's samples about its middle [s^2].
+    """
+    course = CubicSpline(time, means)
+    return np.asarray(course(at) - 0.5 * spread * course(at, 2))

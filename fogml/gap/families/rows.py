@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.families.readings import Smoothness, window_difference
+from fogml.gap.families.readings import Smoothness, at_points, window_difference
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect, LoopEffect
@@ -156,12 +156,13 @@ class Rows:
 
 @dataclass(frozen=True, eq=False)
 class BySample:
-    """Samples of a run, and the even row that each is in."""
+    """Samples of a run, the even row that each is in, and their mean square about its middle [s^2]."""
 
     recorded: Inputs
     row: NDArray[np.intp]
     used: NDArray[np.bool_]
     counts: FloatArray
+    spread: float
 
     def means(self, values: FloatArray) -> FloatArray:
         """Means of a series over even rows, shape (n,) to (e,); interpolated where there is no sample."""
@@ -175,7 +176,7 @@ class BySample:
         """Inputs at the samples, with the even rows' temperatures."""
         held = {**even.temperatures, **(temperatures or {})}
         time = self.recorded.time
-        smooth = {name: np.interp(time, even.time, values) for name, values in held.items()}
+        smooth = {name: at_points(even.time, values, time, self.spread) for name, values in held.items()}
         return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={}, coil=even.coil)
 
 
@@ -189,19 +190,21 @@ def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:
 def through_nominal(
     rows: Rows, told: Mapping[str, FloatArray], errors: Mapping[str, FloatArray]
 ) -> FloatArray:
-    """What errors of temperatures [degC] on the even rows make of the replay, given slopes; shape (m,)."""
-    total = np.zeros(len(rows.kept))
+    """What errors of temperatures [degC] on the even rows make of the replay, given slopes.
+
+    Shape (m,) for errors of shape (e,); (m, k) for k errors side by side, shape (e, k).
+    """
+    total = np.zeros((len(rows.kept), *next((e.shape[1:] for e in errors.values()), ())))
     for name, slope in told.items():
         if name == DELTA:
             error = errors.get("T", errors.get("T_in"))
             if error is not None:
-                total = total + slope * window_difference(
-                    rows.even.time, error, DELTA_WINDOW_S, 0.5 * rows.run.sample_s
-                )
-            continue
-        error = errors.get(name) if name in errors else errors.get({"T": "T_in", "T_in": "T"}.get(name, name))
+                ahead = 0.5 * rows.run.sample_s
+                error = window_difference(rows.even.time, error, DELTA_WINDOW_S, ahead)
+        else:
+            error = errors.get(name, errors.get({"T": "T_in", "T_in": "T"}.get(name, name)))
         if error is not None:
-            total = total + slope * error
+            total = total + (slope if error.ndim == 1 else slope[:, None]) * error
     return rows.of(total)
 
 
