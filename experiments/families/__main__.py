@@ -12,13 +12,14 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.results import write_results
 from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.gap.blind.methods import FAMILIES
 from fogml.gap.blind.score import marks_of
 from fogml.gap.blind.scoring.by_reality import ALL, by_reality
 from fogml.gap.blind.scoring.marks import Mark
 from fogml.gap.blind.truth import read_truth
+
+from experiments.results import write_results
 from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING
 
