@@ -182,6 +182,10 @@ def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     if plan.atoms[i].operator == "play":
         value = f"state->play[{windows.plays.index(plan.atoms[i])}].state"
         return f"(int32_t)clipped(scaled({value}, {_HELD_BITS - bits}), INT32_MAX)"
+    if plan.atoms[i].bounds is not None:
+        low, high = (round(end * 2.0**_HELD_BITS) for end in plan.atoms[i].bounds or ())
+        value = f"beyond(signal[{windows.signal_of_atom[i]}], INT64_C({low}), INT64_C({high}))"
+        return f"(int32_t)scaled({value}, {_HELD_BITS - bits})"
     if place < 0:
         value = f"scaled(signal[{windows.signal_of_atom[i]}], {_HELD_BITS - bits})"
         return f"(int32_t)clipped({value}, INT32_MAX)"

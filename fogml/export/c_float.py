@@ -122,6 +122,8 @@ def _atom(i: int, plan: Plan, windows: Layout, zero: str, number: Any) -> str:
         return f"state->play[{windows.plays.index(atom)}].state"
     if atom.operator == "since_on":
         return f"exp_of_minus({signal} > {zero} ? {signal} / {number(atom.memory)} : {zero})"
+    if atom.bounds is not None:
+        return f"beyond({signal}, {', '.join(number(end) for end in atom.bounds)})"
     if operator < 0:
         return signal
     value = f"direction(value[{operator}])" if atom.operator == "sign" else f"value[{operator}]"

@@ -131,6 +131,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "identifier": sensor_identifier,
         "input_units": input_units(plan),
         "others": not all(is_temperature(name) for name in plan.sensors),
+        "beyonds": any(atom.operator == "beyond" for atom in plan.atoms),
         "decays": any(atom.operator == "since_on" for atom in plan.atoms),
         "plays": windows.plays,
         "lags": windows.of_method("lag"),

@@ -130,6 +130,7 @@ def _document(plan: Plan) -> dict[str, Any]:
             if atom.window is None
             else {"method": atom.window.method, "length_s": atom.window.length_s},
             "memory": atom.memory or None,
+            "bounds": None if atom.bounds is None else list(atom.bounds),
             "unit": atom.unit,
             "low": limits.low[i],
             "high": limits.high[i],

@@ -94,7 +94,9 @@ def window_weights(plan: Plan) -> FloatArray:
         If the windows look back too far, or something remembers more than any window holds.
     """
     for atom in plan.atoms:
-        if atom.operator in MEMORIES or not all(is_temperature(name) for name in atom.signal.sensors):
+        if atom.operator in (*MEMORIES, "beyond") or not all(
+            is_temperature(name) for name in atom.signal.sensors
+        ):
             raise InputError(
                 f"export: the model takes {atom.text}; a graph from a window holds windows of "
                 "temperatures alone; leave out --with-pipeline, or export --to c"

@@ -7,7 +7,7 @@ from fogml.export.plan import Plan
 WINDOW_OPERATIONS = {"block": 24, "slope": 32, "exp": 6, "first": 4}
 """Additions, multiplications and divisions of a full window's step, one sample leaving it."""
 EXPONENTIAL_OPERATIONS = 20
-MEMORY_OPERATIONS = {"lag": 6, "play": 8, "since_on": EXPONENTIAL_OPERATIONS + 1}
+MEMORY_OPERATIONS = {"lag": 6, "play": 8, "beyond": 9, "since_on": EXPONENTIAL_OPERATIONS + 1}
 """The same of a memory's step, at a steady sample interval."""
 
 

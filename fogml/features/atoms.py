@@ -15,11 +15,11 @@ from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals import windows
 from fogml.signals.clock import EXPONENTIAL_SPAN, Clock
-from fogml.signals.memory import Decay, Lag, MemoryOperator, Play
+from fogml.signals.memory import Beyond, Decay, Lag, MemoryOperator, Play
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-Operator = Literal["value", "lag", "play", "since_on", "diff", "d", "sign"]
+Operator = Literal["value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"]
 Method = Literal["block", "slope", "exp", "first"]
 
 OPERATORS: tuple[Operator, ...] = get_args(Operator)
@@ -94,8 +94,8 @@ class Atom:
     ----------
     operator
         ``value``; ``lag`` first-order lag; ``play`` play operator; ``since_on`` exponential decay
-        since power-on; ``diff`` difference; ``d`` rate per minute; ``sign`` direction of a
-        temperature's rate: -1, 0 or +1, with a dead band of 0.05 degC/min.
+        since power-on; ``beyond`` how far beyond bounds, levelled off; ``diff`` difference; ``d`` rate
+        per minute; ``sign`` direction of a temperature's rate, with a dead band of 0.05 degC/min.
     signal
         What it works on.
     window
@@ -103,12 +103,15 @@ class Atom:
     memory
         Time constant of ``lag`` and ``since_on`` [s], half width of ``play`` [unit of the signal];
         0 for the others.
+    bounds
+        Lower and upper one of ``beyond`` [unit of the signal]; None for the others.
     """
 
     operator: Operator
     signal: Signal
     window: Window | None = None
     memory: float = 0.0
+    bounds: tuple[float, float] | None = None
 
     def __post_init__(self) -> None:
         if self.operator not in OPERATORS:
@@ -126,9 +129,10 @@ class Atom:
             raise InputError(f"atom: since_on of {self.signal.text}; it is of {TIME_ON}")
         if (self.operator in MEMORIES) != (0.0 < self.memory < np.inf):
             expected = "a positive number" if self.operator in MEMORIES else "none"
-            raise InputError(
-                f"atom: {self.operator} with a memory of {self.memory:g}; {expected} was expected"
-            )
+            told = f"with a memory of {self.memory:g}; {expected} was expected"
+            raise InputError(f"atom: {self.operator} {told}")
+        if (self.operator == "beyond") != (self.bounds is not None):
+            raise InputError(f"atom: {self.operator} with bounds {self.bounds}; beyond has two, others none")
 
     def __str__(self) -> str:
         return self.text
@@ -142,6 +146,9 @@ class Atom:
         if self.operator in MEMORIES:
             unit = "s" if self.operator == "lag" else self.signal.written_unit
             return f"{self.operator}({signal}, {f'{number_text(self.memory)} {unit}'.rstrip()})"
+        if self.bounds is not None:
+            ends = (f"{number_text(end)} {self.signal.written_unit}".rstrip() for end in self.bounds)
+            return f"beyond({signal}, {', '.join(ends)})"
         if self.window is None:
             return signal
         if self.operator == "diff":
@@ -169,7 +176,7 @@ class Atom:
         return OPERATORS.index(self.operator), self.signal.order, self.text
 
     def memory_operator(self, sample_s: float) -> MemoryOperator | None:
-        """A fresh operator of what it remembers, for samples `sample_s` seconds apart; None without memory.
+        """A fresh operator for samples `sample_s` seconds apart; None for values and windows.
 
         Raises
         ------
@@ -180,6 +187,8 @@ class Atom:
             return Lag(self.memory, sample_s)
         if self.operator == "play":
             return Play(self.memory)
+        if self.bounds is not None:
+            return Beyond(*self.bounds)
         return Decay(self.memory) if self.operator == "since_on" else None
 
 

@@ -11,6 +11,8 @@
                | "play" "(" signal "," number [ unit ] ")"           play(T, 4 degC)
                | "hysteresis" "(" signal ")"                         play(T, 4 degC), play(T, 10 degC) ...
                | "since_on" "(" time ")"                             since_on(400 s)
+               | "beyond" "(" signal "," bound "," bound ")"         beyond(T, -20 degC, 60 degC)
+    bound      = [ "-" ] number [ unit ]
     rate       = "d" temperature | "d" "(" signal ")"                dT, dT_in, d(T_in-T_out), d(power)
     signal     = [ "-" ] part { ("+" | "-") part }                   T, T_in-T_out, 0.5*T1+0.5*T3, power
     part       = [ number "*" ] column
@@ -24,15 +26,14 @@ other sum: ``T_in-T_out^2`` is ``(T_in-T_out)^2``. Spaces do not matter.
 
 from __future__ import annotations
 
-import re
 from itertools import product as all_products
 from math import prod
 
-from fogml.errors import InputError, quoted
-from fogml.features.atoms import DEFAULT_WINDOW, HYSTERESIS_DEGC, METHODS, Atom, Method, Window
-from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal
+from fogml.errors import quoted
+from fogml.features.atoms import DEFAULT_WINDOW, METHODS, Atom, Method, Window
+from fogml.features.operands import OperandReader
+from fogml.features.signal import Signal
 from fogml.features.terms import Term
-from fogml.features.tokens import Token, TokenReader
 from fogml.runs.columns import is_temperature
 
 HIGHEST_POWER = 20
@@ -42,10 +43,6 @@ MOST_FACTORS = 20
 """Most factors of a product."""
 MOST_TERMS = 1000
 """Most terms, ranges of powers spread out: a fit takes time in their square."""
-FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on")
-WINDOW_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
-
-_RATE_NAME = re.compile(r"d(T\w*)\Z", re.ASCII)
 
 
 def parse_terms(text: str) -> tuple[Term, ...]:
@@ -60,7 +57,7 @@ def parse_terms(text: str) -> tuple[Term, ...]:
     return _Parser(text).features()
 
 
-class _Parser(TokenReader):
+class _Parser(OperandReader):
     """Recursive descent over the tokens, one method per rule of the grammar."""
 
     def features(self) -> tuple[Term, ...]:
@@ -104,66 +101,9 @@ class _Parser(TokenReader):
             else:
                 return [(atom, power) for power in powers or (1,)]
 
-    def calls(self, function: str) -> bool:
-        """Whether a call of a function comes next."""
-        return self.token.kind == "name" and self.token.text == function
-
-    def hysteresis(self) -> list[Atom]:
-        at = self.token.at
-        self.next += 1
-        signal = self.signal_in_parentheses("hysteresis")
-        if signal.unit != "degC":
-            self.fail(
-                f"hysteresis({signal.text}) is not of a temperature",
-                at,
-                "write play(x, 0.5) with half widths",
-            )
-        return [Atom("play", signal, memory=half_width) for half_width in HYSTERESIS_DEGC]
-
-    def memory(self) -> Atom:
-        """A lag, a play or a decay since power-on."""
-        function = self.token.text
-        self.next += 1
-        self.expect("(", f"after {function}")
-        if function == "since_on":
-            atom = Atom("since_on", Signal.of(TIME_ON), memory=self.length())
-        else:
-            signal = self.signal()
-            self.expect(
-                ",", f"before the {'time constant' if function == 'lag' else 'half width'} of {function}"
-            )
-            if function == "lag":
-                atom = Atom("lag", signal, memory=self.length())
-            else:
-                atom = Atom("play", signal, memory=self.half_width(signal))
-        self.expect(")", f"to close {function}(")
-        return atom
-
-    def half_width(self, signal: Signal) -> float:
-        token = self.token
-        if token.kind != "number":
-            self.fail(
-                f"a half width above 0 expected, found {self.found()}", token.at, "e.g. play(T, 4 degC)"
-            )
-        self.next += 1
-        units = {"degC": ("degC", "K"), "": ()}.get(signal.written_unit, (signal.written_unit,))
-        if self.token.kind == "name":
-            if self.token.text not in units:
-                told = f"'{units[0]}'" if units else "no unit"
-                self.fail(f"{told} expected after the half width, found {self.found()}", self.token.at)
-            self.next += 1
-        elif signal.unit == "degC":
-            self.fail(
-                f"the half width's unit expected, found {self.found()}", self.token.at, "e.g. play(T, 4 degC)"
-            )
-        half_width = float(token.text)
-        if not 0.0 < half_width < float("inf"):
-            self.fail("the half width must be more than 0", token.at)
-        return half_width
-
     def primary(self, depth: int = 0) -> Atom:
         token = self.token
-        if token.kind == "name" and token.text in ("lag", "play", "since_on"):
+        if token.kind == "name" and token.text in ("lag", "play", "since_on", "beyond"):
             return self.memory()
         if self.calls("hysteresis"):
             self.fail("hysteresis(...) stands for several features; parentheses hold one", token.at)
@@ -183,13 +123,6 @@ class _Parser(TokenReader):
             self.expect(")", "to close the parenthesis")
             return atom
         return Atom("value", self.signal())
-
-    @staticmethod
-    def is_rate(token: Token) -> bool:
-        if token.kind != "name":
-            return False
-        # A column may have a name such as duty: only dT... is a rate without parentheses.
-        return token.text == "d" or _RATE_NAME.match(token.text) is not None
 
     def rate(self) -> Atom:
         token = self.token
@@ -221,40 +154,6 @@ class _Parser(TokenReader):
         if rate.signal.unit != "degC":
             self.fail("the direction of a temperature only is known", at, "write sign(dT)")
         return Atom("sign", rate.signal, rate.window)
-
-    def signal_in_parentheses(self, function: str) -> Signal:
-        self.expect("(", f"after {function}")
-        signal = self.signal()
-        self.expect(")", f"to close {function}(")
-        return signal
-
-    def signal(self) -> Signal:
-        at = self.token.at
-        sign = -1.0 if self.take("-") else 1.0
-        parts = [self.part(sign)]
-        while token := self.take("+", "-"):
-            parts.append(self.part(1.0 if token.text == "+" else -1.0))
-        try:
-            return Signal(tuple(parts))
-        except InputError as error:
-            self.fail(str(error).removeprefix("signal: "), at)
-
-    def part(self, sign: float) -> tuple[str, float]:
-        coefficient = 1.0
-        if self.token.kind == "number":
-            coefficient = float(self.token.text)
-            self.next += 1
-            self.expect("*", "between a number and the column that it scales")
-        token = self.token
-        if token.kind == "name" and (token.text in FUNCTIONS or self.is_rate(token)):
-            hint = "write the rate of a difference as d(T_in-T_out)"
-            self.fail(f"a column expected, found '{token.text}'", token.at, hint)
-        if token.kind == "name" and token.text in NOT_INPUTS:
-            self.fail(f"'{token.text}' is no input of a drift model", token.at, self.known())
-        if token.kind == "name":
-            self.next += 1
-            return token.text, sign * coefficient
-        self.fail(f"a column or a function of it expected, found {self.found()}", token.at, self.known())
 
     def powers(self) -> range:
         self.next += 1
@@ -306,18 +205,3 @@ class _Parser(TokenReader):
         if method == "first":
             self.fail("first takes no window: it is of neighbouring samples", comma.at)
         return Window(method, self.length())
-
-    def length(self) -> float:
-        token = self.token
-        if token.kind != "number":
-            self.fail(f"a window's length expected, found {self.found()}", token.at, "e.g. [block, 64 s]")
-        self.next += 1
-        unit = self.token
-        if unit.kind != "name" or unit.text not in WINDOW_UNITS:
-            hint = f"known units: {', '.join(WINDOW_UNITS)}"
-            self.fail(f"the window's unit expected, found {self.found()}", unit.at, hint)
-        self.next += 1
-        length = float(token.text) * WINDOW_UNITS[unit.text]
-        if not 0.0 < length < float("inf"):
-            self.fail("the window's length must be more than 0", token.at)
-        return length

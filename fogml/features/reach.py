@@ -44,4 +44,6 @@ def reaching_box(box: Box, terms: Sequence[Term], atoms: Sequence[Atom]) -> Box:
 
 def is_rate_or_gradient(atom: Atom) -> bool:
     """Whether an atom is a temperature's change in time, or its difference between sensors."""
-    return atom.operator in ("d", "diff") or (atom.operator == "value" and atom.signal.is_difference)
+    return atom.operator in ("d", "diff") or (
+        atom.operator in ("value", "lag", "play") and atom.signal.is_difference
+    )

@@ -65,7 +65,8 @@ class TokenReader:
         return (
             f"known: temperatures {known_temperatures()}, and any other column by its name; differences "
             "T_in-T_out, diff(x); rates d(x), dT; directions sign(dT); memory lag(x, 600 s), "
-            "play(x, 4 degC), hysteresis(x), since_on(400 s); products x*y, powers x^3, x^1..5; "
+            "play(x, 4 degC), hysteresis(x), since_on(400 s); the way beyond(x, -20 degC, 60 degC); "
+            "products x*y, powers x^3, x^1..5; "
             f"options [method, window], method {', '.join(METHODS)}, window e.g. 64 s"
         )
 

@@ -9,13 +9,22 @@ import numpy as np
 from fogml.features.box import Box
 from fogml.features.features import Features
 from fogml.runs.run import BoolArray, FloatArray
+from fogml.signals.memory import Beyond
 
 
 def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
-    """Set the features' box around values of their atoms in the training rows, each of shape (n, a)."""
+    """Set the features' box around values of their atoms in the training rows, each of shape (n, a).
+
+    What lies beyond bounds is 0 in training rows and levels off by itself: its box is all that it can be.
+    """
     box = Box.around((values, np.ones(len(values), dtype=np.bool_)) for values in atoms)
     names = [atom.text for atom in features.atoms]
-    features.set_box(dict(zip(names, zip(box.low.tolist(), box.high.tolist()), strict=True)))
+    spans = dict(zip(names, zip(box.low.tolist(), box.high.tolist()), strict=True))
+    for atom in features.atoms:
+        if atom.bounds is not None:
+            most = Beyond.most(*atom.bounds)
+            spans[atom.text] = (-most, most)
+    features.set_box(spans)
 
 
 def distance_outside(atoms: FloatArray, outside: BoolArray, features: Features) -> FloatArray:

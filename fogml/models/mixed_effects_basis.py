@@ -72,8 +72,9 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Scaled
     """Columns whose prior sizes mean something: standardised, powers orthogonal, memories as differences.
 
     A power of a signal is taken orthogonal to the lower ones over the training rows, and its prior falls as
-    one over the degree; a lag or a play is taken as its difference from the signal it follows; a product with
-    a signal as that with the signal less its mean.
+    one over the degree; a lag or a play is taken as its difference from the signal it follows, in products
+    too; a product with a signal as that with the signal less its mean. What is linear in a signal goes on
+    with what lies beyond its bounds, which training rows can't tell.
     """
     shift, count = X.mean(axis=0), len(terms)
     medians: list[float] = []
@@ -96,6 +97,9 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Scaled
             degrees[i] = power
         elif plain and not atom.signal.is_difference:
             groups[i] = group(("linear", atom), priors.linear)
+        elif atom.operator == "beyond":
+            groups[i] = group(term, priors.other)
+            continue
         elif atom.operator == "since_on" and not others:
             groups[i] = group("since_on", priors.other)
         else:
@@ -108,7 +112,11 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Scaled
             partner = place.get(tuple(others))
             alone = next((j for j, t in enumerate(terms) if _is_value_of(t, atom.signal)), None)
             if partner is not None and alone is not None:
-                mix[partner, i] = -shift[alone]
+                mix[partner, i] -= shift[alone]
+                (other, _), *more = others
+                square = place.get(((atom, 2),))
+                if other.operator in MEMORIES and other.signal == atom.signal and square is not None:
+                    mix[square, i], mix[alone, i] = -1.0, shift[alone]
     centred = X - shift
     order = sorted(range(count), key=lambda i: degrees[i])
     for i in order:
@@ -122,6 +130,12 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Scaled
         size = float(np.sqrt(np.mean((centred @ mix[:, i]) ** 2)))
         still = size <= 1e-9 * (1.0 + float(np.abs(shift) @ np.abs(mix[:, i])))
         mix[:, i] *= 0.0 if still else 1.0 / (size * degrees[i])
+    for i, term in enumerate(terms):
+        atom = term.factors[0][0]
+        followed = next((j for j, t in enumerate(terms) if _is_value_of(t, atom.signal)), None)
+        if atom.operator == "beyond" and len(term.factors) == 1 and followed is not None:
+            mix[i] = 0.0
+            mix[i, followed] = mix[followed, followed]
     return ScaledColumns(shift, mix, groups, np.array(medians))
 
 

@@ -147,17 +147,25 @@ def _composed(table: TrainingTable, features: Features) -> TrainingTable:
 
 def offered(runs: Sequence[Run]) -> Features:
     """Features that training runs can tell anything of."""
-    terms = [ONE_WAY]
+    terms = [ONE_WAY, _beyond(runs)]
     if moves_both_ways([run.temperature("T") for run in runs]):
-        window = f"[exp, {max([RATE_S, *(run.sample_s for run in runs)]):g} s]"
-        terms += [f"dT{window}", f"T*dT{window}"]
+        rate_s = f"{max([RATE_S, *(run.sample_s for run in runs)]):g} s"
+        terms += [f"lag(T, {rate_s})", f"T*lag(T, {rate_s})"]
         if all(held_by(run, "T_in") and held_by(run, "T_out") for run in runs):
-            terms += ["T_in-T_out", f"d(T_in-T_out){window}"]
+            terms += ["T_in-T_out", f"lag(T_in-T_out, {rate_s})"]
         terms += [f"play(T, {half_width:g} degC)" for half_width in HYSTERESIS_DEGC]
         terms += [f"lag(T, {tau:g} s)" for tau in LAGS_S]
         if all(held_by(run, TIME_ON) for run in runs):
             terms += [f"since_on({tau:g} s)" for tau in DECAYS_S]
     return parse_features(", ".join(terms))
+
+
+def _beyond(runs: Sequence[Run]) -> str:
+    """How far T is beyond all that the runs hold, to a hundredth of a degree."""
+    ends = [(float(T.min()), float(T.max())) for T in (run.temperature("T") for run in runs)]
+    low, high = min(low for low, _ in ends), max(high for _, high in ends)
+    low, high = np.floor(100.0 * low) / 100.0, np.ceil(100.0 * high + 0.5) / 100.0
+    return f"beyond(T, {low:.2f} degC, {high:.2f} degC)"
 
 
 def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:

@@ -1,0 +1,157 @@
+"""Readers of what a feature is made of: signals, lengths, and calls of operators with a memory."""
+
+from __future__ import annotations
+
+import re
+
+from fogml.errors import InputError
+from fogml.features.atoms import HYSTERESIS_DEGC, Atom
+from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal
+from fogml.features.tokens import Token, TokenReader
+
+FUNCTIONS = ("d", "diff", "sign", "lag", "play", "hysteresis", "since_on", "beyond")
+WINDOW_UNITS = {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0}
+
+_RATE_NAME = re.compile(r"d(T\w*)\Z", re.ASCII)
+
+
+class OperandReader(TokenReader):
+    """Reads signals, lengths of time, and operators with a memory or with bounds."""
+
+    def calls(self, function: str) -> bool:
+        """Whether a call of a function comes next."""
+        return self.token.kind == "name" and self.token.text == function
+
+    def hysteresis(self) -> list[Atom]:
+        at = self.token.at
+        self.next += 1
+        signal = self.signal_in_parentheses("hysteresis")
+        if signal.unit != "degC":
+            self.fail(
+                f"hysteresis({signal.text}) is not of a temperature",
+                at,
+                "write play(x, 0.5) with half widths",
+            )
+        return [Atom("play", signal, memory=half_width) for half_width in HYSTERESIS_DEGC]
+
+    def memory(self) -> Atom:
+        """A lag, a play, a decay since power-on, or what lies beyond bounds."""
+        function = self.token.text
+        self.next += 1
+        self.expect("(", f"after {function}")
+        if function == "since_on":
+            atom = Atom("since_on", Signal.of(TIME_ON), memory=self.length())
+        else:
+            signal, following = self.signal(), _FOLLOWING[function]
+            self.expect(",", f"before the {following} of {function}")
+            if function == "lag":
+                atom = Atom("lag", signal, memory=self.length())
+            elif function == "play":
+                atom = Atom("play", signal, memory=self.half_width(signal))
+            else:
+                atom = self.beyond(signal)
+        self.expect(")", f"to close {function}(")
+        return atom
+
+    def beyond(self, signal: Signal) -> Atom:
+        at = self.token.at
+        low = self.bound(signal)
+        self.expect(",", "before the upper bound of beyond")
+        high = self.bound(signal)
+        if not low < high:
+            self.fail("the upper bound must be above the lower one", at, "e.g. beyond(T, -20 degC, 60 degC)")
+        return Atom("beyond", signal, bounds=(low, high))
+
+    def bound(self, signal: Signal) -> float:
+        sign = -1.0 if self.take("-") else 1.0
+        token = self.token
+        if token.kind != "number":
+            self.fail(
+                f"a bound expected, found {self.found()}", token.at, "e.g. beyond(T, -20 degC, 60 degC)"
+            )
+        self.next += 1
+        self.unit_of_number(signal, "bound", "beyond(T, -20 degC, 60 degC)")
+        return sign * float(token.text)
+
+    def half_width(self, signal: Signal) -> float:
+        token = self.token
+        if token.kind != "number":
+            self.fail(
+                f"a half width above 0 expected, found {self.found()}", token.at, "e.g. play(T, 4 degC)"
+            )
+        self.next += 1
+        self.unit_of_number(signal, "half width", "play(T, 4 degC)")
+        half_width = float(token.text)
+        if not 0.0 < half_width < float("inf"):
+            self.fail("the half width must be more than 0", token.at)
+        return half_width
+
+    def unit_of_number(self, signal: Signal, what: str, example: str) -> None:
+        """Take the unit behind a number that is of a signal's kind."""
+        units = {"degC": ("degC", "K"), "": ()}.get(signal.written_unit, (signal.written_unit,))
+        if self.token.kind == "name":
+            if self.token.text not in units:
+                told = f"'{units[0]}'" if units else "no unit"
+                self.fail(f"{told} expected after the {what}, found {self.found()}", self.token.at)
+            self.next += 1
+        elif signal.unit == "degC":
+            self.fail(f"the {what}'s unit expected, found {self.found()}", self.token.at, f"e.g. {example}")
+
+    @staticmethod
+    def is_rate(token: Token) -> bool:
+        if token.kind != "name":
+            return False
+        # A column may have a name such as duty: only dT... is a rate without parentheses.
+        return token.text == "d" or _RATE_NAME.match(token.text) is not None
+
+    def signal_in_parentheses(self, function: str) -> Signal:
+        self.expect("(", f"after {function}")
+        signal = self.signal()
+        self.expect(")", f"to close {function}(")
+        return signal
+
+    def signal(self) -> Signal:
+        at = self.token.at
+        sign = -1.0 if self.take("-") else 1.0
+        parts = [self.part(sign)]
+        while token := self.take("+", "-"):
+            parts.append(self.part(1.0 if token.text == "+" else -1.0))
+        try:
+            return Signal(tuple(parts))
+        except InputError as error:
+            self.fail(str(error).removeprefix("signal: "), at)
+
+    def part(self, sign: float) -> tuple[str, float]:
+        coefficient = 1.0
+        if self.token.kind == "number":
+            coefficient = float(self.token.text)
+            self.next += 1
+            self.expect("*", "between a number and the column that it scales")
+        token = self.token
+        if token.kind == "name" and (token.text in FUNCTIONS or self.is_rate(token)):
+            hint = "write the rate of a difference as d(T_in-T_out)"
+            self.fail(f"a column expected, found '{token.text}'", token.at, hint)
+        if token.kind == "name" and token.text in NOT_INPUTS:
+            self.fail(f"'{token.text}' is no input of a drift model", token.at, self.known())
+        if token.kind == "name":
+            self.next += 1
+            return token.text, sign * coefficient
+        self.fail(f"a column or a function of it expected, found {self.found()}", token.at, self.known())
+
+    def length(self) -> float:
+        token = self.token
+        if token.kind != "number":
+            self.fail(f"a window's length expected, found {self.found()}", token.at, "e.g. [block, 64 s]")
+        self.next += 1
+        unit = self.token
+        if unit.kind != "name" or unit.text not in WINDOW_UNITS:
+            hint = f"known units: {', '.join(WINDOW_UNITS)}"
+            self.fail(f"the window's unit expected, found {self.found()}", unit.at, hint)
+        self.next += 1
+        length = float(token.text) * WINDOW_UNITS[unit.text]
+        if not 0.0 < length < float("inf"):
+            self.fail("the window's length must be more than 0", token.at)
+        return length
+
+
+_FOLLOWING = {"lag": "time constant", "play": "half width", "beyond": "lower bound"}
