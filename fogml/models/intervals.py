@@ -30,7 +30,7 @@ from fogml.strict import Strict, strictly
 
 LEVELS = (*(round(0.05 * i, 2) for i in range(1, 20)), 0.975, 0.99, 0.995)
 WIDENING_PER_SPAN = 10.0
-"""Growth of the half-width per box span outside the box, as a share of itself."""
+"""Growth of the half-width per box span outside the box, as a share of itself, where nothing tells it."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,9 @@ class Intervals:
     count
         Number of residuals behind them.
     folds
-        How the training rows were parted: ``time blocks`` or ``whole runs``.
+        How the training rows were parted, e.g. ``time blocks`` or ``whole runs``.
+    widening_per_span
+        Growth of the half-width per box span outside the box, as a share of itself.
     """
 
     averaging_s: float
@@ -54,6 +56,7 @@ class Intervals:
     count: int
     folds: str
     levels: tuple[float, ...] = field(default=LEVELS)
+    widening_per_span: float = WIDENING_PER_SPAN
 
     def half_width(self, level: float, excess: ArrayLike = 0.0) -> FloatArray:
         """Half-width [deg/h] at a level, for samples `excess` spans outside the box.
@@ -68,7 +71,7 @@ class Intervals:
         if not 0.0 < level < 1.0:
             raise InputError(f"interval level {level}: must lie between 0 and 1, e.g. 0.9")
         inside = np.interp(level, (0.0, *self.levels), (0.0, *self.half_widths))
-        return np.asarray(inside * (1.0 + WIDENING_PER_SPAN * np.asarray(excess, dtype=np.float64)))
+        return np.asarray(inside * (1.0 + self.widening_per_span * np.asarray(excess, dtype=np.float64)))
 
     def summary(self) -> dict[str, Any]:
         """The 90 % half-width and what it stands on."""
@@ -87,6 +90,7 @@ class Intervals:
             "half_widths": list(self.half_widths),
             "count": self.count,
             "folds": self.folds,
+            "widening_per_span": self.widening_per_span,
         }
 
     @classmethod
@@ -102,7 +106,8 @@ class Intervals:
         levels, half_widths = tuple(saved.levels), tuple(saved.half_widths)
         if len(levels) != len(half_widths) or sorted(set(levels)) != list(levels):
             raise InputError("key 'interval': levels and half_widths do not match")
-        return cls(saved.averaging_s, half_widths, saved.count, saved.folds, levels)
+        widening = saved.widening_per_span
+        return cls(saved.averaging_s, half_widths, saved.count, saved.folds, levels, widening)
 
 
 class _Saved(Strict):
@@ -113,6 +118,7 @@ class _Saved(Strict):
     half_widths: list[Annotated[float, Field(ge=0.0)]]
     count: int = Field(ge=1)
     folds: str
+    widening_per_span: float = Field(default=WIDENING_PER_SPAN, ge=0.0)
 
 
 def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: str) -> Intervals:

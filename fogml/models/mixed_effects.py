@@ -8,24 +8,21 @@ The averaged drift y of run r at time t is
 with columns :math:`X_g` of groups g of features, the run's own shift :math:`o_r`, its slow drift
 :math:`d_r` (Gaussian covariance over a third of a run) and faster drift :math:`f_r` (exponential, a
 twentieth), and white noise. Only :math:`\beta_0 + \sum X_g c_g` compensates: what is a run's own can't be
-known beforehand, so it takes weight from the shared part and widens the interval, and is never
-subtracted. Sizes are the maximum of the evidence times log-normal priors (empirical Bayes: Rasmussen &
-Williams, Gaussian Processes for Machine Learning, 2006, ch. 5; mixed effects: Laird & Ware, Biometrics 38,
-1982).
+known beforehand, so it takes weight from the shared part, and is never subtracted. Sizes are the maximum of
+the evidence times log-normal priors (empirical Bayes: Rasmussen & Williams, Gaussian Processes for Machine
+Learning, 2006, ch. 5; mixed effects: Laird & Ware, Biometrics 38, 1982).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from statistics import NormalDist
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, cholesky
 from scipy.optimize import minimize
 
 from fogml.features.terms import Term
-from fogml.models.intervals import LEVELS, Intervals
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects_basis import ScaledColumns, SizePriors, basis_of
 from fogml.models.table import TrainingTable
@@ -48,48 +45,34 @@ class MixedEffects:
         Of intercept and coefficients, shape (k + 1, k + 1).
     sizes
         Size of each group of features and of each own part, by name [deg/h].
-    own_std, shared_std
-        Standard deviation of a new run's own part with noise, and of the shared part over the training rows
-        [deg/h].
-    noise_std
-        White noise of the averages [deg/h].
     """
 
     coef: FloatArray
     intercept: float
     covariance: FloatArray
     sizes: dict[str, float]
-    own_std: float
-    shared_std: float
-    noise_std: float
+    _scale: _Scale
+    _relative: FloatArray
 
-    def shrunk(self, mean: float, skill: float) -> LinearRegressor:
-        """The shared part about a mean [deg/h], taken by a share `skill` of it."""
-        regressor = LinearRegressor()
-        regressor.coef_ = skill * self.coef
-        regressor.intercept_ = mean + skill * (self.intercept - mean)
-        regressor.n_features_in_, regressor.ridge_, regressor.rank_ = len(self.coef), 0.0, len(self.coef)
-        regressor.residual_std_ = self.noise_std
-        regressor.covariance_ = skill**2 * self.covariance
-        return regressor
+    def given(self, table: TrainingTable) -> tuple[FloatArray, float]:
+        """Coefficients and intercept [deg/h] given other rows, with the sizes as they were found."""
+        coef, intercept, _ = _posterior(table, self._scale, self._relative)
+        return coef, intercept
 
-    def intervals(self, skill: float, left_std: float, averaging_s: float, count: int) -> Intervals:
-        """Half-widths for averages of another run: the own part, the shared part's error, and noise.
+    def regressor(self) -> LinearRegressor:
+        """The shared part as a linear regressor."""
+        return linear_regressor(self.coef, self.intercept, self.covariance, self.sizes["noise"])
 
-        Parameters
-        ----------
-        skill
-            Share of the shared part that is taken.
-        left_std
-            Rms of what is left on runs left out [deg/h], which the half-width does not fall below.
-        averaging_s
-            Of the averages [s].
-        count
-            Number of averages.
-        """
-        total = np.sqrt(max(self.own_std**2 + (skill * self.shared_std) ** 2, left_std**2))
-        half = tuple(float(total * NormalDist().inv_cdf(0.5 + level / 2.0)) for level in LEVELS)
-        return Intervals(float(averaging_s), half, count, "between runs")
+
+def linear_regressor(
+    coef: FloatArray, intercept: float, covariance: FloatArray, residual_std: float
+) -> LinearRegressor:
+    """A fitted linear regressor of coefficients found elsewhere."""
+    regressor = LinearRegressor()
+    regressor.coef_, regressor.intercept_ = coef, float(intercept)
+    regressor.n_features_in_, regressor.ridge_, regressor.rank_ = len(coef), 0.0, len(coef)
+    regressor.residual_std_, regressor.covariance_ = residual_std, covariance
+    return regressor
 
 
 def fit_mixed_effects(
@@ -107,103 +90,63 @@ def fit_mixed_effects(
         Priors of the sizes.
     """
     priors = SizePriors() if priors is None else priors
-    found = _Posterior.of(table, basis_of(table.X, terms, priors), priors)
-    coef, intercept = found.in_features()
-    return MixedEffects(
-        coef,
-        intercept,
-        found.covariance_in_features(),
-        found.named_sizes(terms),
-        found.own_std,
-        found.shared_std,
-        float(found.spread * found.noise),
-    )
-
-
-def skill_of(pairs: Sequence[tuple[FloatArray, FloatArray]]) -> tuple[float, float]:
-    r"""Share of the shared part that left-out runs confirm, and the rms that is left on them [deg/h].
-
-    With predictions p and outputs z of each left-out run, both less the mean of the other runs, the share is
-    :math:`\sum \overline{p z} / \sum \overline{p^2}` within 0 and 1: the least-squares factor, each run
-    counting alike. No pairs leave the part as it is.
-
-    Parameters
-    ----------
-    pairs
-        p and z [deg/h] of each left-out run, shapes (n,).
-    """
-    if not pairs:
-        return 1.0, 0.0
-    product = sum(float(np.mean(predicted * told)) for predicted, told in pairs)
-    square = sum(float(np.mean(predicted * predicted)) for predicted, _ in pairs)
-    skill = float(np.clip(product / square, 0.0, 1.0)) if square > 0.0 else 0.0
-    left = np.concatenate([told - skill * predicted for predicted, told in pairs])
-    return skill, float(np.sqrt(np.mean(left**2)))
+    basis = basis_of(table.X, terms, priors)
+    scale = _Scale(basis, priors, float(table.y.std()) or 1.0)
+    kernels = scale.kernels(table)
+    z = (table.y - table.y.mean()) / scale.spread
+    medians = np.concatenate([basis.medians, [priors.shift, priors.slow, priors.fast, priors.noise]])
+    relative = _evidence_maximum(kernels, z, medians, priors)
+    coef, intercept, covariance = _posterior(table, scale, relative, kernels)
+    return MixedEffects(coef, intercept, covariance, scale.named_sizes(relative, terms), scale, relative)
 
 
 @dataclass(frozen=True, eq=False)
-class _Posterior:
-    """The posterior of the shared part, in units of the outputs' spread."""
+class _Scale:
+    """What sizes are relative to: the columns' scale and the spread of the training averages [deg/h]."""
 
     basis: ScaledColumns
-    mean: float
+    priors: SizePriors
     spread: float
-    weights: FloatArray
-    covariance: FloatArray
-    sizes: FloatArray
-    own: FloatArray
-    noise: float
-    columns: FloatArray
 
-    @classmethod
-    def of(cls, table: TrainingTable, basis: ScaledColumns, priors: SizePriors) -> _Posterior:
-        mean, spread = float(table.y.mean()), float(table.y.std()) or 1.0
-        z = (table.y - mean) / spread
-        columns = (table.X - basis.shift) @ basis.mix
-        members = [columns[:, basis.groups == g] for g in range(len(basis.medians))]
-        kernels = [part @ part.T for part in members] + _own_kernels(table) + [np.eye(len(z))]
-        medians = np.concatenate([basis.medians, [priors.shift, priors.slow, priors.fast, priors.noise]])
-        sizes = _evidence_maximum(np.array(kernels), z, medians, priors)
-        total = np.full((len(z), len(z)), priors.offset**2) + np.tensordot(sizes**2, np.array(kernels), 1)
-        factor = cho_factor(total, lower=True)
-        design = np.column_stack([np.ones(len(z)), columns])
-        prior = np.concatenate([[priors.offset], sizes[basis.groups]]) ** 2
-        weights = prior * (design.T @ cho_solve(factor, z))
-        scaled = design * prior
-        covariance = np.diag(prior) - scaled.T @ cho_solve(factor, scaled)
-        g = len(basis.medians)
-        return cls(basis, mean, spread, weights, covariance, sizes[:g], sizes[g:-1], float(sizes[-1]), design)
+    def columns(self, table: TrainingTable) -> FloatArray:
+        return np.asarray((table.X - self.basis.shift) @ self.basis.mix)
 
-    def in_features(self) -> tuple[FloatArray, float]:
-        """Coefficients per unit of the features, and the intercept [deg/h]."""
-        coef = self.spread * (self.basis.mix @ self.weights[1:])
-        return coef, float(self.mean + self.spread * self.weights[0] - self.basis.shift @ coef)
+    def kernels(self, table: TrainingTable) -> FloatArray:
+        """Covariances of unit size: of each group, of a run's own parts, and of noise; (g, n, n)."""
+        columns = self.columns(table)
+        members = [columns[:, self.basis.groups == g] for g in range(len(self.basis.medians))]
+        own = _own_kernels(table)
+        return np.array([part @ part.T for part in members] + own + [np.eye(len(table))])
 
-    def covariance_in_features(self) -> FloatArray:
-        """Covariance of intercept and coefficients, shape (k + 1, k + 1)."""
-        back = np.zeros((len(self.weights), len(self.weights)))
-        back[1:, 1:] = self.basis.mix
-        back[0, 0] = 1.0
-        back[0, 1:] = -self.basis.shift @ self.basis.mix
-        return np.asarray(self.spread**2 * back @ self.covariance @ back.T)
-
-    @property
-    def own_std(self) -> float:
-        """Standard deviation of a new run's own part and of the noise of an average [deg/h]."""
-        return float(self.spread * np.sqrt(np.sum(self.own**2) + self.noise**2))
-
-    @property
-    def shared_std(self) -> float:
-        """Root mean square of the shared part's standard deviation over the training rows [deg/h]."""
-        variance = np.einsum("ij,jk,ik->i", self.columns, self.covariance, self.columns)
-        return float(self.spread * np.sqrt(np.mean(variance)))
-
-    def named_sizes(self, terms: Sequence[Term]) -> dict[str, float]:
+    def named_sizes(self, relative: FloatArray, terms: Sequence[Term]) -> dict[str, float]:
         """Sizes [deg/h] by the first term of each group, and of a run's own parts."""
-        names = [terms[int(np.argmax(self.basis.groups == g))].text for g in range(len(self.sizes))]
-        own = dict(zip(("own shift", "own slow drift", "own faster drift"), self.own.tolist()))
-        found = {**dict(zip(names, self.sizes.tolist())), **own, "noise": self.noise}
-        return {name: float(self.spread * size) for name, size in found.items()}
+        groups = self.basis.groups
+        names = [terms[int(np.argmax(groups == g))].text for g in range(len(self.basis.medians))]
+        names += ["own shift", "own slow drift", "own faster drift", "noise"]
+        return dict(zip(names, (self.spread * relative).tolist(), strict=True))
+
+
+def _posterior(
+    table: TrainingTable, scale: _Scale, relative: FloatArray, kernels: FloatArray | None = None
+) -> tuple[FloatArray, float, FloatArray]:
+    """Coefficients per unit of the features, intercept and their covariance [deg/h], of sizes stated."""
+    kernels = scale.kernels(table) if kernels is None else kernels
+    basis, offset, count = scale.basis, scale.priors.offset, len(table)
+    mean = float(table.y.mean())
+    z = (table.y - mean) / scale.spread
+    total = np.full((count, count), offset**2) + np.tensordot(relative**2, kernels, 1)
+    factor = cho_factor(total, lower=True)
+    design = np.column_stack([np.ones(count), scale.columns(table)])
+    prior = np.concatenate([[offset], relative[basis.groups]]) ** 2
+    weights = prior * (design.T @ cho_solve(factor, z))
+    scaled = design * prior
+    covariance = np.diag(prior) - scaled.T @ cho_solve(factor, scaled)
+    coef = scale.spread * (basis.mix @ weights[1:])
+    back = np.zeros_like(covariance)
+    back[1:, 1:], back[0, 0] = basis.mix, 1.0
+    back[0, 1:] = -basis.shift @ basis.mix
+    intercept = float(mean + scale.spread * weights[0] - basis.shift @ coef)
+    return coef, intercept, np.asarray(scale.spread**2 * back @ covariance @ back.T)
 
 
 def _own_kernels(table: TrainingTable) -> list[FloatArray]:

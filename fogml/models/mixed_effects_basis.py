@@ -113,7 +113,7 @@ def basis_of(X: FloatArray, terms: Sequence[Term], priors: SizePriors) -> Scaled
             alone = next((j for j, t in enumerate(terms) if _is_value_of(t, atom.signal)), None)
             if partner is not None and alone is not None:
                 mix[partner, i] -= shift[alone]
-                (other, _), *more = others
+                other, _ = others[0]
                 square = place.get(((atom, 2),))
                 if other.operator in MEMORIES and other.signal == atom.signal and square is not None:
                     mix[square, i], mix[alone, i] = -1.0, shift[alone]
