@@ -1,11 +1,12 @@
-"""The automatic choice among models, features and sizes, on parts of the training runs held out.
+"""The automatic model: a mixed-effects model's shared part and simple forms, weighed on what is left out.
 
-Candidates are scored on averages of the training runs: blocks of their time are held out, and
-where there are several, each run in turn as well. What is held out is limited to the box of the
-rows fitted to, as in use. The rule that picks one is `fogml.models.score.choose`: a larger
-candidate than the standard form only if it beats it beyond noise (and, where the runs hold fewer
-than three rates of temperature, by a multiple of what noise costs a fit), a smaller one if it is
-no worse, and no compensation where nothing beats the mean on runs left out.
+Simple candidates are scored on averages of the training runs: blocks of their time are held out, and
+where there are several, each run in turn as well; `fogml.models.score.choose` picks one of them. It, a
+cubic in temperature and the mixed-effects model with its memories are then weighed on runs, halves of
+runs and directions left out, and combined (`fogml.models.combination`); what is held out is limited to
+the box of the rows fitted to, as in use. The weights' sum is the skill that left-out parts confirm, down
+to no compensation. A network is no part of a sum: it is taken alone, where the runs hold enough rates of
+temperature and it leaves clearly less than the others together.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar, Self
 
-import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
@@ -23,7 +23,8 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
 from fogml.models.intervals import Intervals
 from fogml.models.rbf.rates import RATES_THAT_TELL
-from fogml.models.trial import Trial, fit_candidate
+from fogml.models.trial import Trial
+from fogml.models.weighing import weigh
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 
@@ -31,7 +32,7 @@ Progress = Callable[[int, int, str], None]
 
 
 class AutoModel(DriftModel):
-    """The model that `auto` stands for; what it chose is in ``chosen_``.
+    """The model that `auto` stands for; what it made is in ``chosen_``.
 
     Parameters
     ----------
@@ -45,9 +46,11 @@ class AutoModel(DriftModel):
     Attributes
     ----------
     chosen_ : DriftModel
-        The chosen model, fitted to all training runs.
+        The model, fitted to all training runs.
     scores_ : list of Score
-        All candidates, best first.
+        All simple candidates, best first.
+    weighed_ : Weighed
+        Members and their weights, after a fit.
     """
 
     form: ClassVar[str] = "auto"
@@ -75,7 +78,8 @@ class AutoModel(DriftModel):
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
         self.choice_ = trial.chosen(scores)
-        self.chosen_ = fit_candidate(self.choice_.candidate, group, self.seed)
+        self.weighed_ = weigh(group, self.choice_.candidate, self.features, self.seed)
+        self.chosen_ = self.weighed_.model
         notes = (*self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)
         self.selection_ = [score.as_dict() for score in self.scores_]
@@ -83,30 +87,21 @@ class AutoModel(DriftModel):
         return self
 
     def _reasons(self, trial: Trial) -> list[str]:
-        """Why this one, and what the training runs could not tell; for the card."""
-        mean = next(score for score in self.scores_ if not score.candidate.features)
-        chosen = self.choice_
-        held_out = "left-out runs" if trial.several_runs else "left-out parts of the training run"
-        rms = [f"{np.sqrt(score.on_runs.mean_square):.4g}" for score in (chosen, mean)]
-        if not chosen.candidate.features:
-            notes = [f"no compensation: nothing beats the training mean ({rms[1]} deg/h rms) on {held_out}"]
-        else:
-            notes = [
-                f"chosen from {len(self.scores_)} candidates: {chosen.candidate.name} leaves {rms[0]} deg/h "
-                f"rms on {held_out}, the training mean {rms[1]} deg/h"
-            ]
+        """What is in it and why, and what the training runs could not tell; for the card."""
+        notes = [self.weighed_.told()]
         weighed = self.features is None
         if weighed and trial.both_directions and trial.rates < RATES_THAT_TELL:
             notes.append(
                 f"at most temperatures the training runs hold {trial.rates} distinct rate(s), which don't "
-                "tell how the drift depends on the rate: all that is weighed holds dT and T*dT and is linear "
-                "in them; train at three or more rates to allow other forms"
+                "tell how the drift depends on the rate: what is weighed is linear in it; train at three or "
+                "more rates to allow other forms"
             )
         if not trial.both_directions:
             only = "so only terms in temperature are weighed, " if weighed else ""
             notes.append(
                 "trained on temperature moving one way only: temperature, its rate, time and direction "
-                f"can't be told apart, {only}and hysteresis is not seen; train on a run up and a run down"
+                f"can't be told apart, {only}and hysteresis is not seen: what holds on the way back is not "
+                "verifiable, and the interval is as wide as the drift; train on a run up and a run down"
             )
         return notes
 

@@ -73,7 +73,7 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
         nothing tells a rate from its direction, from its powers or from the rate of a gradient,
         nor whether a term in it may be left out, and what was fitted fails at the next rate: only
         what holds the standard form's terms in the rate, and is linear in it, is offered, and
-        nothing smaller.
+        nothing smaller; no network is.
     both_directions
         Whether temperature both rises and falls. On one way only, rate and gradient are functions
         of temperature and time, and what was fitted to them turns against the model on the way
@@ -81,7 +81,7 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
     """
     if not both_directions:
         linear = [STATIC_STANDARD, *(Candidate(text) for text in _STATIC if text != STATIC_STANDARD.features)]
-        return [*linear, Candidate("T", network=True)]
+        return linear
     sensors = shared_sensors(runs)
     faces = len(sensors) > 1
     gradient = ("", *(_GRADIENT if rates_told else _GRADIENT[:1])) if faces else ("",)
@@ -94,7 +94,7 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
         texts |= {", ".join(form.format(name) for name in sensors) for form in forms}
     linear = [STANDARD, *(Candidate(text) for text in sorted(texts - {STANDARD.features}))]
     networks = [", ".join(part for part in ("T", _RATE_TERMS, extra) if part) for extra in gradient]
-    mapped = [Candidate(text, network=True) for text in (["T", *networks] if rates_told else networks)]
+    mapped = [Candidate(text, network=True) for text in ("T", *networks)] if rates_told else []
     return [*linear, *mapped, *([] if rates_told else [Candidate("")])]
 
 

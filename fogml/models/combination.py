@@ -1,14 +1,16 @@
 r"""Several linear descriptions of one drift, weighed on what is left out, and combined.
 
-Left out in turn are whole runs, halves of each run, and either direction of temperature. With predictions
-:math:`p_m` of the members and outputs z on a part left out, all less the mean of the rows fitted to, the
-weights are
+Left out in turn are whole runs, halves of each run, either direction of temperature, and shorter blocks of
+time. With predictions :math:`p_m` of the members and outputs z on a part left out, all less the mean of the
+rows fitted to, the weights are
 
 .. math:: \min_{w \ge 0,\ \sum w \le 1}\ \operatorname{mean}_\text{parts}
-          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\overline{z^2}} + \kappa \sum_m (w_m - \bar w)^2 :
+          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\min_m \overline{(z - p_m)^2}} + \kappa \sum_m (w_m - \bar w)^2 :
 
 stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie. Their
-sum is the skill that left-out parts confirm; no compensation is its limit 0.
+sum is the skill that left-out parts confirm; no compensation is its limit 0. Where temperature moves both
+ways, runs and blocks of time are asked: a half or a direction left out says how a fit of the rest goes on,
+which is not how a fit of both does. Where it moves one way only, halves are all that there is.
 """
 
 from __future__ import annotations
@@ -28,21 +30,23 @@ from fogml.features.features import Features
 from fogml.features.parse import parse_features
 from fogml.features.terms import Term
 from fogml.models.box import distance_outside, learn_box
-from fogml.models.folds import Fold
+from fogml.models.folds import Fold, time_folds
 from fogml.models.intervals import LEVELS, Intervals
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import MixedEffects, linear_regressor
 from fogml.models.regressors import goes_on_linearly, predict_rows, refit
 from fogml.models.table import TrainingTable
-from fogml.runs.run import BoolArray, FloatArray
+from fogml.runs.run import FloatArray
 from fogml.signals.memory import Beyond
 
-DRAWN_TOGETHER = 0.1
-"""Weight kappa of equal weights: members whose errors differ by less than a tenth of the drift share."""
+DRAWN_TOGETHER = 0.02
+"""Weight kappa of equal weights, against squared errors as shares of the best member's."""
 WIDENING_PER_SPAN = 1.0
 """Growth of the half-width per box span outside the box, as a share of itself: errors of parts left out that
 lie outside the box of the rest are compared with those inside at this ratio (development data: the shipped
 thermal cycle, simulated tactical units)."""
+BLOCKS = 10
+"""Folds of blocks of time."""
 LEAST_ROWS = 10
 """Fewest averages that a part left out, and the rest, must hold."""
 
@@ -54,7 +58,7 @@ class LeftOut:
     Attributes
     ----------
     kind
-        ``run``, ``half`` or ``direction``.
+        ``runs``, ``halves``, ``directions`` or ``blocks``.
     predicted, told
         Predictions of m members and the output, shapes (n, m) and (n,).
     excess
@@ -106,7 +110,7 @@ class FittedMember:
 
 
 def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[str, Fold]]:
-    """Parts to leave out: whole runs, halves of each run, and either direction of temperature.
+    """Parts to leave out: whole runs, halves of each run, either direction of temperature, blocks of time.
 
     Parameters
     ----------
@@ -116,25 +120,23 @@ def left_out_parts(table: TrainingTable, temperature: FloatArray) -> list[tuple[
         Their temperature [degC], shape (n,).
     """
     runs = [np.flatnonzero(table.run_index == run) for run in np.unique(table.run_index)]
-    rising: BoolArray = np.zeros(len(table), dtype=np.bool_)
+    rising = np.zeros(len(table), dtype=np.bool_)
     for rows in runs:
         if len(rows) > 1:
             rising[rows] = np.gradient(temperature[rows]) > 0.0
-    masks: list[tuple[str, BoolArray]] = []
-    for kind, groups in (
-        ("run", runs if len(runs) > 1 else []),
-        ("half", [half for rows in runs for half in np.array_split(rows, 2)]),
-        ("direction", [np.flatnonzero(rising), np.flatnonzero(~rising)]),
-    ):
-        for rows in groups:
-            mask = np.zeros(len(table), dtype=np.bool_)
-            mask[rows] = True
-            masks.append((kind, mask))
-    return [
-        (kind, (np.flatnonzero(~mask), np.flatnonzero(mask)))
-        for kind, mask in masks
-        if min(mask.sum(), (~mask).sum()) >= LEAST_ROWS
+    everything = np.arange(len(table))
+    parts = [
+        (kind, (np.setdiff1d(everything, rows), rows))
+        for kind, groups in (
+            ("runs", runs if len(runs) > 1 else []),
+            ("halves", [half for rows in runs for half in np.array_split(rows, 2)]),
+            ("directions", [np.flatnonzero(rising), np.flatnonzero(~rising)]),
+        )
+        for rows in groups
     ]
+    if len(table) >= BLOCKS * LEAST_ROWS:
+        parts += [("blocks", fold) for fold in time_folds(table, BLOCKS, blocks_per_fold=2)]
+    return [(kind, fold) for kind, fold in parts if min(len(rows) for rows in fold) >= LEAST_ROWS]
 
 
 def left_out(
@@ -192,15 +194,26 @@ def _bounded(
     return Features.from_terms(terms) if moved else parse_features(features.text), rest, part
 
 
-def weights_of(parts: Sequence[LeftOut], members: int) -> FloatArray:
-    """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none."""
+def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> FloatArray:
+    """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none.
+
+    Parameters
+    ----------
+    parts
+        What members predict of each part.
+    members
+        Their number m.
+    both_ways
+        Whether temperature moves both ways in training.
+    """
     equal = np.full(members, 1.0 / members)
-    kinds = [part.kind for part in parts]
+    asked = [part for part in parts if part.kind in ("runs", "blocks" if both_ways else "halves")]
+    kinds = [part.kind for part in asked]
     square, product = DRAWN_TOGETHER * (np.eye(members) - 1.0 / members), np.zeros(members)
-    for part in parts:
-        power = float(np.mean(part.told**2))
-        if power > 0.0:
-            share = 1.0 / (len(part.told) * power * kinds.count(part.kind) * len(set(kinds)))
+    for part in asked:
+        least = float(np.mean((part.told[:, None] - part.predicted) ** 2, axis=0).min())
+        if least > 0.0:
+            share = 1.0 / (len(part.told) * least * kinds.count(part.kind) * len(set(kinds)))
             square = square + share * part.predicted.T @ part.predicted
             product = product + share * part.predicted.T @ part.told
     found = minimize(
@@ -215,9 +228,9 @@ def weights_of(parts: Sequence[LeftOut], members: int) -> FloatArray:
 
 
 def intervals_of(
-    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, verifiable: bool
+    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, both_ways: bool
 ) -> Intervals:
-    """Half-widths from what is left on the parts left out: of runs, halves and directions the widest.
+    """Half-widths from what is left on the parts left out: of each kind of part, the widest.
 
     Errors are taken relative to how the half-width grows outside the box, so that the half-width inside it is
     told by parts that had to be told from elsewhere too.
@@ -228,13 +241,13 @@ def intervals_of(
         What members predict of each part, and their weights, shape (m,).
     table
         The averages.
-    verifiable
-        Whether the training runs show the same temperatures again, on another run or another way; else the
-        interval is at least as wide as the drift that they hold.
+    both_ways
+        Whether temperature moves both ways in training; else nothing can be verified of the way back, and
+        the interval is at least as wide as the drift that the runs hold.
     """
     kinds = dict.fromkeys(part.kind for part in parts)
     half = np.max([np.zeros(len(LEVELS)), *(_quantiles(parts, weights, kind) for kind in kinds)], axis=0)
-    if not verifiable or not parts:
+    if not both_ways or not parts:
         drift = float(table.y.std())
         half = np.maximum(half, [drift * NormalDist().inv_cdf(0.5 + level / 2.0) for level in LEVELS])
     told = f"{' and '.join(kinds)} left out" if kinds else "none"

@@ -72,7 +72,7 @@ class MixedEffectsModel(FeatureModel):
         self.max_rows = None
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
-        self._verifiable = moves_both_ways([run.temperature("T") for run in runs])
+        self._both_ways = moves_both_ways([run.temperature("T") for run in runs])
         return offered(runs) if self.features is None else resolve_features(self.features, runs)
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
@@ -80,11 +80,11 @@ class MixedEffectsModel(FeatureModel):
         self.fitted_ = fit_mixed_effects(composed(table, features), features.terms)
         T = temperatures_of(table, features)
         parts = left_out([SharedMember(features, self.fitted_)], features, table, left_out_parts(table, T))
-        weights = weights_of(parts, 1)
+        weights = weights_of(parts, 1, self._both_ways)
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
         _, self.regressor_ = combined([(features, self.fitted_.regressor())], weights, mean)
-        self._found = intervals_of(parts, weights, table, self._verifiable)
+        self._found = intervals_of(parts, weights, table, self._both_ways)
         return len(table)
 
     def _interval(self, rows: Sequence[RunRows]) -> Intervals:
@@ -129,6 +129,11 @@ def offered(runs: Sequence[Run]) -> Features:
         if all(held_by(run, TIME_ON) for run in runs):
             terms += [f"since_on({tau:g} s)" for tau in DECAYS_S]
     return parse_features(", ".join(terms))
+
+
+def static_features(runs: Sequence[Run]) -> Features:
+    """A cubic in T, whose trend goes on beyond what the runs hold."""
+    return parse_features(f"T^1..3, {_beyond(runs)}")
 
 
 def _beyond(runs: Sequence[Run]) -> str:

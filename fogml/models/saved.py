@@ -46,7 +46,7 @@ FORMS: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "mean": ("fogml.models.baselines:MeanModel", ("mean",)),
     "features": (
         "fogml.models.feature_model:FeatureModel",
-        ("features", "polynomial", *PRESETS, "rbf", "rbf-patent", "mixed-effects", "shared"),
+        ("features", "polynomial", *PRESETS, "rbf", "rbf-patent", "mixed-effects", "combination", "shared"),
     ),
     "sklearn": ("fogml.models.sklearn_model:SklearnModel", None),
     "joint": ("fogml.models.joint:JointModel", ("joint", "joint-patent")),

@@ -13,6 +13,7 @@ from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
 from fogml.models.box import learn_box
 from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
+from fogml.models.directions import moves_both_ways
 from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
@@ -32,8 +33,6 @@ SCORED_ROWS = 2500
 """Training rows are averaged over blocks of time down to this number for scoring."""
 TRIED_CENTRES, TRIED_ROWS = 16, 1000
 FOLDS, BLOCKS_PER_FOLD = 10, 2
-MOVING_DEGC_MIN = 0.1
-"""A temperature rate above this is moving [degC/min]."""
 _MOTION = parse_features("T, dT")
 
 
@@ -58,16 +57,14 @@ class Trial:
     several_runs
         Whether there are several runs, each of which is left out in turn.
     both_directions
-        Whether temperatures go up and down in the training runs.
+        Whether temperature moves both ways in the training runs (`fogml.models.directions`).
     """
 
     def __init__(self, runs: Sequence[Run], seed: int, features: str | None = None) -> None:
         self.seed = seed
         temperature, rate = _temperatures_and_rates(runs)
         self.rates = distinct_rates(rate, temperature)
-        self.both_directions = bool(
-            rate.min(initial=0.0) < -MOVING_DEGC_MIN and rate.max(initial=0.0) > MOVING_DEGC_MIN
-        )
+        self.both_directions = moves_both_ways([run.temperature("T") for run in runs])
         self.candidates = (
             candidates_of(features)
             if features

@@ -1,0 +1,152 @@
+"""What `auto` is made of: members fitted, weighed on what is left out, and put together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import reduce
+from operator import add
+from typing import Any
+
+import numpy as np
+
+from fogml.features.features import Features
+from fogml.features.parse import parse_features
+from fogml.models.base import DriftModel
+from fogml.models.box import learn_box
+from fogml.models.candidates import Candidate
+from fogml.models.card import hash_ahead, training_card
+from fogml.models.combination import (
+    DRAWN_TOGETHER,
+    FittedMember,
+    LeftOut,
+    Member,
+    SharedMember,
+    combined,
+    intervals_of,
+    left_out,
+    left_out_parts,
+    weights_of,
+)
+from fogml.models.directions import moves_both_ways
+from fogml.models.feature_model import FeatureModel
+from fogml.models.linear import LinearRegressor
+from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
+from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features, temperatures_of
+from fogml.models.table import TrainingTable, run_rows
+from fogml.models.trial import fit_candidate
+from fogml.runs.run import FloatArray, Run
+
+LEAST_WEIGHT = 0.02
+"""Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
+
+
+@dataclass(frozen=True, eq=False)
+class Weighed:
+    """The model that was put together, and what of.
+
+    Attributes
+    ----------
+    model
+        The model, fitted to all training runs.
+    weights
+        Weight of each member, by name.
+    left, mean_left
+        Rms of it, and of the training mean, on the parts left out [deg/h], kinds counting alike.
+    """
+
+    model: DriftModel
+    weights: dict[str, float]
+    left: float
+    mean_left: float
+
+    def told(self) -> str:
+        """A note for the card."""
+        rms = f"{self.left:.4g} deg/h rms on parts left out, the training mean {self.mean_left:.4g} deg/h"
+        if not any(self.weights.values()):
+            return f"no compensation: nothing beats the training mean on parts left out; it leaves {rms}"
+        shares = ", ".join(
+            f"{100.0 * weight:.0f} % {name}" for name, weight in self.weights.items() if weight
+        )
+        return f"made of {shares}: it leaves {rms}"
+
+
+def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: int) -> Weighed:
+    """Fit the members, weigh them on what is left out, and put them together.
+
+    Parameters
+    ----------
+    runs
+        Training runs.
+    choice
+        The simple candidate to weigh; one without features is no member.
+    features
+        Features to keep to; None leaves them open.
+    seed
+        Seed of a network.
+    """
+    hashes = hash_ahead(runs)
+    shared = {"mixed effects": offered(runs) if features is None else parse_features(features)}
+    if features is None:
+        shared["cubic in T"] = static_features(runs)
+    simple = fit_candidate(choice, runs, seed) if choice.features else None
+    held = [*shared.values(), *([simple.features_] if simple is not None and simple.features_ else [])]
+    union: Features = parse_features(reduce(add, held).text)
+    rows = [run_rows(run, union) for run in runs]
+    table = averages_of(rows)
+    members: dict[str, Member] = {}
+    for name, own in shared.items():
+        part = _of(table, union, own)
+        members[name] = SharedMember(own, fit_mixed_effects(composed(part, own), own.terms))
+    regressor: Any = getattr(simple, "regressor_", None)
+    if simple is not None and isinstance(regressor, LinearRegressor) and simple.features_ is not None:
+        members[choice.name] = FittedMember(simple.features_, regressor)
+    parts = left_out_parts(table, temperatures_of(table, union))
+    lefts = left_out(list(members.values()), union, table, parts)
+    both_ways = moves_both_ways([run.temperature("T") for run in runs])
+    weights = weights_of(lefts, len(members), both_ways)
+    weights = np.where(weights < LEAST_WEIGHT, 0.0, weights)
+    left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)
+    if simple is not None and choice.network and simple.features_ is not None:
+        network = left_out([FittedMember(simple.features_, regressor)], union, table, parts)
+        alone = _rms(network, np.ones(1))
+        if alone**2 < (1.0 - DRAWN_TOGETHER) * left**2:
+            return Weighed(simple, {choice.name: 1.0}, alone, mean_left)
+    intervals = intervals_of(lefts, weights, table, both_ways)
+    chosen = [
+        (member.features, _regressor(member)) for member, weight in zip(members.values(), weights) if weight
+    ]
+    chosen = chosen or [(shared.get("cubic in T", union), _still(shared.get("cubic in T", union)))]
+    kept = weights[weights > 0.0] if weights.any() else np.zeros(1)
+    own, linear = combined(chosen, kept, float(table.y.mean()))
+    own = parse_features(own.text)
+    model = FeatureModel(own.text, kind="combination")
+    places = [union.atoms.index(atom) for atom in own.atoms]
+    learn_box(own, [part.atoms[:, places] for part in rows])
+    model.features_, model.regressor_, model.intervals_ = own, linear, intervals
+    notes = [note for part in rows for note in part.notes]
+    model.card_ = training_card(runs, hashes=hashes, rows=len(table), box=own.box, notes=notes)
+    return Weighed(model, dict(zip(members, weights.tolist(), strict=True)), left, mean_left)
+
+
+def _of(table: TrainingTable, union: Features, own: Features) -> TrainingTable:
+    """The table of a member's atoms."""
+    return replace(table, X=table.X[:, [union.atoms.index(atom) for atom in own.atoms]])
+
+
+def _regressor(member: Member) -> LinearRegressor:
+    return member.found.regressor() if isinstance(member, SharedMember) else member.regressor  # type: ignore[attr-defined]
+
+
+def _still(features: Features) -> LinearRegressor:
+    """A regressor that tells nothing of features."""
+    count = len(features)
+    return linear_regressor(np.zeros(count), 0.0, np.zeros((count + 1, count + 1)), 0.0)
+
+
+def _rms(parts: Sequence[LeftOut], weights: FloatArray) -> float:
+    """Root mean square left on parts [deg/h], parts of a kind and kinds counting alike."""
+    by_kind: dict[str, list[float]] = {}
+    for part in parts:
+        by_kind.setdefault(part.kind, []).append(float(np.mean((part.told - part.predicted @ weights) ** 2)))
+    return float(np.sqrt(np.mean([np.mean(squares) for squares in by_kind.values()]))) if by_kind else 0.0
