@@ -4,13 +4,16 @@ Left out in turn are whole runs, halves of each run, either direction of tempera
 time. With predictions :math:`p_m` of the members and outputs z on a part left out, all less the mean of the
 rows fitted to, the weights are
 
-.. math:: \min_{w \ge 0,\ \sum w \le 1}\ \operatorname{mean}_\text{parts}
-          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\min_m \overline{(z - p_m)^2}} + \kappa \sum_m (w_m - \bar w)^2 :
+.. math:: \min_{w \ge 0,\ \sum w = 1}\ \operatorname{mean}_\text{parts}
+          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\min_m \overline{(z - p_m)^2}}
+          + \kappa \sum_m (w_m - \bar w)^2,
 
-stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie. Their
-sum is the skill that left-out parts confirm; no compensation is its limit 0. Where temperature moves both
-ways, runs and blocks of time are asked: a half or a direction left out says how a fit of the rest goes on,
-which is not how a fit of both does. Where it moves one way only, halves are all that there is.
+stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie, times
+the skill :math:`\sum \overline{pz} / \sum \overline{p^2}` of their sum p within 0 and 1: no compensation is
+its limit 0. Where temperature moves both ways, runs and blocks of time are asked: a half or a direction left
+out says how a fit of the rest goes on, which is not how a fit of both does. Where it moves one way only, runs
+and halves are all that there is. Of several runs the skill is asked of those left out alone: parts of a run
+are told by the rest of it whatever it is that moved the drift, time included.
 """
 
 from __future__ import annotations
@@ -39,6 +42,8 @@ from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 from fogml.signals.memory import Beyond
 
+LEAST_WEIGHT = 0.02
+"""Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
 DRAWN_TOGETHER = 0.02
 """Weight kappa of equal weights, against squared errors as shares of the best member's."""
 WIDENING_PER_SPAN = 1.0
@@ -216,15 +221,34 @@ def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> Float
             share = 1.0 / (len(part.told) * least * kinds.count(part.kind) * len(set(kinds)))
             square = square + share * part.predicted.T @ part.predicted
             product = product + share * part.predicted.T @ part.told
+    size = max(float(np.trace(square)), 1e-300)
     found = minimize(
-        lambda w: (0.5 * w @ square @ w - product @ w, square @ w - product),
+        lambda w: ((0.5 * w @ square @ w - product @ w) / size, (square @ w - product) / size),
         equal,
         jac=True,
         method="SLSQP",
         bounds=[(0.0, 1.0)] * members,
-        constraints=[{"type": "ineq", "fun": lambda w: 1.0 - w.sum(), "jac": lambda w: -np.ones(members)}],
+        constraints=[{"type": "eq", "fun": lambda w: w.sum() - 1.0, "jac": lambda w: np.ones(members)}],
     )
-    return np.clip(np.asarray(found.x), 0.0, 1.0)
+    weights = np.clip(np.asarray(found.x), 0.0, 1.0)
+    weights = np.where(weights < LEAST_WEIGHT, 0.0, weights)
+    weights /= weights.sum()
+    return weights * skill_of([part for part in asked if part.kind == "runs"] or asked, weights)
+
+
+def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
+    r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
+
+    With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is
+    :math:`\sum \overline{p z} / \sum \overline{p^2}`: the least-squares factor, each part counting alike.
+    """
+    sums = [(part.predicted @ weights, part.told) for part in parts]
+    product = sum(float(np.mean(predicted * told)) for predicted, told in sums)
+    square = sum(float(np.mean(predicted * predicted)) for predicted, _ in sums)
+    if not square > 0.0:
+        return 1.0
+    skill = float(np.clip(product / square, 0.0, 1.0))
+    return skill if skill >= LEAST_WEIGHT else 0.0
 
 
 def intervals_of(

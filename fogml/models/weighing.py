@@ -17,7 +17,7 @@ from fogml.models.box import learn_box
 from fogml.models.candidates import Candidate
 from fogml.models.card import hash_ahead, training_card
 from fogml.models.combination import (
-    DRAWN_TOGETHER,
+    LEAST_WEIGHT,
     FittedMember,
     LeftOut,
     Member,
@@ -37,8 +37,8 @@ from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
 from fogml.runs.run import FloatArray, Run
 
-LEAST_WEIGHT = 0.02
-"""Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
+CLEARLY = 0.95
+"""A network is taken alone where it leaves less than this share of what the others together leave."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +52,7 @@ class Weighed:
     weights
         Weight of each member, by name.
     left, mean_left
-        Rms of it, and of the training mean, on the parts left out [deg/h], kinds counting alike.
+        Rms of it, and of the training mean, on the runs or blocks left out [deg/h], parts counting alike.
     """
 
     model: DriftModel
@@ -105,12 +105,13 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     lefts = left_out(list(members.values()), union, table, parts)
     both_ways = moves_both_ways([run.temperature("T") for run in runs])
     weights = weights_of(lefts, len(members), both_ways)
-    weights = np.where(weights < LEAST_WEIGHT, 0.0, weights)
     left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)
+    if not left**2 < (1.0 - LEAST_WEIGHT) * mean_left**2:
+        weights, left = 0.0 * weights, mean_left
     if simple is not None and choice.network and simple.features_ is not None:
         network = left_out([FittedMember(simple.features_, regressor)], union, table, parts)
         alone = _rms(network, np.ones(1))
-        if alone**2 < (1.0 - DRAWN_TOGETHER) * left**2:
+        if alone < CLEARLY * left:
             return Weighed(simple, {choice.name: 1.0}, alone, mean_left)
     intervals = intervals_of(lefts, weights, table, both_ways)
     chosen = [
@@ -145,8 +146,9 @@ def _still(features: Features) -> LinearRegressor:
 
 
 def _rms(parts: Sequence[LeftOut], weights: FloatArray) -> float:
-    """Root mean square left on parts [deg/h], parts of a kind and kinds counting alike."""
-    by_kind: dict[str, list[float]] = {}
-    for part in parts:
-        by_kind.setdefault(part.kind, []).append(float(np.mean((part.told - part.predicted @ weights) ** 2)))
-    return float(np.sqrt(np.mean([np.mean(squares) for squares in by_kind.values()]))) if by_kind else 0.0
+    """Root mean square left on runs, or else blocks or halves, left out [deg/h], parts counting alike."""
+    for kind in ("runs", "blocks", "halves"):
+        squares = [float(np.mean((p.told - p.predicted @ weights) ** 2)) for p in parts if p.kind == kind]
+        if squares:
+            return float(np.sqrt(np.mean(squares)))
+    return 0.0

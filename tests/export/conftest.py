@@ -22,7 +22,7 @@ RICH = (
 )
 MEMORY = (
     "T_in, play(T_in, 6 degC), lag(T_in-T_out, 300 s), lag(T_out, 900 s), T_in*play(T_out, 15 degC), "
-    "dT_in[exp, 40 s]"
+    "dT_in[exp, 40 s], beyond(T_in, -10 degC, 40 degC)"
 )
 NAMES = ("none", "mean", "polynomial", "M2", "rich", "memory", "rbf", "rbf-patent", "joint", "joint-patent")
 

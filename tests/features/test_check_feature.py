@@ -24,6 +24,7 @@ from fogml.testing import check_feature
         "T, lag(T, 600 s), lag(T_in-T_out, 100 s)*T",
         "hysteresis(T), play(T, 0.5 degC)*dT",
         "since_on(400 s), T*since_on(1 h), lag(T, 60 s)",
+        "T, beyond(T, -3 degC, 30.5 degC), T*beyond(power, 0, 20)",
         "power, d(power), supply^2, own_name*T, play(own_name, 2), lag(supply, 50 s)",
     ],
 )

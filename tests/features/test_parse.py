@@ -121,6 +121,9 @@ def test_any_text_parses_or_is_refused_with_a_caret_within_it(text: str) -> None
         ("play(power, 4 degC)", 14, "'W' expected"),
         ("play(own, 4 degC)", 12, "no unit expected"),
         ("hysteresis(power)", 0, "not of a temperature"),
+        ("beyond(T, 5 degC, 3 degC)", 10, "above the lower"),
+        ("beyond(T, 5, 8 degC)", 11, "unit expected"),
+        ("T, beyond(T)", 11, "',' expected before the lower bound"),
         ("T*(hysteresis(T))", 3, "several features"),
         ("sign(d(power))", 5, "direction of a temperature only"),
         ("since_on(T)", 9, "length expected"),
@@ -268,3 +271,15 @@ def test_any_text_is_features_or_one_message(text):
     except InputError:
         return
     assert parse_features(features.text) == features
+
+
+def test_beyond_is_what_levelling_within_a_twentieth_lacks_of_levelling_within_half() -> None:
+    atom = parse_features("beyond(T, -20 degC, 60 degC)").atoms[0]
+    T = np.array([-300.0, -60.0, -20.0, 0.0, 60.0, 60.001, 100.0, 1e6])
+    operator = atom.memory_operator(1.0)
+    assert operator is not None
+    values, settled = operator.push(T, T)
+    away = np.array([-280.0, -40.0, 0.0, 0.0, 0.0, 0.001, 40.0, 1e6 - 60.0])
+    size = np.abs(away)
+    np.testing.assert_allclose(values, np.sign(away) * (40 * size / (40 + size) - 4 * size / (4 + size)))
+    assert settled.all() and np.abs(values).max() < 36.0
