@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[1]
 SECTIONS = {
     "thermal-cycle": ("thermal_cycle/results.md", "## rms (bias included)"),
     "thermal-cycle-stability": ("thermal_cycle/results.md", "## Bias stability"),
-    "thermal-cycle-both": ("thermal_cycle/results.md", "and `up`, judged on `last down`"),
+    "thermal-cycle-both": ("thermal_cycle/results.md", "## Two legs in training"),
     "known-floor": ("known_floor/results.md", "# Residual over a known floor"),
     "gap-blind": ("gap_blind/results.md", "# The diagnosis on withheld effects"),
     "default-rates": ("default_rates/results.md", "# The default at other ramp rates"),

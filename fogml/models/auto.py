@@ -21,6 +21,8 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
+from fogml.models.directions import refusals
+from fogml.models.feature_model import resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.trial import Trial
@@ -70,6 +72,8 @@ class AutoModel(DriftModel):
             If the runs don't belong together, lack a temperature, or are too short.
         """
         group = checked_runs(runs)
+        if self.features is not None:
+            resolve_features(self.features, group)
         trial = Trial(group, self.seed, self.features)
         scores = []
         for done, candidate in enumerate(trial.candidates):
@@ -80,7 +84,7 @@ class AutoModel(DriftModel):
         self.choice_ = trial.chosen(scores)
         self.weighed_ = weigh(group, self.choice_.candidate, self.features, self.seed)
         self.chosen_ = self.weighed_.model
-        notes = (*self.chosen_.card_.notes, *self._reasons(trial))
+        notes = (*refusals(group), *self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)
         self.selection_ = [score.as_dict() for score in self.scores_]
         self.features_ = self.chosen_.features_

@@ -1,4 +1,4 @@
-"""Whether temperature moves both ways in training runs: what tells a rate from its time and direction."""
+"""What training runs can tell by how temperature moves in them: span, resolution, and both directions."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fogml.runs.run import FloatArray
+from fogml.runs.run import FloatArray, Run
 
 TURNS = 0.2
 """Share of the span that temperature has to move each way for its direction to tell anything."""
@@ -29,3 +29,36 @@ def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
         steps = np.diff(parts)
         up, down = up + float(steps[steps > 0].sum()), down - float(steps[steps < 0].sum())
     return min(up, down) > TURNS * (high - low)
+
+
+LEAST_SPAN_DEGC = 5.0
+"""Span of temperature below which what was learned holds at that temperature alone [degC]: less than a room
+changes in a day, and a few percent of what gyros are used over."""
+LEAST_STEPS = 10.0
+"""Steps of a sensor's resolution that a span must hold to tell a slope."""
+
+
+def refusals(runs: Sequence[Run]) -> list[str]:
+    """What training runs can't tell because temperature hardly moves in them, and what to record next."""
+    temperatures = [run.temperature("T") for run in runs]
+    low, high = min(float(T.min()) for T in temperatures), max(float(T.max()) for T in temperatures)
+    span = high - low
+    if span == 0.0:
+        return [
+            f"one temperature only, {low:.4g} degC: nothing can be told of drift over temperature; record a "
+            "ramp up and a ramp down over the range of use"
+        ]
+    steps = [np.diff(np.unique(T)) for T in temperatures]
+    resolution = min((float(step.min()) for step in steps if len(step)), default=0.0)
+    if span < LEAST_STEPS * resolution:
+        return [
+            f"T spans {span:.3g} degC, {span / resolution:.0f} steps of its sensor: that tells no slope; "
+            "record a wider range, or with a finer sensor"
+        ]
+    if span < LEAST_SPAN_DEGC:
+        return [
+            f"T spans {span:.3g} degC in the training runs, under {LEAST_SPAN_DEGC:g} degC: what is "
+            f"compensated holds at {0.5 * (low + high):.3g} degC alone; record a ramp up and a ramp down "
+            "over the range of use"
+        ]
+    return []

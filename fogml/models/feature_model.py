@@ -18,7 +18,9 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.signal import check_holds
 from fogml.features.stream import FeatureStream
+from fogml.features.suits import check_suits
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
@@ -279,11 +281,14 @@ def check_feature_text(text: str) -> None:
 
 def resolve_features(features: str | Features, runs: Sequence[Run]) -> Features:
     """Features of one's own from their text, terms with ``{sensor}`` written out for the runs' sensors."""
-    if not isinstance(features, str):
-        return parse_features(features.text)
-    if _EACH_SENSOR in features:
-        features = _written_out(features, shared_sensors(runs))
-    return parse_features(features)
+    text = features if isinstance(features, str) else features.text
+    if _EACH_SENSOR in text:
+        text = _written_out(text, shared_sensors(runs))
+    resolved = parse_features(text)
+    for run in runs:
+        check_holds(run, resolved.sensors, resolved.text)
+    check_suits(resolved, runs)
+    return resolved
 
 
 def shared_sensors(runs: Sequence[Run]) -> list[str]:

@@ -29,7 +29,7 @@ from fogml.models.combination import (
     weights_of,
 )
 from fogml.models.directions import moves_both_ways
-from fogml.models.feature_model import FeatureModel
+from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
 from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features, temperatures_of
@@ -86,7 +86,7 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
         Seed of a network.
     """
     hashes = hash_ahead(runs)
-    shared = {"mixed effects": offered(runs) if features is None else parse_features(features)}
+    shared = {"mixed effects": offered(runs) if features is None else resolve_features(features, runs)}
     if features is None:
         shared["cubic in T"] = static_features(runs)
     simple = fit_candidate(choice, runs, seed) if choice.features else None

@@ -73,3 +73,34 @@ def test_a_test_run_that_lacks_a_column_is_refused_with_the_place() -> None:
     bare = Run("b.csv", {name: test.columns[name] for name in ("time", "gyro", "T")}, test.facts)
     with pytest.raises(InputError, match=r"b.csv: no column 'light'[\s\S]*\^"):
         model.compensate(bare)
+
+
+@pytest.mark.parametrize(
+    ("features", "told"),
+    [
+        ("T, lag(T, 100 h)", r"360000 s, but the longest training run is[\s\S]*\n     \^"),
+        ("T, lag(T, 2 s)", r"samples are 10 s apart[\s\S]*\n     \^\nstate at least 10 s"),
+        ("T, play(T, 60 degC)", r"spans 100 in the training runs[\s\S]*\n     \^\nstate at most 50"),
+        ("T, heat", r"no column 'heat'[\s\S]*\n     \^"),
+    ],
+)
+def test_memories_that_the_runs_cannot_tell_are_refused_with_the_place(features: str, told: str) -> None:
+    for name in ("polynomial", "mixed-effects", "auto"):
+        with pytest.raises(InputError, match=told):
+            make_model(name, features=features).fit(made_run(1, 1.0))
+
+
+@pytest.mark.parametrize(
+    ("T", "told"),
+    [
+        (np.full(720, 25.0), "one temperature only, 25 degC"),
+        (25.0 + np.round(np.sin(np.arange(720) / 115.0)) * 0.5, "2 steps of its sensor"),
+        (25.0 + np.sin(np.arange(720) / 115.0), "under 5 degC"),
+    ],
+)
+def test_a_temperature_that_hardly_moves_is_said_first(T: np.ndarray, told: str) -> None:
+    noise = np.random.default_rng(0).normal(0.0, 0.1, len(T))
+    run = Run("still", {"time": 20.0 * np.arange(len(T)), "gyro": 1.0 + noise, "T": T})
+    model = make_model("auto").fit(run)
+    assert told in model.card_.notes[0] and "record" in model.card_.notes[0]
+    assert model.intervals_.half_width(0.9) > 0.0

@@ -1,0 +1,1 @@
+"""A real cold start, part against part."""

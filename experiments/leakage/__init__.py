@@ -1,0 +1,1 @@
+"""How far a random split flatters a model."""
