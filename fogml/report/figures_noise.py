@@ -99,7 +99,9 @@ def allan_plot(noise: Mapping[str, Any]) -> Drawing:
             )
         )
     figure.update_xaxes(title_text="averaging time τ [s]", **log_axis(taus[0], taus[-1], room=0.03))
-    figure.update_yaxes(title_text="Allan deviation [deg/h]", **log_axis(*_span(adev, intervals)))
+    figure.update_yaxes(
+        title_text="Allan deviation [deg/h]", **log_axis(*_span(adev, intervals, noise.get("floor")))
+    )
     style.styled(figure, 560)
     first, last = (f"{number(adev[i])} deg/h at {number(taus[i])} s" for i in (0, -1))
     lowest = (
@@ -209,9 +211,12 @@ def _term_lines(figure: go.Figure, noise: Mapping[str, Any], taus: FloatArray, a
     )
 
 
-def _span(adev: FloatArray, intervals: FloatArray | None) -> tuple[float, float]:
+def _span(
+    adev: FloatArray, intervals: FloatArray | None, floor: Mapping[str, Any] | None = None
+) -> tuple[float, float]:
     """From the lowest to the highest value, intervals included up to a decade beyond the curve."""
-    positive = adev[adev > 0]
+    drawn = np.concatenate([adev, floor["value"]]) if floor else adev
+    positive = drawn[drawn > 0]
     if positive.size == 0:
         return 0.1, 10.0
     low, high = float(positive.min()), float(positive.max())

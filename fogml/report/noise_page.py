@@ -52,7 +52,7 @@ def noise_page(noise: Mapping[str, Any]) -> str:
 def _verdict(noise: Mapping[str, Any]) -> str:
     parts = []
     white = noise["terms"].get("N", {})
-    if white.get("value"):
+    if white.get("value") and (white.get("ci") or [1.0])[0]:
         parts.append(f"an angle random walk of {number(white['value'])} {_unit(white)}")
     minimum = noise.get("minimum") or {}
     if minimum.get("adev"):
