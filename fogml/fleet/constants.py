@@ -200,12 +200,27 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
             break
     means, spreads, distances = _each(seen, mean, covariance)
     errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
-    prior = Prior(mean, covariance, shift, scale, float(len(units)))
+    prior = Prior(mean, covariance / _of_normal(width), shift, scale, float(len(units)))
     box = {
         name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
         for name in units[0].box
     }
     return FleetConstants(units[0].features, prior, means, errors, np.sqrt(distances / width), box)
+
+
+def _of_normal(width: int) -> float:
+    """Share of the covariance of normal constants that the t distribution's scatter matrix comes out at.
+
+    The root c of ``E[(f + k) x / (f c + x)] = k`` with x chi-square of k degrees of freedom, f those of the t
+    distribution (consistency at the normal: R. Maronna, Ann. Statist. 4 (1976) 51).
+    """
+    from scipy.optimize import brentq
+    from scipy.stats import chi2
+
+    squares = chi2.ppf((np.arange(2048) + 0.5) / 2048, width)
+    return float(
+        brentq(lambda c: np.mean((_FREEDOM + width) * squares / (_FREEDOM * c + squares)) - width, 0.05, 1.0)
+    )
 
 
 def _begin(seen: Sequence[tuple[FloatArray, FloatArray]], width: int) -> tuple[FloatArray, FloatArray]:

@@ -247,8 +247,8 @@ def agreement(told: Told, prior: Prior) -> float:
     (a prior-predictive check: G. Box, J. R. Stat. Soc. A 143 (1980) 383), in the directions of
     which the rows tell something: all jointly, by the sum of squares, and each for itself, by the
     largest one. What counts is the lesser of the two probabilities, against how small it comes out for
-    units of the fleet, drawn: their constants from the t distribution that a mean and variances estimated
-    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.2), their noise from the models
+    units of the fleet, drawn: their constants from the t distribution that a mean and a covariance estimated
+    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.6), their noise from the models
     that the rows speak for, each as often as it is likely.
     0 if the rows tell nothing, as then an odd unit would look the same.
 
@@ -269,8 +269,8 @@ def agreement(told: Told, prior: Prior) -> float:
     unit = random.standard_normal((_DRAWS, len(precise)))
     noise = _noise_drawn(told, directions[:, heard] / np.sqrt(precise), random)
     if np.isfinite(prior.units):
-        known = max(prior.units - 1.0, 1.0)
-        unit *= np.sqrt((1.0 + 1.0 / prior.units) * known / random.chisquare(known, _DRAWS))[:, None]
+        freedom = random.chisquare(max(prior.units - len(prior.mean), 1.0), _DRAWS)
+        unit *= np.sqrt((1.0 + 1.0 / prior.units) * (prior.units - 1.0) / freedom)[:, None]
     drawn = (unit * np.sqrt(precise) + noise) ** 2 / (1.0 + precise)
     figures = np.vstack(
         [np.append(drawn.sum(axis=1), squares.sum()), np.append(drawn.max(axis=1), squares.max())]

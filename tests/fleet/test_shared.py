@@ -176,6 +176,26 @@ def test_a_fleet_of_few_units_is_less_sure_of_an_odd_one():
     assert odd[False] / 400 > 0.09
 
 
+def test_the_level_holds_where_a_fleet_tells_its_whole_covariance():
+    """Fleets of 12 units, three correlated constants known without error: 5 % of further units are odd."""
+    rng = np.random.default_rng(7)
+    root = np.array([[1.0, 0.0, 0.0], [0.6, 0.5, 0.0], [-0.3, 0.2, 0.4]])
+    odd, sizes = [], []
+    for _ in range(30):
+        units = []
+        for constants in rng.normal(size=(12, 3)) @ root.T:
+            triangle = 1e4 * np.column_stack([np.eye(3), constants])
+            box = {"T": [0.0, 1.0]}
+            units.append(UnitConstants("T^1..2", triangle, 1.0, 100, np.zeros(2), np.ones(2), box))
+        prior = fleet_constants(units).prior
+        sizes.append(np.diag(prior.covariance) / np.diag(root @ root.T))
+        for constants in rng.normal(size=(10, 3)) @ root.T:
+            odd.append(agreement(told(1e8 * np.eye(3), 1e8 * constants), prior) < ODD)
+    # Three standard deviations of 300 units; the t distribution of n - 1 degrees of freedom gives 12 %.
+    assert np.mean(odd) == pytest.approx(0.05, abs=0.045)
+    assert np.mean(sizes) == pytest.approx(1.0, abs=0.15), np.mean(odd)
+
+
 def test_what_rows_do_not_tell_can_agree_with_nothing():
     prior = Prior(np.zeros(3), np.eye(3), np.zeros(2), np.ones(2))
     assert agreement(told(1e-3 * np.eye(3), np.zeros(3)), prior) == 0.0
