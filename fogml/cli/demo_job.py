@@ -76,7 +76,8 @@ def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: T
     rows = []
     for axis, judgement in judgements.items():
         run = judgement.test[0]
-        model = ", ".join(judgement.model["features"]) or "no compensation"
+        nothing = any(note.startswith("no compensation") for note in judgement.model["notes"])
+        model = "no compensation" if nothing else ", ".join(judgement.model["features"])
         figures = (
             run.before.rms,
             run.after.rms,

@@ -42,6 +42,9 @@ from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 from fogml.signals.memory import Beyond
 
+UNSEEN_SHIFT = 2.0**0.5
+"""Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken
+to have the variance of what is left within it."""
 LEAST_WEIGHT = 0.02
 """Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
 DRAWN_TOGETHER = 0.02
@@ -256,6 +259,8 @@ def intervals_of(
 ) -> Intervals:
     """Half-widths from what is left on the parts left out: of each kind of part, the widest.
 
+    Of one run they are widened for the shift to the next, `UNSEEN_SHIFT`.
+
     Errors are taken relative to how the half-width grows outside the box, so that the half-width inside it is
     told by parts that had to be told from elsewhere too.
 
@@ -274,6 +279,8 @@ def intervals_of(
     if not both_ways or not parts:
         drift = float(table.y.std())
         half = np.maximum(half, [drift * NormalDist().inv_cdf(0.5 + level / 2.0) for level in LEVELS])
+    if "runs" not in kinds:
+        half = UNSEEN_SHIFT * half
     told = f"{' and '.join(kinds)} left out" if kinds else "none"
     averaging_s, half_widths = float(table.averaging_s), tuple(half.tolist())
     return Intervals(averaging_s, half_widths, len(table), told, LEVELS, WIDENING_PER_SPAN)

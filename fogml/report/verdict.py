@@ -169,8 +169,8 @@ def model_card(model: dict[str, Any]) -> list[tuple[str, str]]:
 
 
 def _atom_unit(name: str) -> str:
-    """The unit of a feature's atom, from its name: a temperature, a rate of one, or a direction."""
-    if name.startswith("sign"):
+    """The unit of a feature's atom, from its name: a temperature, a rate of one, or a pure number."""
+    if name.startswith(("sign", "since_on")):
         return ""
     return " °C/min" if name.startswith(("dT", "d(")) else " °C"
 
