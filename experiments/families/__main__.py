@@ -12,14 +12,13 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.gap.blind.folders import DIAGNOSIS, BlindFolder
-from fogml.gap.blind.methods import FAMILIES
-from fogml.gap.blind.score import marks_of
-from fogml.gap.blind.scoring.by_reality import ALL, by_reality
-from fogml.gap.blind.scoring.marks import Mark
-from fogml.gap.blind.truth import read_truth
-
 from experiments.results import write_results
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.methods import FAMILIES
+from fogml.blind.score import marks_of
+from fogml.blind.scoring.by_reality import ALL, by_reality
+from fogml.blind.scoring.marks import Mark
+from fogml.blind.truth import read_truth
 from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING
 
@@ -66,7 +65,8 @@ def page(values: Mapping[str, Any]) -> str:
         "",
         f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no final "
         "figures, and families were widened with failures among these cases in view. Each figure with its "
-        "95 % interval (Wilson's for shares) and what it rests on.",
+        "95 % interval (Wilson's for shares) and what it rests on. Times are what was recorded with the "
+        "answers, on a machine that others used: families' of the processor, the diagnosis's of the clock.",
         "",
     ]
     if values["shared"]:
