@@ -31,7 +31,10 @@ COMMANDS = {
     "export": ("fogml.cli.export", "Write a model's compact form, once it has been compared with the model."),
     "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
     "sweep": ("fogml.cli.sweep", "Search features, models and sizes on held-out parts of the training runs."),
-    "lab": ("fogml.cli.lab", "Procedures of a laboratory: misalignment on a rate table, north seeking."),
+    "lab": (
+        "fogml.cli.lab",
+        "Procedures of a laboratory: misalignment, tests on a rate table, north seeking.",
+    ),
     "fleet": (
         "fogml.cli.fleet",
         "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",

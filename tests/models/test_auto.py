@@ -149,7 +149,10 @@ def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
         assert np.std(model.predict(run)) < 0.1 * run.gyro.std()
         if not taken[-1]:
             assert "no compensation" in model.card_.notes[0]
-            np.testing.assert_allclose(model.predict(run), run.gyro.mean(), rtol=1e-9)
+            # One constant, the mean of what the members are weighed on: within its error of the run's.
+            predicted = model.predict(run)
+            assert np.ptp(predicted) == 0.0
+            assert abs(predicted[0] - run.gyro.mean()) < 0.1 / np.sqrt(len(predicted))
             # It has a box and an interval all the same.
             assert model.features_ is not None and model.intervals_.half_width(0.9) > 0.0
     # A member may gain a little by luck; it must not be the rule.
