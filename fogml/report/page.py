@@ -73,12 +73,11 @@ def _as_shown(value: Any) -> Any:
     if isinstance(value, str):
         return "".join(part if part in _MARKS else figure_text(part) for part in _MARK.split(value))
     if isinstance(value, list):
-        return [_as_shown(item) for item in value] if any(map(_may_hold_text, value)) else value
-    return {key: _as_shown(item) for key, item in value.items()} if isinstance(value, dict) else value
-
-
-def _may_hold_text(value: Any) -> bool:
-    return isinstance(value, str | list | dict)
+        return [_as_shown(item) for item in value]
+    if isinstance(value, dict):
+        # Samples are packed as base64, which is no text.
+        return {key: item if key == "bdata" else _as_shown(item) for key, item in value.items()}
+    return value
 
 
 @cache
