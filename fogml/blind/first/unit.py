@@ -12,8 +12,9 @@ from fogml.blind.first.programme import Programme, draw_programme, static_progra
 from fogml.blind.first.sensors import draw_instruments, sense
 from fogml.blind.first.world import happen
 from fogml.blind.frame import nominal
+from fogml.blind.frame.drawing import draw_demands, draw_set_up
 from fogml.blind.frame.form import Demands, Form
-from fogml.blind.frame.record import SetUp, World
+from fogml.blind.frame.record import World
 from fogml.blind.frame.unit import Unit, UnitRun
 
 _STATIC_FACTOR = 1.3
@@ -31,9 +32,9 @@ def draw_unit(
     plant = Plant(draw_plant(rng, quick))
     constants = nominal.draw_constants(rng, instruments.two_faces)
     noise = draw_noise(rng)
-    set_up = _draw_set_up(rng, forms)
+    set_up = draw_set_up(rng, forms, (20.0, 60.0), upright=0.75)
     earth_stated = bool(rng.random() < 0.85)
-    demands = _draw_demands(rng, forms)
+    demands = draw_demands(rng, forms, {"turns": 0.4, "power_steps": 0.3, "fan_stops": 0.15}, (10.0, 80.0))
     slope, turning_slope = nominal.temperature_slopes(constants, sample_s)
     turning_slope *= demands.top_rate * float(demands.turns and not demands.small_rates)
     instruments = instruments.finer(slope, turning_slope, noise.N / np.sqrt(sample_s / 3600.0))
@@ -70,26 +71,3 @@ def _shown(others: tuple[str, ...], demands: Demands, world: World) -> tuple[str
     names = [name for name in others if name in world.drives]
     names += ["power"] * demands.power_steps + ["fan"] * demands.fan_stops
     return tuple(dict.fromkeys(names))
-
-
-def _draw_set_up(rng: np.random.Generator, forms: Sequence[type[Form]]) -> SetUp:
-    latitude = float(rng.uniform(20.0, 60.0))
-    if any(f.horizontal for f in forms):
-        return SetUp(latitude, float(rng.choice([90.0, 270.0])))
-    if any(f.demands.slow_turns for f in forms) or rng.random() < 0.75:
-        return SetUp(latitude, None)
-    return SetUp(latitude, float(rng.uniform(0.0, 360.0)))
-
-
-def _draw_demands(rng: np.random.Generator, forms: Sequence[type[Form]]) -> Demands:
-    """What the forms ask for, and the rest by chance."""
-    kinds = [name for name, value in vars(Demands()).items() if isinstance(value, bool)]
-    asked = {name: any(getattr(f.demands, name) for f in forms) for name in kinds}
-    by_chance = rng.random(len(kinds))
-    still = any(f.name == "logger_skew" for f in forms)
-    chance = {"turns": 0.0 if still else 0.4, "power_steps": 0.3, "fan_stops": 0.15}
-    drawn = {
-        name: bool(wanted or draw < chance.get(name, 0.0))
-        for (name, wanted), draw in zip(asked.items(), by_chance)
-    }
-    return Demands(**drawn, top_rate=float(np.exp(rng.uniform(np.log(10.0), np.log(80.0)))))

@@ -8,8 +8,9 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from fogml.blind.frame import nominal
-from fogml.blind.frame.form import Demands, Form
-from fogml.blind.frame.record import SetUp, World
+from fogml.blind.frame.drawing import draw_demands, draw_set_up
+from fogml.blind.frame.form import Form
+from fogml.blind.frame.record import World
 from fogml.blind.frame.state_noise import StateNoise
 from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.blind.frame.unit import Unit, UnitRun
@@ -29,8 +30,8 @@ def draw_unit(
     """A unit whose programmes and instruments show the given forms; `runs` to fit on, one held out."""
     plant = Plant(draw_plant(rng, any(f.quick_plant for f in forms)))
     noise = draw_noise(rng)
-    demands = _draw_demands(rng, forms)
-    set_up = _draw_set_up(rng, forms)
+    demands = draw_demands(rng, forms, {"turns": 0.3, "power_steps": 0.3}, (5.0, 100.0))
+    set_up = draw_set_up(rng, forms, (-55.0, 62.0), upright=0.6)
     faces = any(f.faces for f in forms)
     constants = nominal.draw_constants(rng, True)
     rest, turning = nominal.temperature_slopes(constants, sample_s)
@@ -84,27 +85,3 @@ def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:
     low, high = int(winding.argmin()), int(winding.argmax())
     turned = [float(winding[k]) for k in sorted((low, high))]
     return (*past, *turned, float(winding[-1]), 22.0)
-
-
-def _draw_set_up(rng: np.random.Generator, forms: Sequence[type[Form]]) -> SetUp:
-    latitude = float(rng.uniform(-55.0, 62.0))
-    if any(f.horizontal for f in forms):
-        return SetUp(latitude, float(rng.choice([90.0, 270.0])))
-    if any(f.demands.slow_turns for f in forms) or rng.random() < 0.6:
-        return SetUp(latitude, None)
-    return SetUp(latitude, float(rng.uniform(0.0, 360.0)))
-
-
-def _draw_demands(rng: np.random.Generator, forms: Sequence[type[Form]]) -> Demands:
-    """What the forms ask for, and the rest by chance."""
-    kinds = [name for name, value in vars(Demands()).items() if isinstance(value, bool)]
-    asked = {name: any(getattr(f.demands, name) for f in forms) for name in kinds}
-    by_chance = rng.random(len(kinds))
-    chance = {"turns": 0.3, "power_steps": 0.3}
-    if any(f.name == "logger_skew" for f in forms):
-        chance["turns"] = 0.0
-    drawn = {
-        name: bool(wanted or draw < chance.get(name, 0.0))
-        for (name, wanted), draw in zip(asked.items(), by_chance)
-    }
-    return Demands(**drawn, top_rate=float(np.exp(rng.uniform(np.log(5.0), np.log(100.0)))))
