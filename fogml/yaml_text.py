@@ -188,6 +188,8 @@ class _Builder:
 
     def _scalar(self, event: Any, is_text: bool) -> Any:
         text: str = event.value
+        if "\0" in text:
+            self._fail(event, "a character of code 0, which no name or path may have; remove it")
         if not event.implicit[0]:  # in quotation marks, or a block of text
             return text
         if text in _NULL:

@@ -61,6 +61,7 @@ def test_scalars(written, read):
         ("a: !!python/object/apply:os.system [ls]", "tag .*os.system.* is not accepted"),
         ("a: !!float 3", "tag .* is not accepted"),
         ("<<: {a: 1}", "merge keys"),
+        (r'a: ["b\0"]', "key 'a': a character of code 0, which no name"),
         ("a: &x [*x]", r"alias '\*x' stands for nothing above it"),
         ("a: *b", r"alias '\*b' stands for nothing above it"),
         ("--- 1\n--- 2", "line 2, column 1: a second document"),
@@ -108,7 +109,7 @@ looks = st.sampled_from(
      "-", "?", "1_0", "+1", ".5", "5.", "# x", "a: b", "*a", "&a", "!a", "- a", "'", '"', " a ", "a\nb",
      "\t", "\x07", "\udc80"]
 )  # fmt: skip
-texts = looks | st.text(max_size=12)
+texts = looks | st.text(st.characters(exclude_characters="\0"), max_size=12)
 plain = st.recursive(
     scalars | texts,
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3),

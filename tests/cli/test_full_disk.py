@@ -6,40 +6,50 @@ files, which needs no privilege.
 
 from __future__ import annotations
 
-import functools
+import contextlib
 import os
 import resource
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
+from fogml.models.names import make_model
+from fogml.models.saved import save_model
+from fogml.runs.reading import read_run
+from tests.cli.conftest import csv_text
 from tests.fleet.units import write_fleet
 
-PROGRAM = [sys.executable, "-c", "from fogml.cli.main import main; main()"]
-FLEET = ("--model", "polynomial", "--features", "T", "--averaging", "40", "--quiet")
+FLEET = ("--model", "polynomial", "--features", "T", "--averaging", "40", "--workers", "1", "--quiet")
 UNIT_KIB = 4800
 """What a unit's results take, nearly all of it the page's."""
 
 
-def run(cwd: Path, *arguments: object, most: int | None = None) -> subprocess.CompletedProcess:
-    """Run fogml as a process of its own whose files may have `most` bytes."""
-    limit = (
-        None if most is None else functools.partial(resource.setrlimit, resource.RLIMIT_FSIZE, (most, most))
-    )
-    command = [*PROGRAM, *[str(argument) for argument in arguments]]
-    return subprocess.run(command, capture_output=True, text=True, timeout=300, cwd=cwd, preexec_fn=limit)
+@contextlib.contextmanager
+def files_up_to(most: int) -> Iterator[None]:
+    """No file may have more than `most` bytes."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (most, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def refused(done: subprocess.CompletedProcess, message: str) -> None:
+@pytest.fixture
+def refused(invoke):
     """Check for status 2 and one line that says what the kernel said and what to do."""
-    assert done.returncode == 2, done.stderr
-    assert done.stdout == ""
-    (line,) = done.stderr.strip().splitlines()
-    assert message in line
-    assert "make room" in line
+
+    def check(message: str, *arguments: object, most: int | None = None) -> None:
+        with contextlib.nullcontext() if most is None else files_up_to(most):
+            done = invoke(*arguments, status=2)
+        assert done.stdout == ""
+        (line,) = done.stderr.strip().splitlines()
+        assert message in line
+        assert "make room" in line
+
+    return check
 
 
 def finished(home: Path) -> dict[str, int]:
@@ -73,11 +83,11 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
         subprocess.run(["umount", "-l", str(place)], check=True)
 
 
-def test_a_fleet_on_a_disk_that_fills(small_disk, tmp_path):
+def test_a_fleet_on_a_disk_that_fills(small_disk, invoke, refused, tmp_path):
     manifest = write_fleet(tmp_path, 4)
     home = small_disk(2 * UNIT_KIB + UNIT_KIB // 2) / "out"
-    arguments = ("fleet", manifest, *FLEET, "--workers", 2, "--out", home)
-    refused(run(tmp_path, *arguments), "No space left on device")
+    arguments = ("fleet", manifest, *FLEET, "--out", home)
+    refused("No space left on device", *arguments)
     kept = finished(home)
     assert 1 <= len(kept) <= 2
     for folder in home.iterdir():
@@ -85,70 +95,71 @@ def test_a_fleet_on_a_disk_that_fills(small_disk, tmp_path):
         assert {path.name for path in folder.iterdir()} >= {"report.json", "report.html", "model"}
     assert not list(home.parent.rglob(".partial-*"))
     small_disk(8 * UNIT_KIB)
-    done = run(tmp_path, *arguments)
-    assert (done.returncode, done.stderr) == (0, "")
+    assert invoke(*arguments).stderr == ""
     assert len(finished(home)) == 4
     assert {name: finished(home)[name] for name in kept} == kept
 
 
-def test_a_fleets_own_page_on_a_full_disk(small_disk, tmp_path):
+def test_a_fleets_own_page_on_a_full_disk(small_disk, invoke, refused, tmp_path):
     manifest = write_fleet(tmp_path, 2)
     home = small_disk(2 * UNIT_KIB + UNIT_KIB // 2) / "out"
     arguments = ("fleet", manifest, *FLEET, "--out", home)
-    refused(run(tmp_path, *arguments), "finished units are kept")
+    refused("finished units are kept", *arguments)
     kept = finished(home)
     assert len(kept) == 2
     assert {path.name for path in home.iterdir()} == set(kept)
     small_disk(8 * UNIT_KIB)
-    assert run(tmp_path, *arguments).returncode == 0
+    invoke(*arguments)
     assert finished(home) == kept
     assert (home / "fleet.html").is_file()
 
 
-def test_a_fleet_whose_files_may_not_grow(tmp_path):
+def test_a_fleet_whose_files_may_not_grow(invoke, refused, tmp_path):
     manifest = write_fleet(tmp_path, 2)
     lines = manifest.read_text().splitlines()
     arguments = ("fleet", manifest, *FLEET, "--out", tmp_path / "out")
     manifest.write_text("\n".join(lines[:2]) + "\n")
-    assert run(tmp_path, *arguments).returncode == 0
+    invoke(*arguments)
     kept = finished(tmp_path / "out")
     manifest.write_text("\n".join(lines) + "\n")
     # The limits stop the workbook of the second unit, and its page.
     for most in (5000, 1_000_000):
-        refused(run(tmp_path, *arguments, most=most), "File too large")
+        refused("File too large", *arguments, most=most)
         assert finished(tmp_path / "out") == kept
         assert not (tmp_path / "out" / "FOG-001-x").exists()
         assert not list(tmp_path.rglob(".partial-*"))
 
 
-@pytest.fixture
-def model(invoke, run_files, tmp_path):
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
     """A trained model."""
-    out = tmp_path / "trained"
-    invoke("train", run_files[0], "--test", run_files[1], "--model", "M2", "-o", out, "--quiet")
-    return out / "model"
+    home = tmp_path_factory.mktemp("trained")
+    (home / "a.csv").write_text(csv_text(0))
+    (home / "a.yaml").write_text("unit: FOG-1\naxis: x\n")
+    save_model(make_model("M2").fit(read_run(home / "a.csv")), home / "model")
+    return home / "model"
 
 
 @pytest.mark.parametrize("most", [5000, 1_000_000])
-def test_a_training_whose_files_may_not_grow(run_files, tmp_path, most):
-    arguments = ("--model", "M2", "-o", "out", "--quiet")
-    refused(run(tmp_path, "train", "a.csv", "--test", "b.csv", *arguments, most=most), "File too large")
+def test_a_training_whose_files_may_not_grow(run_files, refused, tmp_path, most):
+    arguments = ("--test", run_files[1], "--model", "M2", "-o", tmp_path / "out", "--quiet")
+    refused("File too large", "train", run_files[0], *arguments, most=most)
     assert not (tmp_path / "out").exists()
     assert not list(tmp_path.rglob(".partial-*"))
 
 
 @pytest.mark.parametrize(("form", "most"), [("json", 60), ("onnx", 300)])
-def test_an_export_whose_files_may_not_grow(model, tmp_path, form, most):
+def test_an_export_whose_files_may_not_grow(model, refused, tmp_path, form, most):
     if form == "onnx":
         pytest.importorskip("onnxruntime", reason="ONNX is not installed: pip install 'fogml[export]'")
-    arguments = ("export", model, "--to", form, "-o", "firmware", "--quiet")
-    refused(run(tmp_path, *arguments, most=most), "File too large")
+    arguments = ("export", model, "--to", form, "-o", tmp_path / "firmware", "--quiet")
+    refused("File too large", *arguments, most=most)
     assert not (tmp_path / "firmware").exists()
     assert not list(tmp_path.rglob(".partial-*"))
 
 
 @pytest.mark.parametrize(("form", "free_kib"), [("c", 8), ("json", 4)])
-def test_an_export_on_a_disk_that_fills(small_disk, model, tmp_path, form, free_kib):
+def test_an_export_on_a_disk_that_fills(small_disk, model, invoke, refused, tmp_path, form, free_kib):
     disk = small_disk(1024)
     (disk / "firmware").mkdir()
     (disk / "firmware" / "mine.txt").write_text("mine")
@@ -156,9 +167,9 @@ def test_an_export_on_a_disk_that_fills(small_disk, model, tmp_path, form, free_
     with (disk / "full").open("wb") as file:
         os.posix_fallocate(file.fileno(), 0, state.f_bavail * state.f_frsize - free_kib * 1024)
     arguments = ("export", model, "--to", form, "-o", disk / "firmware", "--quiet")
-    refused(run(tmp_path, *arguments), "No space left on device")
+    refused("No space left on device", *arguments)
     assert [path.name for path in (disk / "firmware").iterdir()] == ["mine.txt"]
     assert not list(disk.rglob(".partial-*"))
     (disk / "full").unlink()
-    assert run(tmp_path, *arguments).returncode == 0
+    invoke(*arguments)
     assert (disk / "firmware" / "export.json").is_file()
