@@ -17,7 +17,7 @@ from fogml.tuning.plan import Plan
 from fogml.tuning.references import AUTO, DEFAULT, reference_choices
 from fogml.tuning.space import Choice, Space
 from fogml.tuning.sweep import run_sweep
-from fogml.tuning.winner import train_settings, winner
+from fogml.tuning.winner import complete, winner
 
 UNITS, TRIALS, BIAS_SPREAD = 20, 10, 0.1
 """Units; trials of a sweep; spread of the bias from run to run [deg/h]."""
@@ -48,7 +48,12 @@ def recorded(seed: int, rate: float) -> tuple[Run, FloatArray]:
 
 def error(choice: Choice, runs: list[Run], seed: int) -> float:
     """Rms from the true drift about each fresh run's mean [deg/h], after a fit to the training runs."""
-    model = make_model(choice.model, choice.features or None, 0, choice.parameters or None).fit(runs)
+    made = choice.made
+    model = (
+        made.model
+        if made is not None
+        else make_model(choice.model, choice.features or None, 0, choice.parameters or None).fit(runs)
+    )
     squares = []
     for rate in FRESH:
         run, drift = recorded(seed, rate)
@@ -71,13 +76,12 @@ def unit(seed: int, objective: str) -> dict[str, Any]:
             folder=str(Path(folder)),
             references=references,
         )
-        best = winner(run_sweep(plan).get_trials())
-    settings = train_settings(best)
-    won = Choice(settings["model"], settings.get("features", ""), settings.get("parameters", {}))
-    errors = {"winner": error(won, runs, seed)}
-    for name in (DEFAULT, AUTO):
-        choice = next(choice for key, choice in references.items() if name in key)
-        errors[name] = error(choice, runs, seed)
+        trials = complete(run_sweep(plan).get_trials())
+    best = winner(trials)
+    errors = {name: error(choice, runs, seed) for name, choice in references.items()}
+    told = best.user_attrs
+    won = references.get(told.get("reference"), Choice(told["model"], told["features"], told["parameters"]))
+    errors["winner"] = error(won, runs, seed)
     return {"unit": seed, "winner": f"{won.model} of {won.features}", "error": errors}
 
 
@@ -103,7 +107,7 @@ def section(quick: bool) -> Section:
         f"## Sweeps\n\n**Synthetic**: {len(found)} units, three training runs of a cycle at "
         f"{', '.join(f'{rate:g}' for rate in TRAINED)} degC/min, every {SAMPLE_S:g} s, white and flicker "
         f"noise, biases that move by {BIAS_SPREAD:g} deg/h from run to run; {TRIALS} trials, the default "
-        "polynomial and auto's choice the first of them, by bias stability and bytes. The errors are rms "
+        "polynomial and what auto makes the first of them, by bias stability and bytes. The errors are rms "
         "from the true drift about the mean of fresh runs at "
         f"{' and '.join(f'{rate:g}' for rate in FRESH)} degC/min.\n\n"
     )

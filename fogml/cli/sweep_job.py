@@ -177,9 +177,9 @@ def _judge(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.sweep_page import worse_than
+    from fogml.report.sweep_page import standing
 
-    for text in worse_than(values["winner"]):
+    for text in standing(values["winner"]):
         terminal.say(text)
     counts = values["counts"]
     terminal.say(

@@ -53,12 +53,21 @@ class Weighed:
         Weight of each member, by name.
     left, mean_left
         Rms of it, and of the training mean, on the runs or blocks left out [deg/h], parts counting alike.
+    members
+        What is weighed, in the weights' order.
+    table
+        The averages that it is made of, of the atoms of `union`.
+    union
+        Features that hold all atoms of the members.
     """
 
     model: DriftModel
     weights: dict[str, float]
     left: float
     mean_left: float
+    members: tuple[Member, ...]
+    table: TrainingTable
+    union: Features
 
     def told(self) -> str:
         """A note for the card."""
@@ -109,10 +118,10 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     if not left**2 < (1.0 - LEAST_WEIGHT) * mean_left**2:
         weights, left = 0.0 * weights, mean_left
     if simple is not None and choice.network and simple.features_ is not None:
-        network = left_out([FittedMember(simple.features_, regressor)], union, table, parts)
-        alone = _rms(network, np.ones(1))
+        own_member = FittedMember(simple.features_, regressor)
+        alone = _rms(left_out([own_member], union, table, parts), np.ones(1))
         if alone < CLEARLY * left:
-            return Weighed(simple, {choice.name: 1.0}, alone, mean_left)
+            return Weighed(simple, {choice.name: 1.0}, alone, mean_left, (own_member,), table, union)
     intervals = intervals_of(lefts, weights, table, both_ways)
     chosen = [
         (member.features, _regressor(member)) for member, weight in zip(members.values(), weights) if weight
@@ -127,7 +136,8 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     model.features_, model.regressor_, model.intervals_ = own, linear, intervals
     notes = [note for part in rows for note in part.notes]
     model.card_ = training_card(runs, hashes=hashes, rows=len(table), box=own.box, notes=notes)
-    return Weighed(model, dict(zip(members, weights.tolist(), strict=True)), left, mean_left)
+    shares = dict(zip(members, weights.tolist(), strict=True))
+    return Weighed(model, shares, left, mean_left, tuple(members.values()), table, union)
 
 
 def _of(table: TrainingTable, union: Features, own: Features) -> TrainingTable:

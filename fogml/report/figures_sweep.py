@@ -164,7 +164,7 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
         alt=f"Held-out rms against size and operations; {plural(len(front), 'trial')} in the Pareto set.",
         caption=(
             f"Pareto set: trials that no other is at least as good as in every objective ({named}). The "
-            "winner is the smallest that the best does not beat beyond noise."
+            "winner is the default, or the best of those that beat it beyond noise."
         ),
     )
 

@@ -11,6 +11,7 @@ from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table, metrics_table
 from fogml.report.verdict import worst_run
 from fogml.report.words import MISSING, averages, number, plural
+from fogml.tuning.references import DEFAULT
 from fogml.validation.results import Judgement
 
 _MOST_ROWS = 30
@@ -47,12 +48,14 @@ def sweep_page(study: Mapping[str, Any], judgement: Judgement | None = None) -> 
     )
 
 
-def worse_than(winner: Mapping[str, Any]) -> list[str]:
-    """Sentences that say what the winner is worse than on the parts held out; none where it is not."""
-    return [
+def standing(winner: Mapping[str, Any]) -> list[str]:
+    """Sentences that say first that nothing beats the default, and what the winner is worse than on the
+    parts held out."""
+    stays = "No trial beats the default polynomial beyond noise on the parts held out: it stays the winner."
+    return [stays] * (winner.get("reference") == DEFAULT) + [
         f"The winner is worse than {against['reference']} on the parts held out: "
         f"{number(winner['bias_stability'])} against {number(against['bias_stability'])} deg/h about each "
-        f"run's mean, {'beyond noise' if against['beyond_noise'] else 'within noise, and smaller'}."
+        f"run's mean, {'beyond' if against['beyond_noise'] else 'within'} noise."
         for against in winner.get("against", [])
         if against["winner_worse"]
     ]
@@ -72,7 +75,7 @@ def _verdict(study: Mapping[str, Any], judgement: Judgement | None) -> list[str]
     counts, best = study["counts"], study["winner"]
     finished = counts["complete"] + counts["pruned"]
     sentences = [
-        *worse_than(best),
+        *standing(best),
         f"Of {plural(finished, 'trial')}, {_name(best)} wins: {number(best['rms'])} deg/h rms on held-out "
         f"{study['folds']}, with {plural(best['bytes'], 'byte')} of weights.",
     ]

@@ -19,6 +19,7 @@ from fogml.models.regressors import regressor_to_saved
 from fogml.models.table import RunRows, TrainingTable, usable_rows
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.tuning.auto_folds import held_out_predictions
 from fogml.tuning.operations import operations_per_sample
 from fogml.tuning.space import Choice, Space
 
@@ -94,7 +95,10 @@ class HeldOut:
             raise InputError(f"{count} folds: one of {', '.join(map(str, FOLD_COUNTS))} was expected")
         self.runs = checked_runs(runs)
         self.seed = seed
-        texts = [*space.extreme_texts(), *(choice.features for choice in references if choice.features)]
+        texts = [
+            *space.extreme_texts(),
+            *(one.made.union.text if one.made else one.features for one in references if one.features),
+        ]
         self._used = [_rows_of_all(run, texts) for run in self.runs]
         by_run = folds == "runs" or (folds == "auto" and len(self.runs) > 1)
         self.folds: list[Fold] = (
@@ -141,6 +145,14 @@ class HeldOut:
         if not choice.features:
             for fitted, held in self.folds:
                 yield np.full(len(held), self._table.y[fitted].mean()), 8, 1
+            return
+        if choice.made is not None:
+            made, atoms = choice.made, self._atoms(choice.made.union.text)
+            assert isinstance(made.model, FeatureModel)
+            regressor = made.model.regressor_
+            cost = weight_bytes(regressor), operations_per_sample(made.model.features_, regressor)
+            for predicted in held_out_predictions(made, self._table, atoms, self.folds):
+                yield predicted, *cost
             return
         features = parse_features(choice.features)
         atoms = self._atoms(features.text)

@@ -16,6 +16,8 @@ from fogml.errors import InputError
 if TYPE_CHECKING:
     import optuna
 
+    from fogml.models.weighing import Weighed
+
 BUILDER, WINDOW = "{builder}", "{window}"
 """Where a feature text takes the builder and the window [s] that a trial chose."""
 Scalar = bool | int | float | str
@@ -51,11 +53,15 @@ Values = Range | list[Scalar] | Scalar
 
 @dataclass(frozen=True)
 class Choice:
-    """What a trial chose: a model's name, its feature text and its parameters; features may be empty."""
+    """What a trial chose: a model's name, its feature text and its parameters; features may be empty.
+
+    ``made`` is what `auto` made of the training runs, where that is the model.
+    """
 
     model: str
     features: str
     parameters: dict[str, Any]
+    made: Weighed | None = None
 
 
 class Space(BaseModel):

@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.tuning.references import DEFAULT
 from fogml.tuning.sampling import place_of
 from fogml.tuning.worker import score_of
 
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
-EQUAL = 1.0
-"""Standard errors of the difference within which a smaller trial counts as equal to the best."""
 _TREES = 200
 _LEAST_TRIALS = 10
 
@@ -55,13 +54,13 @@ def figure(trial: FrozenTrial, name: str) -> float:
     return float(trial.user_attrs[name])
 
 
-def winner(trials: Sequence[FrozenTrial], standard_errors: float = EQUAL) -> FrozenTrial:
-    """The smallest trial that does as well as the best on the parts held out.
+def winner(trials: Sequence[FrozenTrial]) -> FrozenTrial:
+    """The default, unless trials beat it on the parts held out beyond noise: then the best of these.
 
     Trials are compared block by block of the same rows, the mean of each run held out apart: the bias
-    moves from run to run by more than models differ by. As well as the best does what that one beats by no
-    more than a standard error of the difference (the one-standard-error rule: L. Breiman et al.,
-    Classification and Regression Trees (1984) 3.4.3).
+    moves from run to run by more than models differ by. Of several that the folds can't tell from the
+    default the best is best by luck, and the smallest leaves out what fresh runs need. Without a default
+    among the trials it is the best of all.
 
     Raises
     ------
@@ -73,10 +72,13 @@ def winner(trials: Sequence[FrozenTrial], standard_errors: float = EQUAL) -> Fro
         reasons = [t.user_attrs["reason"] for t in trials if "reason" in t.user_attrs]
         why = f": {reasons[0]}" if reasons else ""
         raise InputError(f"no trial could be fitted{why}")
-    best = min(found, key=lambda t: (figure(t, "bias_stability"), place_of(t)))
-    score = score_of(best)
-    as_good = [t for t in found if t is best or not score.beats(score_of(t), standard_errors)]
-    return min(as_good, key=lambda t: (t.user_attrs["bytes"], figure(t, "bias_stability"), place_of(t)))
+    default = next((t for t in found if t.user_attrs.get("reference") == DEFAULT), None)
+    if default is None:
+        better = found
+    else:
+        score = score_of(default)
+        better = [t for t in found if score_of(t).beats(score)] or [default]
+    return min(better, key=lambda t: (figure(t, "bias_stability"), t.user_attrs["bytes"], place_of(t)))
 
 
 def against_references(trials: Sequence[FrozenTrial], best: FrozenTrial) -> list[dict[str, Any]]:
@@ -108,7 +110,7 @@ def train_settings(trial: FrozenTrial) -> dict[str, Any]:
     """Model, features and parameters of a trial, as a configuration of ``fogml train`` takes them."""
     attributes = trial.user_attrs
     values: dict[str, Any] = {"model": attributes["model"]}
-    if attributes["features"]:
+    if attributes["features"] and attributes["model"] != "auto":
         values["features"] = attributes["features"]
     if attributes["parameters"]:
         values["parameters"] = dict(attributes["parameters"])
