@@ -57,6 +57,8 @@ def _specs() -> dict[str, ColumnSpec]:
         ColumnSpec("T_chamber", temperature, _TEMPERATURE, "chamber air"),
         ColumnSpec("T_case", temperature, _TEMPERATURE, "case"),
         ColumnSpec("T_electronics", temperature, _TEMPERATURE, "electronics"),
+        ColumnSpec("T_top", temperature, _TEMPERATURE, "top of the fibre coil, along its axis"),
+        ColumnSpec("T_bottom", temperature, _TEMPERATURE, "bottom of the fibre coil, along its axis"),
         ColumnSpec("rate", "deg/s", _RATE, "table rate about the input axis, Earth rate not included"),
         ColumnSpec("angle", "deg", _ANGLE, "table angle"),
         ColumnSpec("power", "W", {"W": (1.0, 0.0)}, "electrical power"),

@@ -37,7 +37,10 @@ PROGRAMME = {
     ],
 }
 """Power, turns back to where they began, a dose, a ramp, the fan, a power cycle."""
-NODES = ("T_in", "T_out", "T_case", "T_electronics", "T_chamber", "rate", "angle", "fan")
+NODES = (
+    *("T_in", "T_out", "T_case", "T_electronics", "T_chamber", "T_top", "T_bottom"),
+    *("rate", "angle", "fan"),
+)
 DRIVES = ("power", "supply", "humidity", "vibration", "compressor", "heater", "dose")
 COLUMNS = {"all": (*NODES, *DRIVES, "B_x", "B_y", "B_z"), "no field": (*NODES, *DRIVES)}
 ACTING = {
@@ -50,10 +53,9 @@ DAMAGE = ("units_and_gaps", "fringe_jump", "logger_skew", "averaging")
 
 
 def everything() -> Twin:
-    # Nodes that no column holds, as axial_gradient's, start at rest in a replay: it has a test of its own.
     twin = replace(load_twin("tactical"), settings={}, sensors=Twin().sensors)
     for id in ACTING:
-        if id not in (*DAMAGE, "axial_gradient"):
+        if id not in DAMAGE:
             twin = twin.with_effect(id)
     return twin.with_noise(N=0.0, B=0.0, K=0.0, Q=0.0, R=0.0)
 
@@ -79,7 +81,7 @@ def hidden_by_nodes() -> set[str]:
 def resting(minutes: int = 200, **changes: object) -> Inputs:
     """A unit that is warm, at 25 degC throughout, at rest, with nothing acting on it, at the equator."""
     count = 60 * minutes
-    still = {name: np.full(count, 25.0) for name in (*NODES[:5], "T", "T_leads", "T_hub", "T_plate")}
+    still = {name: np.full(count, 25.0) for name in (*NODES[:7], "T", "T_leads", "T_hub", "T_plate")}
     given = Inputs(
         np.arange(float(count)), still, np.zeros(count), facts=Facts(latitude=0.0, input_axis="east")
     )

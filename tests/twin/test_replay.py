@@ -18,7 +18,7 @@ from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effect, effects
 from fogml.twin.replay import inputs_of_run, replay
 from fogml.twin.set_up import SensorErrors, Sensors
-from fogml.twin.simulate import simulate
+from fogml.twin.simulate import DEFAULT_COLUMNS, simulate
 from fogml.twin.truth import truth_from_columns
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
@@ -36,20 +36,16 @@ PROGRAMME = [
     "soak at 40 degC for 30 min",
 ]
 DAMAGE = ("fringe_jump", "units_and_gaps")
+COLUMNS = (*DEFAULT_COLUMNS, "T_top", "T_bottom")
 CONSTANTS = NominalConstants(300, 20, 0.2, 2, 0.02, 2e-4, 0.3, 1.0)
 NOISE = NoiseConstants(N=0.01, B=0.05, K=0.01)
 
 
 def everything(stop: type | tuple[type, ...] = (), seeded: bool = True, **more) -> Twin:
-    """All effects on but damage, those of some kinds, and where not wanted those that a simulation draws.
-
-    Without sensors' errors columns replay to rounding, but for nodes that none holds: they start at rest.
-    """
+    """All effects on but damage, those of some kinds, and where not wanted those that a simulation draws."""
     twin = Twin("all", nominal=CONSTANTS, noise=NOISE, **more)
     for id, declared in effects().items():
         wanted = not isinstance(declared, stop) and (seeded or not declared.seeded)
-        if id == "axial_gradient" and stop is SensorEffect:
-            continue
         if id not in DAMAGE and not declared.conflicts and wanted:
             twin = twin.with_effect(id)
     return twin
@@ -68,7 +64,7 @@ def test_truth_comes_back_to_rounding(monkeypatch):
 
 def test_recorded_columns_without_sensor_errors_are_as_good():
     twin = everything(SensorEffect, seeded=False)
-    made = simulate(PROGRAMME, twin, truth=True)
+    made = simulate(PROGRAMME, twin, truth=True, columns=COLUMNS)
     found = replay(twin, made.run)
     assert np.abs(found - made.truth.noise_free).max() <= 1e-9
 
@@ -110,7 +106,7 @@ def test_missing_nodes_come_from_the_plant():
 
 def test_only_one_effect():
     twin = everything(SensorEffect, seeded=False)
-    made = simulate(PROGRAMME, twin, sample_s=5.0, truth=True)
+    made = simulate(PROGRAMME, twin, sample_s=5.0, truth=True, columns=COLUMNS)
     whole = replay(twin, made.run)
     for id in ("thermal_hysteresis", "coil_expansion", "deadband", "logger_skew"):
         wanted = whole - replay(twin.without_effect(id), made.run)
