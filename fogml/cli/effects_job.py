@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.outputs import whole_folder
+from fogml.twin.effect import Effect
 from fogml.twin.registry import effect, effects
 
 _WIDTH = 100
 _TERMINAL_PROGRAMMES = ("multi-point-cycle", "joint-staircase", "separating")
-_CATALOGUE_PROGRAMME = "separating"
 
 
 class EffectsSettings(Settings):
@@ -36,15 +36,17 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
     found = effects()
     if out is not None:
         from fogml.report.catalogue_page import catalogue_page
-        from fogml.twin.card import card_values, pictures, rate_curves
+        from fogml.twin.card import card_values
+        from fogml.twin.pictures import allan_curve, pictures, rate_curves
 
         cards = []
         with whole_folder(out, shared=True) as folder:
             with terminal.work("drawing", total=len(found)) as work:
                 for declared in found.values():
                     work.doing(declared.id)
-                    (picture,) = pictures(declared, (_CATALOGUE_PROGRAMME,))
-                    cards.append((card_values(declared), picture, rate_curves(declared)))
+                    (picture,) = pictures(declared)
+                    drawn = picture, rate_curves(declared), allan_curve(declared)
+                    cards.append((card_values(declared), *drawn))
                     work.advance()
             (folder / "catalogue.html").write_text(catalogue_page(cards), encoding="utf-8")
     terminal.say(f"{len(found)} effects: letter code, id, stage, title\n")
@@ -74,7 +76,8 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
 
 
 def _card(id: str, out: str | None, terminal: Terminal) -> None:
-    from fogml.twin.card import STANDARD_PROGRAMMES, card_values, pictures, rate_curves
+    from fogml.twin.card import card_values
+    from fogml.twin.pictures import STANDARD_PROGRAMMES, allan_curve, pictures, rate_curves
 
     declared = effect(id)
     values = card_values(declared)
@@ -82,8 +85,8 @@ def _card(id: str, out: str | None, terminal: Terminal) -> None:
         with whole_folder(out, shared=True) as folder, terminal.work("drawing"):
             from fogml.report.effect_card import effect_page
 
-            drawn = pictures(declared, STANDARD_PROGRAMMES)
-            page = effect_page(values, drawn, rate_curves(declared))
+            drawn = pictures(declared, _best_first(declared, STANDARD_PROGRAMMES))
+            page = effect_page(values, drawn, rate_curves(declared), allan_curve(declared))
             (folder / f"{id}.html").write_text(page, encoding="utf-8")
     if not (terminal.quiet or terminal.as_json):
         _print_card(values, terminal)
@@ -119,14 +122,21 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
 
 def _print_pictures(id: str, terminal: Terminal) -> None:
     from fogml.report.braille import braille
-    from fogml.twin.card import pictures
+    from fogml.twin.pictures import pictures
 
-    for picture in pictures(effect(id), _TERMINAL_PROGRAMMES):
+    declared = effect(id)
+    for picture in pictures(declared, _best_first(declared, _TERMINAL_PROGRAMMES)):
         low, high = float(picture.values.min()), float(picture.values.max())
-        span = f"{number(low)} to {number(high)} deg/h, {picture.hours[-1]:.3g} h"
+        what = f" in {next(iter(picture.places))}" if picture.places else ""
+        span = f"{number(low)} to {number(high)} {picture.unit}{what}, {picture.hours[-1]:.3g} h"
         terminal.say(f"\n{picture.programme}: {span}")
         if low != high:
             terminal.say("\n".join(braille(picture.values)))
+
+
+def _best_first(declared: Effect, names: Sequence[str]) -> list[str]:
+    """Names of scenes, first that which shows the effect best."""
+    return [declared.shown_on, *(name for name in names if name != declared.shown_on)]
 
 
 def _filled(text: str, indent: str = "") -> str:

@@ -8,10 +8,10 @@ from typing import Any
 
 from markupsafe import Markup
 
-from fogml.report.effect_card import about, panel, quantities_table, rate_figure
+from fogml.report.effect_card import about, allan_figure, panel, quantities_table, rate_figure
 from fogml.report.page import render
 from fogml.report.tables import Table
-from fogml.twin.card import RATE_DEGC, Picture, RateCurve
+from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
 
 STAGE_WORDS = {
     "thermal": "Thermal plant",
@@ -26,7 +26,10 @@ STAGE_WORDS = {
 }
 
 OVER_RATE = ("loop", "readout")
-"""Stages whose effects are shown over the rate too, as every effect is that the programme does not show."""
+"""Stages whose effects are shown over the rate too, as those are whose scale factor goes with it."""
+Drawn = tuple[Mapping[str, Any], Picture, Sequence[RateCurve], AllanCurve | None]
+"""Card of schema ``fogml.effect/1`` of an effect, its picture, its curves over the rate, and a noise's Allan
+deviation."""
 
 
 @dataclass(frozen=True)
@@ -39,26 +42,33 @@ class Entry:
     programme: str
     words: str
     curves: list[Markup]
+    allan: Markup
     about: list[tuple[str, str]]
 
 
-def catalogue_page(cards: Sequence[tuple[Mapping[str, Any], Picture, Sequence[RateCurve]]]) -> str:
+def catalogue_page(cards: Sequence[Drawn]) -> str:
     """The self-contained HTML page of all effects.
 
     Parameters
     ----------
     cards
-        Card of schema ``fogml.effect/1``, its signature on one programme and its curves over the rate, of
-        each effect in the order of the catalogue.
+        What is shown of each effect, in the order of the catalogue.
     """
     stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
-    for card, picture, curves in cards:
+    for card, picture, curves, allan in cards:
         drawn = panel(card, picture)
-        figure = drawn.signature if drawn.shows else Markup("")
-        over_rate = card["stage"] in OVER_RATE or not drawn.shows
-        shapes = [rate_figure(curve) for curve in curves if over_rate]
+        over_rate = card["stage"] in OVER_RATE or (
+            card["stage"] == "scale_factor" and "rate" in card["needs"]
+        )
         entry = Entry(
-            card, quantities_table(card), figure, picture.programme, drawn.words, shapes, about(card)
+            card=card,
+            quantities=quantities_table(card),
+            figure=drawn.signature if drawn.shows else Markup(""),
+            programme=picture.programme,
+            words=drawn.words,
+            curves=[rate_figure(curve) for curve in curves if over_rate],
+            allan=allan_figure(allan),
+            about=about(card),
         )
         stages[card["stage"]].append(entry)
     shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
 from markupsafe import Markup
 
 from fogml.report import style
@@ -14,9 +15,16 @@ from fogml.report.reduce import min_max_indices
 from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table
 from fogml.report.words import number
-from fogml.twin.card import RATE_DEGC, Picture, RateCurve
+from fogml.runs.run import FloatArray
+from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
 
 _POINTS = 600
+_SHORT_H = 0.15
+"""What is shorter is shown over seconds."""
+_NEARLY_CONSTANT = 0.05
+"""Share of its size by which an effect changes at most to be shown as a constant, from zero."""
+_DECADES = 1e-3
+"""Of the greatest Allan deviation: what is below, as at the whole periods of a line, is off the picture."""
 
 
 @dataclass(frozen=True)
@@ -31,7 +39,10 @@ class Panel:
 
 
 def effect_page(
-    card: Mapping[str, Any], pictures: Sequence[Picture], curves: Sequence[RateCurve] = ()
+    card: Mapping[str, Any],
+    pictures: Sequence[Picture],
+    curves: Sequence[RateCurve] = (),
+    allan: AllanCurve | None = None,
 ) -> str:
     """The self-contained HTML page of an effect.
 
@@ -43,6 +54,8 @@ def effect_page(
         Its signature on programmes.
     curves
         What it changes over the rate, if that is its place.
+    allan
+        Its Allan deviation, if it is a noise.
     """
     return render(
         "effect.html",
@@ -52,6 +65,7 @@ def effect_page(
         panels=[panel(card, picture) for picture in pictures],
         about=about(card),
         curves=[rate_figure(curve) for curve in curves],
+        allan=allan_figure(allan),
         warm=f"{RATE_DEGC:g} degC",
     )
 
@@ -64,6 +78,22 @@ def rate_figure(curve: RateCurve) -> Markup:
         "effect [deg/h]",
         f"Change of the output over rates of up to {curve.rate[-1]:g} {curve.unit}",
         height=170,
+    )
+
+
+def allan_figure(curve: AllanCurve | None) -> Markup:
+    """Allan deviation of a noise alone; nothing of another effect."""
+    if curve is None:
+        return Markup("")
+    # A line alone has zeros.
+    least = _DECADES * float(curve.adev.max()) if curve.has_dips else 0.0
+    return line_figure(
+        [Curve(curve.taus_s, np.maximum(curve.adev, least), style.MODEL)],
+        "averaging time [s]",
+        "Allan deviation [deg/h]",
+        f"Allan deviation at averaging times from {curve.taus_s[0]:g} to {curve.taus_s[-1]:g} s",
+        height=190,
+        log="xy",
     )
 
 
@@ -106,29 +136,44 @@ def panel(card: Mapping[str, Any], picture: Picture) -> Panel:
         _figure(picture, chamber=True, height=120),
         _figure(picture, chamber=False, height=170),
         words(card, picture),
-        bool(picture.values.any()),
+        picture.span != (0.0, 0.0),
     )
 
 
 def words(card: Mapping[str, Any], picture: Picture) -> str:
     """What a picture shows, in a sentence."""
-    low, high = float(picture.values.min()), float(picture.values.max())
+    low, high = picture.span
     if low == high == 0.0:
         return "Nothing of it shows in the output here."
     unit = card["amplitude"]["unit"]
     amplitude = number(card["amplitude"]["usual"]) + ("" if unit == "1" else f" {unit}")
-    return f"From {number(low)} to {number(high)} deg/h at an amplitude of {amplitude}."
+    what = " in the temperatures" if picture.places else ""
+    return f"From {number(low)} to {number(high)} {picture.unit}{what} at an amplitude of {amplitude}."
 
 
 def _figure(picture: Picture, chamber: bool, height: int) -> Markup:
-    values = picture.chamber if chamber else picture.values
-    kept = min_max_indices(values, _POINTS)
-    colour = style.TRAINING if chamber else style.MODEL
-    title = "chamber [degC]" if chamber else "effect [deg/h]"
     alt = f"{'Chamber air' if chamber else 'Signature'} over time on {picture.programme}"
-    return line_figure(
-        [Curve(picture.hours[kept], values[kept], colour)], "time [h]", title, alt, height=height
-    )
+    hours = picture.hours
+    across, title = (hours, "time [h]") if hours[-1] - hours[0] > _SHORT_H else (3600.0 * hours, "time [s]")
+    if chamber:
+        curves = [_reduced(across, picture.chamber, style.TRAINING)]
+        return line_figure(curves, title, "chamber [degC]", alt, height=height)
+    curves = []
+    low, high = picture.span
+    if low * high <= 0.0 or high - low < _NEARLY_CONSTANT * max(abs(low), abs(high)):
+        # What is there without the effect.
+        curves.append(Curve(across[[0, -1]], np.zeros(2), style.TRAINING))
+    if picture.places:
+        for colour, (name, change) in zip(style.SERIES, picture.places.items()):
+            curves.append(_reduced(across, change, colour, name))
+        return line_figure(curves, title, "change [degC]", alt, height=height + 30)
+    curves.append(_reduced(across, picture.values, style.MODEL))
+    return line_figure(curves, title, "effect [deg/h]", alt, height=height)
+
+
+def _reduced(across: FloatArray, values: FloatArray, colour: str, label: str = "") -> Curve:
+    kept = min_max_indices(values, _POINTS)
+    return Curve(across[kept], values[kept], colour, label=label)
 
 
 def _range(quantity: Mapping[str, Any], grade: str) -> str:

@@ -13,8 +13,8 @@ from fogml.escaping import markup
 
 FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
-_DIGIT = 6.2
-"""Width of a digit of a label."""
+_DIGIT, _TITLE = 6.2, 25.0
+"""Widths of a digit of a label, and of the title of the upright axis with what is free about it."""
 _LEGEND, _LEGEND_COLUMNS = 15.0, 3
 
 
@@ -73,10 +73,16 @@ def line_figure(
     scale_x, scale_y = (np.log10 if axis in log else np.asarray for axis in "xy")
     x_span = _span([scale_x(c.x) for c in curves], 0.0)
     y_span = _span([scale_y(c.y) for c in curves], 0.06)
+    if "y" in log:
+        # Less than a decade might have no tick, and a flat curve would not look flat.
+        room = max(0.0, 0.5 * (1.0 - (y_span[1] - y_span[0])))
+        y_span = y_span[0] - room, y_span[1] + room
+    y_ticks = _ticks_of(y_span, "y" in log, about=4)
+    left = max(_LEFT, _TITLE + _DIGIT * max((len(_tick(value)) for value in y_ticks), default=0))
     top = _TOP + _LEGEND * (1 + (sum(bool(c.label) for c in curves) - 1) // _LEGEND_COLUMNS)
 
     def across(x: FloatArray | float) -> FloatArray:
-        return _LEFT + (scale_x(x) - x_span[0]) / (x_span[1] - x_span[0]) * (width - _LEFT - _RIGHT)
+        return left + (scale_x(x) - x_span[0]) / (x_span[1] - x_span[0]) * (width - left - _RIGHT)
 
     def up(y: FloatArray | float) -> FloatArray:
         return (
@@ -92,10 +98,10 @@ def line_figure(
         anchor = "end" if float(x) + 0.5 * _DIGIT * len(label) > width else "middle"
         at = f'x="{width if anchor == "end" else x}" y="{height - _BOTTOM + 13}" text-anchor="{anchor}"'
         parts.append(f"<text {at}>{label}</text>")
-    for value in _ticks_of(y_span, "y" in log, about=4):
+    for value in y_ticks:
         y = float(up(value))
-        parts.append(f'<path d="M{_LEFT},{y:.1f}H{width - _RIGHT}" stroke="#E4E7EB"/>')
-        parts.append(f'<text x="{_LEFT - 6}" y="{y + 3.5:.1f}" text-anchor="end">{_tick(value)}</text>')
+        parts.append(f'<path d="M{left:.1f},{y:.1f}H{width - _RIGHT}" stroke="#E4E7EB"/>')
+        parts.append(f'<text x="{left - 6:.1f}" y="{y + 3.5:.1f}" text-anchor="end">{_tick(value)}</text>')
     for curve in curves:
         dash = f' stroke-dasharray="{curve.dash}"' if curve.dash else ""
         outline = _outline(across(curve.x), up(curve.y))
@@ -109,15 +115,15 @@ def line_figure(
                 for x, y in zip(across(curve.x).tolist(), up(curve.y).tolist(), strict=True)
                 if x == x and y == y
             ]
-    frame_width, frame_height = width - _LEFT - _RIGHT, height - top - _BOTTOM
+    frame_width, frame_height = width - left - _RIGHT, height - top - _BOTTOM
     middle = top + frame_height / 2
     return Markup(
         f'<svg role="img" aria-label="{markup(alt)}" viewBox="0 0 {width} {height}" '
         'xmlns="http://www.w3.org/2000/svg" font-size="10.5" fill="#1F2328">'
         + "".join(parts)
-        + f'<rect x="{_LEFT}" y="{top}" width="{frame_width}" height="{frame_height}" '
+        + f'<rect x="{left:.1f}" y="{top}" width="{frame_width:.1f}" height="{frame_height}" '
         'fill="none" stroke="#9AA1AA"/>'
-        + f'<text x="{_LEFT + frame_width / 2}" y="{height - 5}" text-anchor="middle">'
+        + f'<text x="{left + frame_width / 2:.1f}" y="{height - 5}" text-anchor="middle">'
         + f"{markup(x_title)}</text>"
         + f'<text transform="translate(12,{middle}) rotate(-90)" text-anchor="middle">'
         + f"{markup(y_title)}</text>"

@@ -57,6 +57,8 @@ class Effect(ABC):
         Where equation and ranges come from.
     shows
         Where in a recording it shows.
+    shown_on
+        What its picture is drawn on: a name of `fogml.twin.scenes.scene_names`.
     confused_with
         Id of a look-alike to what separates the two.
     candidate
@@ -90,6 +92,7 @@ class Effect(ABC):
     conflicts: ClassVar[tuple[str, ...]] = ()
     sources: ClassVar[tuple[str, ...]] = ()
     shows: ClassVar[str] = ""
+    shown_on: ClassVar[str] = "separating"
     confused_with: ClassVar[Mapping[str, str]] = {}
     candidate: ClassVar[bool] = True
     told_by: ClassVar[tuple[tuple[str, ...], ...]] = ()

@@ -25,6 +25,7 @@ class AngleRandomWalk(WhiteNoiseEffect):
     conflicts = ("arw_physics",)
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at middle times, with slope -1/2"
+    shown_on = "rest for an hour"
     confused_with = {
         "quantisation": "the slope of the Allan deviation: -1/2 here, -1 there",
         "gauss_markov": "times beyond its correlation: only then are the two alike",

@@ -36,6 +36,7 @@ class Averaging(LoggerEffect):
     needs = ("output",)
     sources = ("First-order expansion of a moving mean",)
     shows = "edges of the table rate become ramps; white noise falls below its slope at short times"
+    shown_on = "turns of half a minute"
     confused_with = {
         "logger_skew": "the shape of an edge: averaging makes a ramp of it, a skew shifts it",
         "loop_gain": "the shape of an edge: straight here, exponential there",

@@ -27,6 +27,7 @@ class BiasInstability(NoiseEffect):
     amplitude = Quantity("amplitude", "deg/h", (0.05, 2.0), (5e-4, 1e-2), "B", (0.0, 1e6))
     sources = ("IEEE Std 952-1997",)
     shows = "the flat part of the Allan deviation"
+    shown_on = "rest for an hour"
     confused_with = {
         "gauss_markov": "two decades of averaging time: that one has a hump",
         "rate_random_walk": "longer times: that one rises",

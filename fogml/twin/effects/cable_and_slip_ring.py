@@ -32,6 +32,7 @@ class CableAndSlipRing(BiasEffect):
     needs = ("rate",)
     sources = ("Engineering practice of rate tables",)
     shows = "a shift while the table moves, the same for both directions and nearly for all rates"
+    shown_on = "turns of half a minute"
     confused_with = {
         "sf_asymmetry": "two rates: asymmetry grows with the rate",
         "vibration_rectification": "a vibration sensor on the table",

@@ -16,8 +16,8 @@ class CoilExpansion(ScaleFactorEffect):
         s = (alpha_L + alpha_D) (T - 25)
 
     alpha_D is 0.55 ppm/degC for free silica and 5 to 25 on a former or in adhesive, alpha_L 0.5 to 5; a
-    navigation gyro has a former of low expansion, or none. It is one with the nominal gyro's own slope of
-    the scale factor.
+    navigation gyro has a former of low expansion, which fibre and diameter follow. It is one with the
+    nominal gyro's own slope of the scale factor.
 
     Source: Lefevre (literature); ranges partly engineering ones.
     """
@@ -26,7 +26,7 @@ class CoilExpansion(ScaleFactorEffect):
     code = "D2"
     place = "coil"
     title = "Expansion of the coil"
-    amplitude = Quantity("amplitude", "ppm/degC", (1.0, 30.0), (0.5, 5.0), "alpha_L + alpha_D", (-1e3, 1e3))
+    amplitude = Quantity("amplitude", "ppm/degC", (1.0, 30.0), (0.1, 3.0), "alpha_L + alpha_D", (-1e3, 1e3))
     needs = ("T",)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "a scale factor in proportion to the coil's temperature"

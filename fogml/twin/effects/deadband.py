@@ -43,6 +43,7 @@ class Deadband(LoopEffect):
         "Interferometric FOG dead band suppression",
     )
     shows = "only where the rate is small: axis to east or west, in north seeking, under slow turns"
+    shown_on = "four-positions"
     confused_with = {
         "electronic_crosstalk": "a sweep of the rate through zero",
         "sf_asymmetry": "a ladder of rates of both signs, from hundredths of a deg/h up",

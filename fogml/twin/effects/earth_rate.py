@@ -16,11 +16,12 @@ class EarthRate(RigEffect):
 
     ::
 
-        w_e = 15.041067 (cos(lat) cos(psi), -cos(lat) sin(psi), sin(lat)) . (north, west, up) of the axis
+        w_e = 15.041067 (cos(lat) a_north + sin(lat) a_up),      a the unit vector along the input axis
 
-    so 15.041067 sin(lat) for an upright axis. Where latitude and attitude are stated it is part of
-    the reference and of every replay; this is what is missing where they are not, or are wrong, and
-    the amplitude is its size. At a fixed attitude it is one with the nominal bias.
+    so 15.041067 sin(lat) for an axis that points up, 15.041067 cos(lat) cos(heading) for a horizontal one.
+    Where latitude and attitude are stated it is part of the reference and of every replay; this is what is
+    missing where they are not, or are wrong, and the amplitude is its size. At a fixed attitude it is one
+    with the nominal bias.
 
     Source: Earth rate, derived.
     """
@@ -39,7 +40,7 @@ class EarthRate(RigEffect):
         signed=True,
     )
     sources = ("IEEE Std 952-1997",)
-    shows = "a constant offset that turns with the attitude"
+    shows = "a constant offset, and another one in another attitude"
     confused_with = {
         "magnetic": "a Helmholtz coil, or a turned shield: both are once a turn of heading",
         "turn_on_bias": "power cycles at the same attitude; then another attitude",

@@ -35,6 +35,7 @@ class GSensitivity(BiasEffect):
     needs = ("facts",)
     sources = ("IEEE Std 952-1997",)
     shows = "a constant that changes with attitude: a tumble test over several positions"
+    shown_on = "a turn about a horizontal axis in an hour"
     confused_with = {
         "earth_rate": "positions with equal Earth projection and another weight",
         "turn_on_bias": "several power cycles",

@@ -29,6 +29,7 @@ class GaussMarkov(NoiseEffect):
     shape = (Quantity("time_constant", "s", (10.0, 1e4), (10.0, 1e4), "T_c", (1e-6, 1e9)),)
     sources = ("IEEE Std 952-1997",)
     shows = "a hump of the Allan deviation at about twice its correlation time"
+    shown_on = "rest for an hour"
     confused_with = {
         "bias_instability": "two decades of averaging time: flicker is flat",
         "sinusoidal": "the spectrum: a line is narrow",

@@ -39,6 +39,7 @@ class InputAxisMisalignment(RigEffect):
     needs = ("angle", "facts")
     sources = ("IEEE Std 952-1997", "Patent on decoupling scale factor and misalignment")
     shows = "once a turn of the table, and a loss of scale factor that goes with the cosine of tilt"
+    shown_on = "a turn of the table and back in two hours"
     confused_with = {
         "table_wobble": "unmount and mount again turned by 180 deg: wobble stays with the table",
         "mount_tilt": "temperature: a tilt of the mount changes with it",

@@ -36,6 +36,7 @@ class LoggerSkew(LoggerEffect):
     needs = ("output",)
     sources = ("First-order expansion of a delay",)
     shows = "edges of the table rate; during ramps in proportion to the slope of the static output"
+    shown_on = "turns of half a minute"
     confused_with = {
         "sensor_lag": "edges of the table rate show the clock; a power step shows the lag",
         "averaging": "the shape of an edge: averaging makes a ramp of it, a skew shifts it",

@@ -39,6 +39,7 @@ class LoopGain(LoopEffect):
     needs = ("T_electronics", "output")
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
     shows = "edges of the table rate; with a leak also a scale factor that follows the light"
+    shown_on = "a step of the rate within a millisecond"
     confused_with = {
         "logger_skew": "both shift edges of the rate; a skew also shifts temperature against the gyro",
         "averaging": "the shape of an edge: exponential here, straight there",

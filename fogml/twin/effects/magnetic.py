@@ -49,6 +49,7 @@ class Magnetic(BiasEffect):
         "IEEE Access 8 (2020) 222242",
     )
     shows = "a sinusoid over the table's angle, once a turn; steps with currents near the unit"
+    shown_on = "a turn of the table and back in two hours"
     confused_with = {
         "earth_rate": "a Helmholtz coil, or a turned shield: both are once a turn of heading",
         "mount_tilt": "a Helmholtz coil, or a turned shield",

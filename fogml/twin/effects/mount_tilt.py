@@ -19,9 +19,10 @@ class MountTilt(RigEffect):
                          + beta cos(direction) (table rate)
         beta = 1e-6 beta_1 (T_case - 25)
 
-    The amplitude is beta_1 [urad/degC]; an upright axis tilts by ``direction`` from north, a horizontal one
-    upwards at 0 and in azimuth at 90 deg. 0.013 deg/h per mrad with the axis upright at 30 deg. The tilt at
-    25 degC belongs to the bias. The last term is the rate of a table whose axis is up, across the axis.
+    The amplitude is beta_1 [urad/degC]; an upright axis tilts to north at ``direction`` 0 and to west at 90
+    deg, a horizontal one upwards at 0 and clockwise in azimuth at 90 deg. 0.013 deg/h per mrad with the axis
+    upright at 30 deg. The tilt at 25 degC belongs to the bias. The last term is the rate of a table whose
+    axis is up, across the axis.
 
     Source: rates of Earth and table in the tilted frame (derived); 0.2 to 5 urad/degC is an engineering
     range.

@@ -38,6 +38,7 @@ class OutputCounts(LoggerEffect):
     conflicts = ("quantisation",)
     sources = ("IEEE Std 952-1997",)
     shows = "whole numbers in the column of the gyro; the Allan deviation at short times, with slope -1"
+    shown_on = "rest for an hour"
     confused_with = {
         "quantisation": "that one is its noise alone",
         "angle_random_walk": "the slope of the Allan deviation: -1 here, -1/2 there",

@@ -29,6 +29,7 @@ class Quantisation(NoiseEffect):
     amplitude = Quantity("amplitude", "urad", (0.05, 5.0), (5e-3, 0.5), "Q", (0.0, 1e6))
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at short times, with slope -1"
+    shown_on = "rest for an hour"
     confused_with = {
         "angle_random_walk": "the slope of the Allan deviation: -1 here, -1/2 there",
         "sensor_quantisation": "it does not go with temperature",

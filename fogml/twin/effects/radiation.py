@@ -41,6 +41,7 @@ class Radiation(ScaleFactorEffect):
     needs = ("dose",)
     sources = ("J. Jin et al., Science China Technological Sciences 53 (2010) 3056",)
     shows = "a scale factor error that grows with the dose and comes back in part over hours"
+    shown_on = "irradiation for two hours, turning at 10 deg/s"
     confused_with = {
         "radiation_noise": "the mean: noise has none",
         "source_wavelength": "temperature: this one follows the dose alone",

@@ -36,6 +36,7 @@ class RadiationNoise(WhiteNoiseEffect):
     needs = ("dose",)
     sources = ("J. Jin et al., Science China Technological Sciences 53 (2010) 3056",)
     shows = "white noise that grows with the dose and comes back in part over hours"
+    shown_on = "irradiation for two hours, turning at 10 deg/s"
     confused_with = {
         "angle_random_walk": "before the dose there is that one alone",
         "arw_physics": "temperature: this one follows the dose alone",

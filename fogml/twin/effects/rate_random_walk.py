@@ -27,6 +27,7 @@ class RateRandomWalk(NoiseEffect):
     amplitude = Quantity("amplitude", "deg/h/sqrt(h)", (0.02, 1.0), (1e-4, 5e-3), "K", (0.0, 1e6))
     sources = ("IEEE Std 952-1997",)
     shows = "the Allan deviation at long times, with slope +1/2"
+    shown_on = "rest for an hour"
     confused_with = {
         "rate_ramp": "several runs: a ramp is the same in each",
         "bias_instability": "longer times: this one rises",

@@ -34,6 +34,7 @@ class RateRange(ReadoutEffect):
     needs = ("output",)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope", "IEEE Std 952-1997")
     shows = "fast turns: the output no longer follows the table, of either sign alike"
+    shown_on = "turns at 400 deg/s"
     confused_with = {
         "sf_nonlinearity": "a ladder of rates: nothing below the range, all of it above",
         "slew_limit": "a slow approach to the rate: a slew limit then shows nothing",

@@ -31,6 +31,7 @@ class SensorLag(SensorEffect):
     needs = ("slopes", "T", "T_in", "T_out")
     sources = ("First-order response of a sensor to its surroundings",)
     shows = "during ramps, in proportion to the slope of the static output over temperature"
+    shown_on = "multi-point-cycle"
     confused_with = {
         "shupe_mohr": "the slope of the output over temperature: a lag changes sign at its extremum",
         "logger_skew": "edges of the table rate show the clock; a power step shows the lag",

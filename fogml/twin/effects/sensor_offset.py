@@ -33,6 +33,7 @@ class SensorOffset(SensorEffect):
     needs = ("slopes", "T", "T_in", "T_out")
     sources = ("Data sheets of temperature sensors",)
     shows = "not in one run, as the calibration takes it up; in a run with another sensor"
+    shown_on = "multi-point-cycle"
     confused_with = {
         "sensor_placement": "a soak: all places agree there, an offset stays",
         "bias_polynomial": "another sensor at the same place",

@@ -34,6 +34,7 @@ class SensorPlacement(SensorEffect):
     needs = ("slopes", "T", "T_in", "T_out", "T_case")
     sources = ("Heat conduction along a sensor's leads",)
     shows = "during ramps and after power-on, in proportion to the slope of the static output"
+    shown_on = "multi-point-cycle"
     confused_with = {
         "sensor_lag": "a power step: it heats the case from inside",
         "hidden_thermal_node": "sensors in more places",

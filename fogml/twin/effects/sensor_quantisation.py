@@ -44,6 +44,7 @@ class SensorQuantisation(SensorEffect):
     needs = ("slopes", "T", "T_in", "T_out")
     sources = ("Data sheet of the DS18B20",)
     shows = "a saw-tooth in slow ramps, one tooth a step of the sensor"
+    shown_on = "the end of a ramp of 10 degC/h"
     confused_with = {
         "polarization_nonreciprocity": "its period is one step of the sensor",
         "chamber_ripple": "its period goes with the ramp rate",

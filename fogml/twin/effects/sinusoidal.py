@@ -32,6 +32,7 @@ class Sinusoidal(NoiseEffect):
     shape = (Quantity("frequency", "Hz", (1e-3, 10.0), (1e-3, 10.0), "of the line", (1e-9, 1e6)),)
     sources = ("IEEE Std 952-1997",)
     shows = "a hump of the Allan deviation at 0.371 of its period, with dips at whole periods"
+    shown_on = "rest for an hour"
     confused_with = {
         "supply_ripple": "another supply: that line goes with it",
         "chamber_ripple": "a sensor in the air",

@@ -31,7 +31,8 @@ class SlewLimit(LoopEffect):
     shape = (Quantity("slew", "deg/s2", (1e3, 1e5), (1e3, 1e5), "of the output", (1e-3, 1e9)),)
     needs = ("output",)
     sources = ("H. C. Lefevre, The Fiber-Optic Gyroscope",)
-    shows = "fast changes of the rate: straight flanks of the output, the same for every size of step"
+    shows = "fast changes of the rate: straight flanks of the output, of one slope for every size of step"
+    shown_on = "a step of the rate within a millisecond"
     confused_with = {
         "loop_gain": "the shape of an edge: straight here, exponential there",
         "averaging": "two steps: the flank's length goes with the step here, and not there",

@@ -34,6 +34,7 @@ class TableRateError(RigEffect):
     needs = ("rate", "angle")
     sources = ("IEEE Std 952-1997",)
     shows = "an error in proportion to the rate, periodic over the table's angle"
+    shown_on = "a turn of the table and back in two hours"
     confused_with = {
         "sf_nonlinearity": "another table, or the time of whole turns",
         "logger_skew": "between the edges of the rate: a skew shows at edges alone",

@@ -37,6 +37,7 @@ class TableWobble(RigEffect):
     needs = ("angle", "facts")
     sources = ("IEEE Std 952-1997",)
     shows = "a sinusoid over the table's angle, once a turn"
+    shown_on = "a turn of the table and back in two hours"
     confused_with = {
         "input_axis_misalignment": "mount the unit turned by 180 deg: wobble stays with the table",
         "magnetic": "a Helmholtz coil, or a turned shield",

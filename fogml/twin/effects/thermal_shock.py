@@ -46,6 +46,7 @@ class ThermalShock(BiasEffect):
     needs = ("T",)
     sources = ("Telemetry and Remote Control 46(3) (2025)",)
     shows = "steps that do not repeat while temperature changes faster than the threshold, then relaxation"
+    shown_on = "thermal shocks of 60 degC/min with a threshold of 3 degC/min"
     confused_with = {
         "shupe_pure": "after the shock: shupe_pure is gone with the gradient",
         "stress_relaxation": "a slow ramp over the same range leaves no slips",

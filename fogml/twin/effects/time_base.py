@@ -13,7 +13,7 @@ _SPAN_DEGC = 50.0
 
 
 class TimeBase(ScaleFactorEffect):
-    """A crystal that runs slow off its turnover temperature, so that counts per second come out high.
+    """A crystal whose frequency goes with temperature: where it runs slow, counts per second come out high.
 
     ::
 

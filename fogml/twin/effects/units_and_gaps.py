@@ -25,10 +25,13 @@ class UnitsAndGaps(LoggerEffect):
     id = "units_and_gaps"
     code = "G12"
     title = "Wrong unit or sign"
-    amplitude = Quantity("amplitude", "1", (0.99, 2.0), (0.99, 2.0), "A", (-1e5, 1e5), signed=True)
+    amplitude = Quantity(
+        "amplitude", "1", (0.99, 2.0), (0.99, 2.0), "A", (-1e5, 1e5), signed=True, default=-2.0
+    )
     needs = ("output",)
     sources = ("Logger files",)
     shows = "everywhere, in proportion to the output"
+    shown_on = "turns of half a minute"
     confused_with = {
         "sf_asymmetry": "its size: scale factors are not off by a half",
         "fringe_jump": "the table at rest: a jump stays there",
