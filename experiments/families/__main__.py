@@ -3,6 +3,9 @@
 ``python -m experiments.families DIR...`` reads the suites in the folders, made by ``fogml blind make`` and
 answered by ``fogml blind run --method diagnosis --method families``, and writes ``results.md`` and
 ``results.json``. Of a suite that one method alone has answered, that method alone stands in the table.
+
+With ``--calibrate`` it prints the trust and the doubt of `fogml.gap.families.priors.Priors` that what is
+listed asks for: the one monotone map between evidence and probability, fitted by likelihood.
 """
 
 from __future__ import annotations
@@ -12,6 +15,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.optimize import minimize
+
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.blind.methods import FAMILIES
@@ -19,6 +25,7 @@ from fogml.blind.score import marks_of
 from fogml.blind.scoring.by_reality import ALL, by_reality
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.truth import read_truth
+from fogml.gap.families.priors import Priors
 from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING
 
@@ -31,6 +38,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("suites", type=Path, nargs="+", help="folders of blind suites")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
+    parser.add_argument("--calibrate", action="store_true", help="print trust and doubt; no page")
     given = parser.parse_args()
     alone: dict[str, list[Mark]] = {method: [] for method in METHODS}
     both: dict[str, list[Mark]] = {method: [] for method in METHODS}
@@ -46,11 +54,35 @@ def main() -> None:
             marks = marks_of(folder, [method], truths, workers=given.workers)[method] if truths else []
             alone[method] += marks
             both[method] += [m for m in marks if m.truth.case in shared]
+    if given.calibrate:
+        trust, doubt, count = fitted_map(alone[FAMILIES], Priors())
+        print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {sorted(seeds)}")
+        return
     values: dict[str, Any] = {"seeds": sorted(seeds)}
     values["shared"] = {m: by_reality(both[m]) for m in METHODS if both[m]}
     values["cases"] = {m: len(alone[m]) for m in METHODS} | {"shared": len(both[FAMILIES])}
     values["families"] = by_reality(alone[FAMILIES])
     write_results(HERE, values, page(values))
+
+
+def fitted_map(marks: Sequence[Mark], priors: Priors) -> tuple[float, float, int]:
+    """Trust and doubt by penalised likelihood of what was listed, and how many names that were.
+
+    The penalty holds the trust near 1 and the doubt near 0, a standard deviation of 1 and of 3, where names
+    are few.
+    """
+    items = [item for m in marks for item in (*m.items, *m.suspected)]
+    right = np.array([item.right for item in items], dtype=np.float64)
+    chances = np.clip([item.probability for item in items], 1e-12, 1.0 - 1e-12)
+    odds = (np.log(chances / (1.0 - chances)) + priors.doubt) / priors.trust
+
+    def loss(given: np.ndarray) -> float:
+        trust, doubt = np.exp(given[0]), given[1]
+        told = trust * odds - doubt
+        return float(np.sum(np.logaddexp(0.0, told) - right * told) + 0.5 * (given[0] ** 2 + doubt**2 / 9.0))
+
+    found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
+    return float(np.exp(found[0])), float(found[1]), len(items)
 
 
 def _answered(folder: BlindFolder, method: str) -> set[str]:

@@ -97,13 +97,16 @@ def _answer(
     verdict = _verdict(named, judged)
     recalibrated = Foretold.of(found, (), ())
     every = Foretold.of(found, judged.best.members, judged.best.members)
-    after = Foretold.of(found, judged.best.members, [c.member for c in named]) if named else recalibrated
+    counted = [m for c in named for m in c.members]
+    # Beside what is unknown, but not beside causes that nobody would add: two that cancel foretell nothing.
+    beside = [m for m in judged.best.members if found.columns.families[m.family].kind != "known"]
+    after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
     structural = [r.gap - recalibrated.on(i) for i, r in enumerate(scene.runs)]
     energies = {m: _energy(found, every, m) for m in judged.best.members}
     shares = _shares(energies)
     cards = {c.member: _card(found, judged, c) for c in judged.causes}
     items = tuple(
-        _found(found, c, p, cards[c.member], shares.get(c.member, 0.0))
+        _found(found, c, p, cards[c.member], sum(shares.get(m, 0.0) for m in c.members))
         for c, p in zip(judged.causes, shifted)
         if p >= LISTED
     )
@@ -183,7 +186,7 @@ def _shares(energies: dict[Member, float]) -> dict[Member, float]:
 
 
 def _card(found: Inference, judged: Judgement, cause: Cause) -> Card:
-    others = [(m.node, m.size) for m in judged.best.members if m is not cause.member]
+    others = [(m.node, m.size) for m in judged.best.members if m not in cause.members]
     shape = found.columns.nodes[cause.member.node].shape
     return card_of(cause.ids[0], found.setting, found.field, found.field.beside(others), shape)
 
@@ -212,18 +215,18 @@ def _found(found: Inference, cause: Cause, probability: float, card: Card, share
 def _by_run(found: Inference, cause: Cause) -> tuple[RunAmplitude, ...]:
     """Scale of the cause that each run asks for, constants free, the rest as found; 1 is what all ask for."""
     held = found.field
-    block = held.block(cause.member.node) * cause.member.size
-    design = held.design([(cause.member.node, cause.member.size)])
+    own = [(m.node, m.size) for m in cause.members]
+    design = held.design(own)
     from fogml.gap.families.linear_gaussian import Posterior
 
     first = held.fixed.shape[1]
     mean = Posterior.of(design, held.base.data).mean[first:]
-    course = block @ mean
+    course = design[:, first:] @ mean
     rows = []
     for r, span in zip(found.setting.scene.runs, found.setting.spans):
-        fixed, own, data = held.fixed[span], course[span], held.base.data[span]
+        fixed, part, data = held.fixed[span], course[span], held.base.data[span]
         basis, _ = np.linalg.qr(fixed + 1e-12)
-        beside = own - basis @ (basis.T @ own)
+        beside = part - basis @ (basis.T @ part)
         size = float(beside @ beside)
         if size > 9.0:
             rows.append(RunAmplitude(r.run.name, float(beside @ data) / size, size**-0.5))
@@ -233,10 +236,10 @@ def _by_run(found: Inference, cause: Cause) -> tuple[RunAmplitude, ...]:
 def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOut]) -> tuple[WhatIf, ...]:
     """Every candidate alone, and beside what is named: what the held-out runs keep."""
     search = found.search
-    beside = [c.member for c in named]
+    beside = [m for c in named for m in c.members]
     rows = []
     for others in [[], beside] if beside else [[]]:
-        ids = tuple(found.columns.families[m.family].id for m in others)
+        ids = tuple(dict.fromkeys(found.columns.families[m.family].id for m in others))
         held = found.field.beside([(m.node, m.size) for m in others])
         for f, member in search.best_members(held).items():
             family = found.columns.families[f]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -58,8 +59,8 @@ def card_of(
     nodes = nodes_of(declared, scene, setting.values)
     runs = scene.runs[: scene.fitted]
     build = signature_of(declared)
-    blocks = [list(build(rows, scene, setting.values)) for rows in runs]
-    count = min(len(blocks[0]), MOST_NODES)
+    blocks = [list(islice(build(rows, scene, setting.values), MOST_NODES)) for rows in runs]
+    count = len(blocks[0])
     best: tuple[float, int, FloatArray, FloatArray] | None = None
     gains, values = [], []
     stacked = field.whitening.stacked(

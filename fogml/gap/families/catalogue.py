@@ -68,7 +68,6 @@ def _known(declared: Effect) -> Family:
         "known",
         build,
         drawn_per_run=declared.drawn_per_run or declared.family == "line",
-        twice=declared.family == "wave",
         place=declared.place,
     )
 

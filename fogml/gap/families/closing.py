@@ -13,7 +13,8 @@ from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
 from fogml.gap.how_far_result import HowFar
 from fogml.runs.run import FloatArray
-from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
+from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
+from fogml.signals.noise_model import NoiseModel
 
 AVERAGING_S = 100.0
 DRAWS, NOISES = 40, 200
@@ -110,10 +111,20 @@ class HeldOut:
         self._floor = float(floor_square(model, windows.time, windows.window_s))
         models = found.points.fit.draw(self._rng, DRAWS)
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
-        alone = expected_mean_square(model, windows.time, windows.window_s)
-        noises = mean_square_draws(model, windows.time, windows.window_s, NOISES, self._rng)
-        self._noises = noises / noises.mean() * alone
-        self._at_floor = self._recalibrated - alone <= _Z90 * float(np.std(self._noises))
+        self._noises = self._drawn(model, None)
+        level = self._recalibrated - self._noises.mean() > _Z90 * float(np.std(self._noises))
+        # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
+        about = self._drawn(model, Fitted(np.ones((len(windows.time), 1)), ordinary=True))
+        varied = float(np.var(windows.of(self.rows.gap - recalibrated.on(run))))
+        shape = varied - self._floor > _Z90 * float(np.std(about))
+        self._at_floor = not level and not shape
+
+    def _drawn(self, model: NoiseModel, fitted: Fitted | None) -> FloatArray:
+        """Mean squares of noises on the run's windows, their mean the expected one."""
+        windows = self._windows
+        expected = expected_mean_square(model, windows.time, windows.window_s, fitted=fitted)
+        drawn = mean_square_draws(model, windows.time, windows.window_s, NOISES, self._rng, fitted=fitted)
+        return np.asarray(drawn / drawn.mean() * expected)
 
     def how_far(self, after: Foretold) -> HowFar:
         """Before, recalibrated, after and floor, and what is closed.

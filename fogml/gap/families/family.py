@@ -44,8 +44,6 @@ class Family:
         What it looks like, of an unknown.
     drawn_per_run
         Whether each run draws its coefficients anew.
-    twice
-        Whether two of its members may act beside each other.
     place
         Where it acts, for words.
     """
@@ -55,7 +53,6 @@ class Family:
     build: Build
     words: str = ""
     drawn_per_run: bool = False
-    twice: bool = False
     place: str = ""
 
 

@@ -17,14 +17,14 @@ from fogml.gap.families.frame import (
     fixed_columns,
     reading_errors,
 )
-from fogml.gap.families.linear_gaussian import Posterior
+from fogml.gap.families.linear_gaussian import Posterior, log_evidence
 from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
 from fogml.gap.families.other_families import LINES
 from fogml.gap.families.places import Scene
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
-from fogml.gap.families.search import Explanation, Search, over_noises
+from fogml.gap.families.search import Explanation, Search
 from fogml.gap.families.spectral_lines import outstanding_lines
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
@@ -33,6 +33,12 @@ from fogml.signals.noise_model import NoiseModel
 
 FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
+MOST_ROUNDS = 3
+"""Searches, each at the noise that the one before found likeliest."""
+WHITE_FACTORS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
+"""White noise beside what was found, over that beside nothing."""
+SURE = 5
+"""Sets by which white noise is judged again."""
 RESCORED = 40
 """Sets whose evidence is taken at every noise."""
 Progress = Callable[[str], None]
@@ -50,8 +56,6 @@ class Inference:
         Runs and constants; families' blocks; noises.
     fields
         Whitened by each noise; the one that fits best holds all blocks, others those that are asked for.
-    best
-        Which noise fits best.
     search
         At that noise.
     explanations
@@ -65,7 +69,6 @@ class Inference:
     columns: Columns
     points: NoisePoints
     search: Search
-    best: int
     explanations: tuple[Explanation, ...]
     unusable: tuple[tuple[str, str], ...]
 
@@ -103,28 +106,33 @@ def infer(
     setting = _setting(model, scene, priors, prior.centre)
     setting = _setting(model, scene, priors, first_noise(setting, prior))
     tell("fitting the noise")
-    points = noise_points(setting, prior, source, noise, 0.5 * priors.hopeless)
+    points = noise_points(setting, prior, source, noise, priors.hopeless)
     setting = _setting(model, scene, priors, points.fit.model)
     scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
     setting = replace(setting, scene=scene)
     tell("building families")
     columns = Columns.of(families_of(model.twin, scene, without), scene, setting.values)
-    best = points.best
-    for _ in range(2):
+    for _ in range(MOST_ROUNDS):
         tell("searching")
+        best = points.best
         search = Search(Field(setting, columns, points.noises[best]))
         found = search.explanations()
         found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members][:RESCORED]
         only = sorted({n for e in found for n, _ in e.nodes})
+        # What fast causes make looks like noise until they are known.
+        whites = [points.with_white(factor) for factor in WHITE_FACTORS]
+        beside = [Field(setting, columns, p.noises[best], only) for p in whites]
+        likeliest = over_noises(found[:SURE], beside, [0.0] * len(beside))
+        scores = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in likeliest])
+        settled = WHITE_FACTORS[int(np.argmax(scores))] == 1.0
+        points = whites[int(np.argmax(scores))]
         fields = [Field(setting, columns, m, only) for m in points.noises]
         rescored = over_noises(found, fields, points.log_priors)
-        total = np.array([np.logaddexp.reduce([e.log_prior + e.by_noise[i] for e in rescored])
-                          for i in range(len(fields))])  # fmt: skip
-        likeliest = int(np.argmax(total))
-        if likeliest == best:
+        by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in rescored])
+        points = points.judged(by_noise)
+        if settled and points.best == best:
             break
-        best = likeliest
-    return Inference(model, setting, columns, points, search, best, tuple(rescored), (*unusable, *more))
+    return Inference(model, setting, columns, points, search, tuple(rescored), (*unusable, *more))
 
 
 def _rows(runs: Sequence[Run], model: TwinModel, most: int) -> tuple[list[Rows], list[tuple[str, str]]]:
@@ -166,3 +174,30 @@ def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: NoiseModel) 
         off = {c.name: abs(values[c.name] - c.mean) / c.sd for c in constants}
         widened |= {name: 2.0 * z for name, z in off.items() if z > FAR_OFF}
     return replace(setting, values=values, fixed=fixed)
+
+
+def over_noises(
+    explanations: Sequence[Explanation], fields: Sequence[Field], log_priors: Sequence[float]
+) -> list[Explanation]:
+    """Explanations with their evidence at each noise, the likeliest first."""
+    by_noise: list[list[float]] = [[] for _ in explanations]
+    for held, log_prior in zip(fields, log_priors):
+        data, first = held.base.data, held.fixed.shape[1]
+        square = float(data @ data)
+        every = np.concatenate([held.fixed, held.white], axis=1)
+        gram, fits = every.T @ every, every.T @ data
+        for e, row in zip(explanations, by_noise):
+            places = [np.arange(first)] + [
+                np.arange(first + held.at[n].start, first + held.at[n].stop)
+                for n, _ in e.nodes
+                if n in held.at
+            ]
+            size = np.concatenate(
+                [np.ones(first), *(np.full(held.block(n).shape[1], s) for n, s in e.nodes if n in held.at)]
+            )
+            at = np.concatenate(places)
+            scaled = gram[np.ix_(at, at)] * np.outer(size, size)
+            value = log_evidence(scaled, fits[at] * size, square)
+            row.append(value + e.spread + log_prior - held.whitening.log_det)
+    told = [replace(e, by_noise=tuple(row)) for e, row in zip(explanations, by_noise)]
+    return sorted(told, key=lambda e: -e.score)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -12,7 +13,7 @@ from fogml.gap.families.frame import Columns, Field, Setting
 from fogml.gap.families.linear_gaussian import size_gains
 from fogml.gap.families.static_run import StaticRun
 from fogml.gap.families.unknown import unknown_families
-from fogml.runs.run import Run
+from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
@@ -25,21 +26,43 @@ WHITE_STEPS = (1.3, 1.06)
 _MEDIAN = 0.6744897501960817
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class NoisePoints:
-    """Noises, the logarithms of their priors, and their posterior beside smooth unknowns as a fit."""
+    """Noises, the logarithms of their priors, and those of their posterior beside what may act.
+
+    ``fit`` holds the posterior's moments.
+    """
 
     noises: tuple[NoiseModel, ...]
     log_priors: tuple[float, ...]
-    best: int
-    fit: NoiseFit
+    prior: NoisePrior
     source: str
+    log_posteriors: FloatArray = field(default_factory=lambda: np.zeros(1))
+
+    def judged(self, log_posteriors: FloatArray) -> NoisePoints:
+        """With another posterior."""
+        return replace(self, log_posteriors=log_posteriors)
+
+    def with_white(self, factor: float) -> NoisePoints:
+        """With white noise so many times as strong."""
+        return replace(self, noises=tuple(replace(n, N=factor * n.N) for n in self.noises))
+
+    @property
+    def best(self) -> int:
+        """Which is the likeliest."""
+        return int(np.argmax(self.log_posteriors))
+
+    @cached_property
+    def fit(self) -> NoiseFit:
+        """Moments of the logarithms of the coefficients."""
+        weights = np.exp(self.log_posteriors - self.log_posteriors.max())
+        return _as_fit(self.noises, weights / weights.sum(), self.prior, float(self.log_posteriors.max()))
 
 
 def noise_points(
     setting: Setting, prior: NoisePrior, source: str, static: Run | None, negligible: float
 ) -> NoisePoints:
-    """Noises to integrate over; those with less than exp(-`negligible`) of the likeliest left out.
+    """Noises to integrate over; those with less than exp(-`negligible`) of the likeliest prior left out.
 
     White noise is what the runs themselves show, whatever a static run said: it is no evidence of a cause.
     Flicker and random walk are taken at steps about what was expected of them, each as likely as the static
@@ -71,17 +94,10 @@ def noise_points(
             noises.append(noise)
             own = replace(noise, N=prior.centre.N)
             log_priors.append(-0.5 * (b * b + k * k) if told is None else told.log_likelihood(own))
+    kept = [i for i, p in enumerate(log_priors) if p > max(log_priors) - negligible]
+    noises, log_priors = [noises[i] for i in kept], [log_priors[i] for i in kept]
     total = np.array([_score(setting, columns, n) + p for n, p in zip(noises, log_priors)])
-    kept = np.flatnonzero(total > total.max() - negligible)
-    weights = np.exp(total[kept] - total.max())
-    fit = _as_fit([noises[i] for i in kept], weights / weights.sum(), prior, float(total.max()))
-    return NoisePoints(
-        tuple(noises[i] for i in kept),
-        tuple(log_priors[i] for i in kept),
-        int(np.argmax(total[kept])),
-        fit,
-        source,
-    )
+    return NoisePoints(tuple(noises), tuple(log_priors), prior, source).judged(total)
 
 
 def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,23 +20,33 @@ class Cause:
 
     Attributes
     ----------
-    member
-        Its family, node and size.
+    members
+        Its family's, with nodes and sizes, the largest first.
     ids
         Effects that these runs don't tell from it, itself first.
     probability
-        That one of them acts, doubt and carrying over in it.
+        That one of them acts, trust and carrying over in it.
     evidence
         The same by the evidence alone.
     carried
         What it adds to the log density of each run given the others, over the best set without it [nats].
     """
 
-    member: Member
+    members: tuple[Member, ...]
     ids: tuple[str, ...]
     probability: float
     evidence: float
     carried: float
+
+    @property
+    def member(self) -> Member:
+        """The one that stands for it."""
+        return self.members[0]
+
+    @property
+    def odds(self) -> float:
+        """Logarithm of its odds, by the evidence or by what carries over, whichever is less."""
+        return min(_log_odds(self.evidence), max(self.carried, 0.0))
 
 
 @dataclass(frozen=True)
@@ -54,76 +65,57 @@ def judge(found: Inference) -> Judgement:
     """Causes of the likeliest set with their classes.
 
     The odds of a cause are those of all sets that hold a member of its class, or those by which it helps to
-    foretell each run from the others where these are lower, over the prior's doubt.
+    foretell each run from the others where these are lower, through the prior's trust.
     """
-    families, priors = found.columns.families, found.setting.priors
+    families, priors, search = found.columns.families, found.setting.priors, found.search
     best = found.explanations[0]
-    known = [m for m in best.members if families[m.family].kind == "known"]
-    exchanges = {m: found.search.exchanged(best, m) for m in known}
-    explanations = _with_exchanges(found, exchanges)
+    exchanges = [e for f in search.names(best) for e in search.exchanged(best, f).values()]
+    explanations = _with_more(found.explanations, exchanges)
     best = explanations[0]
+    alike = {f: _alike(found, explanations, f) for f in search.names(best)}
+    instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
+    explanations = _with_more(explanations, [e for sets in instead.values() for e in sets])
+    if explanations[0].key != best.key and not search.names(explanations[0]) >= search.names(best):
+        best = explanations[0]
+        alike = {f: _alike(found, explanations, f) for f in search.names(best)}
+        instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
     scores = np.array([e.score for e in explanations])
     weights = np.exp(scores - scores.max())
     weights /= weights.sum()
-    by_key = {e.key: e.score for e in explanations}
     causes = []
-    for member in best.members:
-        if families[member.family].kind != "known":
-            continue
-        rest = [m.family for m in best.members if m is not member]
-        alike = [
-            (by_key[key], f)
-            for f in range(len(families))
-            if families[f].kind == "known"
-            and f not in rest
-            and (key := tuple(sorted([*rest, f]))) in by_key
-            and by_key[key] > best.score - priors.exchange
-        ]
-        members = {f for _, f in alike} | {member.family}
-        held = float(sum(w for e, w in zip(explanations, weights) if members & set(e.key)))
-        carried = carries(found, best) - carries(found, found.search.unexplained(best, member))
-        odds = min(_log_odds(held), max(carried, 0.0)) - math.log(priors.doubt)
-        order = [families[f].id for _, f in sorted(alike, reverse=True) if f != member.family]
-        causes.append(
-            Cause(
-                member,
-                tuple(dict.fromkeys([families[member.family].id, *order])),
-                1.0 / (1.0 + math.exp(-odds)),
-                held,
-                carried,
-            )
-        )
+    for f, members in alike.items():
+        held = float(sum(w for e, w in zip(explanations, weights) if set(members) & set(e.key)))
+        near = [e for e in instead[f] if e.score > instead[f][0].score - priors.exchange]
+        carried = carries(found, best) - max(carries(found, e) for e in near)
+        own = sorted((m for m in best.members if m.family == f), key=lambda m: -m.size)
+        cause = Cause(tuple(own), tuple(families[g].id for g in members), 0.0, held, carried)
+        causes.append(replace(cause, probability=_chance(priors.trusted(cause.odds))))
     causes.sort(key=lambda c: -c.probability)
-    unknown = float(
-        sum(
-            w
-            for e, w in zip(explanations, weights)
-            if any(families[m.family].kind == "unknown" for m in e.members)
-        )
-    )
-    known_share = 1.0 - unknown
+
+    def weight(counts: Callable[[Explanation], bool]) -> float:
+        return float(sum(w for e, w in zip(explanations, weights) if counts(e)))
+
+    known_share = 1.0 - weight(lambda e: any(families[f].kind == "unknown" for f in e.key))
     for cause in causes:
-        lost = cause.evidence - 1.0 / (
-            1.0 + math.exp(-min(_log_odds(cause.evidence), max(cause.carried, 0.0)))
-        )
-        known_share *= 1.0 - max(lost, 0.0)
-    nothing = float(
-        sum(
-            w
-            for e, w in zip(explanations, weights)
-            if all(families[m.family].kind == "plant" for m in e.members)
-        )
-    )
-    return Judgement(best, _once(causes), nothing, 1.0 - known_share, explanations, weights)
+        known_share *= 1.0 - max(cause.evidence - _chance(cause.odds), 0.0)
+    nothing = weight(lambda e: all(families[f].kind == "plant" for f in e.key))
+    return Judgement(best, tuple(causes), nothing, 1.0 - known_share, explanations, weights)
 
 
-def _once(causes: list[Cause]) -> tuple[Cause, ...]:
-    """Causes of which each effect is named by one alone."""
-    kept: list[Cause] = []
-    for cause in causes:
-        if all(cause.ids[0] != other.ids[0] for other in kept):
-            kept.append(cause)
-    return tuple(kept)
+def _alike(found: Inference, explanations: Sequence[Explanation], family: int) -> list[int]:
+    """Families that one of the likeliest set may be exchanged for at a low cost; itself first."""
+    best, families = explanations[0], found.columns.families
+    rest = frozenset(best.key) - {family}
+    by_set: dict[frozenset[int], float] = {}
+    for e in explanations:
+        by_set.setdefault(frozenset(e.key), e.score)
+    near = [
+        (score, next(iter(held - rest)))
+        for held, score in by_set.items()
+        if held > rest and len(held) == len(rest) + 1 and score > best.score - found.setting.priors.exchange
+    ]
+    others = [f for _, f in sorted(near, reverse=True) if f != family and families[f].kind == "known"]
+    return [family, *others]
 
 
 def carries(found: Inference, explanation: Explanation) -> float:
@@ -136,20 +128,20 @@ def carries(found: Inference, explanation: Explanation) -> float:
     return left_out_log_density(held.design(explanation.nodes), held.base.data, spans)
 
 
-def _with_exchanges(
-    found: Inference, exchanges: dict[Member, dict[int, Explanation]]
-) -> tuple[Explanation, ...]:
-    """All explanations with those of exchanged members: as far ahead at every noise as at the likeliest."""
-    have = {e.key for e in found.explanations}
-    best = found.explanations[0]
-    more: dict[tuple[int, ...], Explanation] = {}
-    for by_family in exchanges.values():
-        for e in by_family.values():
-            if e.key not in have and (e.key not in more or e.score > more[e.key].score):
-                more[e.key] = e
-    ahead = {key: e.log_evidence - best.log_evidence for key, e in more.items()}
-    added = [replace(e, by_noise=tuple(x + ahead[key] for x in best.by_noise)) for key, e in more.items()]
-    return tuple(sorted([*found.explanations, *added], key=lambda e: -e.score))
+def _with_more(explanations: Sequence[Explanation], more: Sequence[Explanation]) -> tuple[Explanation, ...]:
+    """With explanations that are known at one noise: as far ahead at every one; the likeliest first."""
+    best = explanations[0]
+    have = {e.key: e for e in explanations}
+    for e in more:
+        ahead = e.log_evidence - best.log_evidence
+        told = replace(e, by_noise=tuple(x + ahead for x in best.by_noise))
+        if e.key not in have or told.score > have[e.key].score:
+            have[e.key] = told
+    return tuple(sorted(have.values(), key=lambda e: -e.score))
+
+
+def _chance(log_odds: float) -> float:
+    return 1.0 / (1.0 + math.exp(-log_odds))
 
 
 def _log_odds(probability: float) -> float:

@@ -23,6 +23,9 @@ class Priors:
     other_plant
         Probability that heat flows otherwise than the model's plant says, beyond what constants take up: one
         unit in twenty.
+    mixed_forms
+        Probability that it takes two members of its family to hold a known cause, or two families an unknown
+        one: a real cause is a distribution over forms, which is often narrow.
     least_size, greatest_size, sizes
         Whitened length of what a cause does: log-uniform, in so many values. Under 3 none can be told from
         noise; from 60 on a prior makes no difference, whatever the size is.
@@ -40,8 +43,9 @@ class Priors:
         Members of a class cost less than this to be exchanged [nats]: one in twenty.
     carried
         What a name has to add to the prediction of each run from the others, all together [nats].
-    doubt
-        Odds of a name are divided by this for what no family describes: a monotone map, the same for all.
+    trust, doubt
+        Logarithms of a name's odds are multiplied by the first, then less the second, for what no family
+        describes: a monotone map, the same for all.
     slow_noise
         Prior standard deviations from the median at which random walk is integrated over; flicker at all but
         the last. Far above, since a short static run shows little of a walk.
@@ -56,6 +60,7 @@ class Priors:
     expected_causes: float = 1.0
     unknown: float = 0.25
     other_plant: float = 0.05
+    mixed_forms: float = 0.3
     least_size: float = 3.0
     greatest_size: float = 60.0
     sizes: int = 6
@@ -66,7 +71,8 @@ class Priors:
     hopeless: float = 12.0
     exchange: float = 3.0
     carried: float = 2.0
-    doubt: float = 4.0
+    trust: float = 1.0
+    doubt: float = 1.4
     slow_noise: tuple[float, ...] = (-1.0, 0.0, 0.6, 1.2, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
@@ -82,6 +88,10 @@ class Priors:
     def plant_lengths(self) -> FloatArray:
         """The values of another plant's size, shape (2,)."""
         return np.array([self.least_size, self.plant_size])
+
+    def trusted(self, log_odds: float) -> float:
+        """Of a name, from what the evidence and carrying over say."""
+        return self.trust * log_odds - self.doubt
 
     def log_odds(self, probability: float) -> float:
         """Of a cause that acts with a probability."""

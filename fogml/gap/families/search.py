@@ -10,11 +10,13 @@ import numpy as np
 
 from fogml.gap.families.family import Family
 from fogml.gap.families.frame import Field
-from fogml.gap.families.linear_gaussian import LinearGaussian, log_evidence, log_sum_exp, size_gains
+from fogml.gap.families.linear_gaussian import LinearGaussian, log_sum_exp, size_gains
 from fogml.runs.run import FloatArray
 
 REFINED = 12
 """Sets of each number of causes whose members are chosen again beside each other."""
+ALTERNATIVES = 3
+"""Sets without a name that each round asks what it could be instead."""
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,11 @@ class Search:
         self.blocks = {f: b for f, b in self.blocks.items() if b.nodes}
 
     def explanations(self) -> list[Explanation]:
-        """The sets worth keeping, the likeliest first."""
+        """The sets worth keeping, the likeliest first.
+
+        Sets without a known cause go on in a beam of their own: what several unknown families explain
+        together competes with a name, however far ahead names are on the way there.
+        """
         nothing = Explanation((), 0.0, self.field.base.log_evidence)
         found: dict[tuple[int, ...], Explanation] = {(): nothing}
         level, best = [nothing], nothing.score
@@ -113,18 +119,26 @@ class Search:
                     if other.key not in grown or other.score > grown[other.key].score:
                         grown[other.key] = other
             ranked = sorted(grown.values(), key=lambda e: -e.score)
+            beam = self.priors.beam if count < 3 else max(self.priors.beam // 2, 1)
             if count > 1:
                 near = [e for e in ranked[:REFINED] if e.score > best - self.priors.hopeless]
-                ranked = [*map(self._refined, near), *ranked[len(near) :]]
-                ranked.sort(key=lambda e: -e.score)
+                near += [e for e in ranked[REFINED:] if not self.names(e)][: beam // 2]
+                refined = {e.key: self._refined(e) for e in near}
+                ranked = sorted([refined.get(e.key, e) for e in ranked], key=lambda e: -e.score)
             found |= {e.key: e for e in ranked}
             best = max(best, max((e.score for e in ranked), default=-math.inf))
-            beam = self.priors.beam if count < 3 else max(self.priors.beam // 2, 1)
-            level = [e for e in ranked[:beam] if count == 1 or e.score > best - self.priors.hopeless]
+            # Of a set in several forms the likeliest goes on.
+            sets = list({frozenset(e.key): e for e in reversed(ranked)}.values())[::-1]
+            level = [e for e in sets[:beam] if count == 1 or e.score > best - self.priors.hopeless]
+            level += [e for e in sets[beam:] if not self.names(e)][: beam // 2]
             if not level:
                 break
         kept = [e for e in found.values() if e.score > best - 2.0 * self.priors.hopeless or not e.members]
         return sorted(kept, key=lambda e: -e.score)
+
+    def names(self, explanation: Explanation) -> set[int]:
+        """Families of a set that may be named."""
+        return {f for f in explanation.key if self.families[f].kind == "known"}
 
     def alone(self) -> Mapping[int, float]:
         """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
@@ -136,54 +150,74 @@ class Search:
         across, fits = self._beside(held)
         return {f: self._averaged(f, self._gains(f, across, fits))[0] for f in self.blocks}
 
-    def exchanged(self, explanation: Explanation, member: Member) -> dict[int, Explanation]:
-        """The set with one of its members exchanged for each other family that may be named, where near."""
-        rest = self.without(explanation, member)
-        held = self.field.beside(rest.nodes)
-        across, fits = self._beside(held)
+    def exchanged(self, explanation: Explanation, family: int) -> dict[int, Explanation]:
+        """The set with a known family exchanged for each other one that may be named, where near."""
+        rest = self.without(explanation, {family})
+        forms = explanation.key.count(family)
         found = {}
-        for f in self.blocks:
-            if self.families[f].kind != "known" or f in rest.key:
+        for f, grown in self._each_more(rest, self.families_of("known")).items():
+            if f in explanation.key or grown.score < self._alone(explanation) - 2.0 * self.priors.hopeless:
                 continue
-            grown = self._grown(rest, held, f, across, fits)
-            if grown.log_prior + grown.log_evidence > self._alone(explanation) - 2.0 * self.priors.hopeless:
-                found[f] = self._refined(grown)
+            found[f] = self._refined(grown)
+            if forms > 1 and len(self.blocks[f].nodes) > 1:
+                found[f] = max(
+                    found[f], self._refined(self._each_more(found[f], [f])[f]), key=lambda e: e.score
+                )
         return found
 
-    def unexplained(self, explanation: Explanation, member: Member) -> Explanation:
-        """The likeliest set in which something unknown, or nothing, stands in for a member."""
-        rest = self.without(explanation, member)
-        held = self.field.beside(rest.nodes)
-        across, fits = self._beside(held)
-        others = [rest] + [
-            self._grown(rest, held, f, across, fits)
-            for f in self.blocks
-            if self.families[f].kind != "known" and f not in rest.key
-        ]
-        return max(others, key=lambda e: e.score)
+    def unexplained(self, explanation: Explanation, families: set[int]) -> list[Explanation]:
+        """Sets in which something unknown, a mixture of forms, or nothing, stands in for known families."""
+        rest = self._refined(self.without(explanation, families))
+        others = [*self.families_of("unknown"), *self.families_of("plant"), *self.names(rest)]
+        sets = [rest]
+        for _ in range(2):
+            start = sets[0]
+            more = self._each_more(start, [f for f in others if self._may_join(start, f)])
+            ranked = sorted(more.values(), key=lambda e: -e.score)[:ALTERNATIVES]
+            sets = sorted([*map(self._refined, ranked), *sets], key=lambda e: -e.score)
+            if sets[0] is start:
+                break
+        return sets
+
+    def families_of(self, kind: str) -> list[int]:
+        """Families of a kind that have blocks."""
+        return [f for f in self.blocks if self.families[f].kind == kind]
 
     @staticmethod
     def _alone(explanation: Explanation) -> float:
         return explanation.log_prior + explanation.log_evidence
 
-    def without(self, explanation: Explanation, member: Member) -> Explanation:
-        """The set without one of its members, at the one noise."""
-        members = tuple(m for m in explanation.members if m is not member)
-        return Explanation(
-            members,
-            explanation.log_prior - float(self.log_odds[member.family]),
-            self.field.beside([(m.node, m.size) for m in members]).log_evidence,
-        )
+    def without(self, explanation: Explanation, families: set[int]) -> Explanation:
+        """The set without some families, at the one noise."""
+        members = tuple(m for m in explanation.members if m.family not in families)
+        prior = sum(self._odds(members[:i], m.family) for i, m in enumerate(members))
+        held = self.field.beside([(m.node, m.size) for m in members])
+        return Explanation(members, prior, held.log_evidence)
+
+    def _odds(self, members: Sequence[Member], f: int) -> float:
+        """Of a family beside members: a second one of a known family, or unknown, is a mixture of forms."""
+        if any(m.family == f for m in members):
+            return self.priors.log_odds(self.priors.mixed_forms)
+        kinds = {self.families[m.family].kind for m in members}
+        if self.families[f].kind == "unknown" and "unknown" in kinds:
+            return self.priors.log_odds(self.priors.mixed_forms / len(self.families_of("unknown")))
+        return float(self.log_odds[f])
+
+    def _may_join(self, explanation: Explanation, f: int) -> bool:
+        if f not in explanation.key:
+            return True
+        known = self.families[f].kind == "known" and len(self.blocks[f].nodes) > 1
+        return known and explanation.key.count(f) < 2
 
     def _with_one_more(self, explanation: Explanation) -> list[Explanation]:
+        joining = [f for f in self.blocks if self._may_join(explanation, f)]
+        return list(self._each_more(explanation, joining).values())
+
+    def _each_more(self, explanation: Explanation, joining: Sequence[int]) -> dict[int, Explanation]:
+        """The set with each of some families more."""
         held = self.field.beside(explanation.nodes)
         across, fits = self._beside(held)
-        present = explanation.key
-        return [
-            self._grown(explanation, held, f, across, fits)
-            for f in self.blocks
-            if f not in present or (self.families[f].twice and present.count(f) < 2)
-        ]
+        return {f: self._grown(explanation, held, f, across, fits) for f in joining}
 
     def _grown(
         self, rest: Explanation, held: LinearGaussian, f: int, across: FloatArray, fits: FloatArray
@@ -192,7 +226,7 @@ class Search:
         member, averaged, spread = self._averaged(f, gains)
         return Explanation(
             (*rest.members, member),
-            rest.log_prior + float(self.log_odds[f]),
+            rest.log_prior + self._odds(rest.members, f),
             held.log_evidence + averaged + rest.spread,
             rest.spread + spread,
         )
@@ -275,30 +309,3 @@ class Search:
         scales = np.array([self.field.scale[n] for n in nodes])
         over = np.log(np.maximum(scales[:, None] * lengths / high, 1.0))
         return np.asarray(-0.5 * (over / math.log(self.priors.beyond_range)) ** 2)
-
-
-def over_noises(
-    explanations: Sequence[Explanation], fields: Sequence[Field], log_priors: Sequence[float]
-) -> list[Explanation]:
-    """Explanations with their evidence at each noise, the likeliest first."""
-    by_noise: list[list[float]] = [[] for _ in explanations]
-    for held, log_prior in zip(fields, log_priors):
-        data, first = held.base.data, held.fixed.shape[1]
-        square = float(data @ data)
-        every = np.concatenate([held.fixed, held.white], axis=1)
-        gram, fits = every.T @ every, every.T @ data
-        for e, row in zip(explanations, by_noise):
-            places = [np.arange(first)] + [
-                np.arange(first + held.at[n].start, first + held.at[n].stop)
-                for n, _ in e.nodes
-                if n in held.at
-            ]
-            size = np.concatenate(
-                [np.ones(first), *(np.full(held.block(n).shape[1], s) for n, s in e.nodes if n in held.at)]
-            )
-            at = np.concatenate(places)
-            scaled = gram[np.ix_(at, at)] * np.outer(size, size)
-            value = log_evidence(scaled, fits[at] * size, square)
-            row.append(value + e.spread + log_prior - held.whitening.log_det)
-    told = [replace(e, by_noise=tuple(row)) for e, row in zip(explanations, by_noise)]
-    return sorted(told, key=lambda e: -e.score)

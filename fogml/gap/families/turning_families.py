@@ -14,8 +14,8 @@ from fogml.twin.registry import effect
 
 NEAR = (0.5,)
 """Mixes of the faces that stand for the optics' place, where a slope in temperature is all that acts."""
-MODULATOR_S = (30.0, 300.0)
-"""Start-up of a modulator's second loop [s]."""
+MODULATOR_S = (30.0, 300.0, 1000.0)
+"""How late a modulator's second loop is [s]."""
 BEHIND_S = (300.0, 1200.0)
 """How far a node near a place may lag behind it [s]."""
 Constants = Mapping[str, float]
@@ -43,16 +43,17 @@ def scale_factor_node(rows: Rows, scene: Scene, constants: Constants) -> Iterato
 
 
 def modulator(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """A scale factor that follows the modulator's temperature, and finds its second loop after power-on."""
-    speed = _speed(rows)
+    """A scale factor that follows the modulator's temperature, with a second loop that corrects it late."""
+    speed, time = _speed(rows), rows.even.time
     on = np.isfinite(rows.even.powered_on_s)
     found = [rows.of(rows.even.unwarmed(s)) * 100.0 if on else np.zeros(len(rows)) for s in MODULATOR_S]
     for place in scene.optics(rows, NEAR):
         x = rows.of(place.temperature) - 25.0
         yield Block(speed[:, None] * x[:, None], {"place": place.name}, place.weight)
-        yield Block(
-            speed[:, None] * np.column_stack([x, *found]), {"place": place.name, "starts": True}, place.weight
-        )
+        behind = [x + 25.0 - rows.of(lag(time, place.temperature, s)) for s in MODULATOR_S]
+        for more, how in ((found, {"starts": True}), (behind, {"corrected": True})):
+            columns = speed[:, None] * np.column_stack([x, *more])
+            yield Block(columns, {"place": place.name, **how}, place.weight)
 
 
 def even_in_rate(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

@@ -9,9 +9,10 @@ import numpy as np
 
 from fogml.gap.families.family import Block, Family
 from fogml.gap.families.places import Scene, lag, rate
-from fogml.gap.families.rows import Rows
+from fogml.gap.families.rows import Rows, slopes, through_nominal
 from fogml.gap.families.thermal_families import bumps
 from fogml.runs.run import FloatArray
+from fogml.signals.recursions import play_kernel
 
 TIMES_S = (7200.0, 2400.0, 900.0, 400.0)
 """Shortest half periods of what is smooth in time [s]."""
@@ -19,6 +20,14 @@ STEPS, SINGLE_STEPS = 40, 24
 """Steps of a run that are many, and places of a single one."""
 TEMPERATURE_BUMPS = (25, 60)
 PAST_S = (600.0, 1800.0, 5400.0, 16200.0)
+CREEPS_S = (1800.0, 7200.0, 30000.0)
+TURN_DEGC = 1.0
+"""Temperature has turned when it came back by twice this."""
+HEALS_S = (900.0, 3000.0, 9000.0, 1e9)
+LINES, LINE_WEIGHT = 3, 0.01
+"""One line among as many as a run of some hours holds between its start and its rows."""
+BETWEEN = (("T_out", "T_in"), ("T_case", "T_in"), ("T_chamber", "T_in"), ("T_electronics", "T_in"))
+"""Places whose difference may drive something."""
 DIRECTION_DEGC_MIN = 0.05
 """Rates under this are no direction."""
 Constants = Mapping[str, float]
@@ -63,6 +72,55 @@ def _past(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(np.column_stack([bumps(v, low, high, 7) for v in lags]))
     speeds = [rows.of(rate(time, lag(time, x, s))) for s in (300.0, *PAST_S)]
     yield Block(np.column_stack(speeds))
+    # What goes on only while it is hot, or cold, and recovers.
+    levels = bumps(x, low, high, 5).T
+    yield Block(np.column_stack([rows.of(lag(time, level, s)) for level in levels for s in CREEPS_S]))
+
+
+def _events(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """What turns of the temperature, starts and ends of its moves leave behind, and how it heals."""
+    time, x = rows.even.time, np.ascontiguousarray(rows.even.temperature("T"))
+    ways = np.sign(np.diff(play_kernel(x, TURN_DEGC, np.nan)[0], prepend=x[0]))
+    moving = np.flatnonzero(ways)
+    kicks = np.zeros((len(x), 4))
+    turned = moving[np.diff(ways[moving], prepend=0.0) != 0.0].tolist()
+    for last, i in zip([0, *turned], turned):
+        kicks[i, :2] = ways[i], ways[i] * abs(x[i] - x[last])
+    going = np.abs(rate(time, x)) > DIRECTION_DEGC_MIN
+    changed = np.flatnonzero(np.diff(going.astype(np.int8), prepend=int(going[0])))
+    way = np.sign(rate(time, x))
+    for i in changed.tolist():
+        kicks[i, 2 if going[i] else 3] = way[i] if going[i] else way[max(i - 1, 0)]
+    yield Block(rows.of(np.column_stack([_decay(time, kicks, s) for s in HEALS_S])))
+
+
+def _differences(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """Any function of how much warmer one place is than another, at once or late."""
+    for i, (one, other) in enumerate(BETWEEN):
+        ends = ("differences", i)
+        if ends not in scene.cache:
+            held = [r.even.temperature(one) - r.even.temperature(other) for r in scene.runs[: scene.fitted]]
+            scene.cache[ends] = min(d.min() for d in held), max(d.max() for d in held)
+        low, high = scene.cache[ends]
+        levels = bumps(rows.even.temperature(one) - rows.even.temperature(other), low, high, 6)
+        late = [lag(rows.even.time, level, 1800.0) for level in levels.T]
+        yield Block(rows.of(levels))
+        yield Block(rows.of(np.column_stack([levels, *late])))
+
+
+def _readings(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """Any error of the thermometers through the nominal: smooth in time, by temperature, by direction."""
+    told, time = slopes(rows, constants), rows.even.time
+    phase = np.pi * (time - time[0]) / max(float(time[-1] - time[0]), 1.0)
+    for names in (("T", "T_in"), ("T_out",)):
+        own = [n for n in names if n in rows.readings]
+        errors = {}
+        for name in own:
+            x = rows.even.temperatures[name]
+            levels = bumps(x, *scene.range_degc, 5)
+            ways = np.tanh(rate(time, x) / DIRECTION_DEGC_MIN)[:, None]
+            errors[name] = np.column_stack([np.cos(phase[:, None] * np.arange(1, 13)), levels, ways * levels])
+        yield Block(through_nominal(rows, told, errors) if own else np.zeros((len(rows), 22)))
 
 
 def _excursion(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
@@ -82,19 +140,26 @@ def _table(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     yield Block(levels)
     yield Block(levels * ((rows.temperature - 25.0) / scene.span_degc)[:, None])
     moved = np.abs(speed) > 0.0
-    settled = np.column_stack(
-        [_decay(rows.of(rows.even.time), np.diff(speed, prepend=speed[0]), s) for s in (60.0, 300.0, 1200.0)]
-    )
-    yield Block(settled)
+    starts = np.sign(np.diff(speed, prepend=speed[0]))[:, None]
+    time = rows.of(rows.even.time)
+    yield Block(np.column_stack([_decay(time, starts, s) for s in (60.0, 300.0, 1200.0)]))
+    tired = np.sqrt(np.abs(rows.even.table_rate))
+    late = np.column_stack([rows.of(lag(rows.even.time, tired, s)) for s in (300.0, 1200.0, 3600.0)])
+    yield Block(np.column_stack([late, late * ~moved[:, None]]))
     turning = rows.even.angle_deg if moved.any() or "angle" in rows.even.drives else np.zeros(len(rows.kept))
     angle = np.radians(rows.of(turning))
     yield Block(np.column_stack([f(h * angle) for h in (1.0, 2.0, 3.0) for f in (np.sin, np.cos)]))
+    # Turns made so far, net and in all.
+    made = np.cumsum(rows.even.table_rate) * rows.row_s / 360.0
+    net, travelled = rows.of(made), rows.of(np.cumsum(np.abs(rows.even.table_rate)) * rows.row_s / 360.0)
+    yield Block(np.column_stack([net, travelled, *(np.tanh(net / s) for s in (0.3, 1.0, 3.0))]))
 
 
 def _decay(time: FloatArray, kicks: FloatArray, time_constant_s: float) -> FloatArray:
-    out, state = np.zeros(len(kicks)), 0.0
+    """What kicks leave behind while it decays, shape (n, k)."""
+    out, state = np.zeros(kicks.shape), np.zeros(kicks.shape[1])
     keep = np.exp(-np.diff(time, prepend=time[0]) / time_constant_s)
-    for i, (kick, share) in enumerate(zip(np.sign(kicks) * (kicks != 0.0), keep)):
+    for i, (kick, share) in enumerate(zip(kicks, keep.tolist())):
         state = state * share + kick
         out[i] = state
     return out
@@ -112,6 +177,25 @@ def _of_candidates() -> set[str]:
     from fogml.twin.registry import effects
 
     return {name for declared in effects().values() if declared.candidate for name in declared.needs}
+
+
+def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """Lines that stand out, as strong as temperature, its direction, the table or time make them."""
+    time = rows.time_s
+    phase = np.pi * (time - time[0]) / max(float(time[-1] - time[0]), 1.0)
+    direction = np.tanh(rows.of(rate(rows.even.time, rows.even.temperature("T"))) / DIRECTION_DEGC_MIN)
+    strength = [
+        np.ones(len(time)),
+        (np.abs(rows.of(rows.even.table_rate)) > 0.0).astype(np.float64),
+        (rows.temperature - scene.range_degc[0]) / scene.span_degc,
+        direction,
+        *(np.cos(k * phase) for k in (1.0, 2.0, 3.0)),
+    ]
+    for frequency in scene.lines_hz[:LINES]:
+        turn = 2.0 * np.pi * frequency * time
+        waves = np.column_stack([wave(h * turn) for h in (1.0, 2.0) for wave in (np.sin, np.cos)])
+        columns = [s[:, None] * waves for s in strength]
+        yield Block(np.concatenate(columns, axis=1), {"period": 1.0 / frequency}, LINE_WEIGHT)
 
 
 def unknown_families() -> tuple[Family, ...]:
@@ -136,6 +220,10 @@ def unknown_families() -> tuple[Family, ...]:
         Family("direction", "unknown", _direction, "differs with the direction of temperature"),
         Family("past", "unknown", _past, "remembers the temperature of the past hours"),
         Family("excursion", "unknown", _excursion, "remembers how far and how often temperature went"),
+        Family("events", "unknown", _events, "follows turns, starts and ends of changes of temperature"),
+        Family("differences", "unknown", _differences, "goes with how much warmer one place is than another"),
+        Family("readings", "unknown", _readings, "is an error of a thermometer, of no known kind"),
+        Family("lines", "unknown", _lines, "is a line that comes and goes", True),
         Family("table", "unknown", _table, "goes with the table's rate or angle"),
         Family("recorded", "unknown", _recorded, "goes with something else that is recorded"),
     )
