@@ -68,7 +68,8 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         rows.append([f"fixture error {axis}", f"{value:.6g}", number(error), "–", "–", "deg"])
     level = f"{values['level']:.0%}"
     terminal.table(
-        f"{values['source']}: scale factor and misalignment, four states",
+        f"{values['source']}: scale factor and misalignment, four states"
+        + (" (synthetic data)" if values["synthetic"] else ""),
         ["quantity", "value", "standard error", f"{level} from", "to", "unit"],
         rows,
     )

@@ -84,7 +84,7 @@ def _values(settings: RateSettings, terminal: Terminal) -> dict[str, Any]:
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
     rows = [[row.quantity, row.value, row.se, row.unit, row.remark] for row in result_rows(values, number)]
     title = f"{values['source']}: tests on a rate table" + (
-        " (synthetic)" if values["kind"] == "simulated" else ""
+        " (synthetic data)" if values["synthetic"] else ""
     )
     terminal.table(title, ["quantity", "value", "standard error", "unit", ""], rows)
     for note in values["notes"]:

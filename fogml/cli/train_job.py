@@ -15,6 +15,7 @@ from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
+from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.judge import judge
 from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.report_json import judgement_json
@@ -228,7 +229,9 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
             rows.append([f"{run.run} {when}", *(number(value) for value in values)])
         rows.append([f"{run.run} noise floor", "–", floor_words(run, number), "–", "–"])
     averaging = f"{judgement.test[0].averaging_s:g} s averages, deg/h"
+    synthetic = any(run.facts.synthetic for run in (*judgement.train, *judgement.test))
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
+    averaging += "; synthetic data" if synthetic else ""
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
     for run in judgement.test:
         for name in _TOLD_BY_SOME:
@@ -236,6 +239,7 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
             if after is not None:
                 text = f"{number(before)} before, {number(after)} after"
                 terminal.say(f"{run.run}: {label(name)}: {text} [{unit_of(name)}]")
+        _say_stability(run, terminal)
         if run.outside_training:
             terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
     spread = judgement.repeatability
@@ -257,6 +261,21 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         terminal.say(f"{name}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
     for note in judgement.notes:
         terminal.say(note)
+
+
+def _say_stability(run: RunJudgement, terminal: Terminal) -> None:
+    """Bias stability over and at constant temperature, over n - 1, with 90 % intervals."""
+    told = []
+    for what, found in (
+        ("over temperature", over_temperature(run)),
+        ("at constant temperature", held_constant(run)),
+        ("of 10 s averages", of_10_s(run)),
+    ):
+        if found is not None:
+            low, high = (number(end) for end in found.ci90)
+            told.append(f"{number(found.value)} ({low} to {high}) {what}")
+    if told:
+        terminal.say(f"{run.run}: Bias stability after, over n - 1: {'; '.join(told)} [deg/h]")
 
 
 _TOLD_BY_SOME = (

@@ -57,6 +57,8 @@ class TableMeasurements:
     state_angles_deg
         Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z, that is against
         the reference axis [deg].
+    synthetic
+        Whether they come from a simulation.
     """
 
     state: FloatArray
@@ -66,6 +68,7 @@ class TableMeasurements:
     unit: str
     source: str = "measurements"
     state_angles_deg: Sequence[float] = DOCUMENT_ANGLES_DEG
+    synthetic: bool = False
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ from fogml.lab.misalignment_segments import Rows, from_marks, from_rates, from_s
 from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, stated
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.csv_dialect import csv_dialect
+from fogml.runs.facts import read_side_file, side_file
 from fogml.runs.raw_table import RawTable
 from fogml.runs.reading import file_format, read_table
 from fogml.runs.run import FloatArray
@@ -50,6 +52,12 @@ def read_measurements(path: str | Path, state_angles_deg: Sequence[float] | None
     """
     path = Path(path)
     table = read_table(path)
+    facts = read_side_file(path) if side_file(path) else table.facts
+    measured = _measured(path, table, state_angles_deg)
+    return replace(measured, synthetic=facts is not None and facts.synthetic)
+
+
+def _measured(path: Path, table: RawTable, state_angles_deg: Sequence[float] | None) -> TableMeasurements:
     cells = _cells(table)
     rows = _rows(table, cells, state_angles_deg)
     if "segment" in cells:

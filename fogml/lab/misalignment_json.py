@@ -35,6 +35,7 @@ def misalignment_json(measured: TableMeasurements, cross_tilt: bool | None = Non
     return {
         "schema": SCHEMA,
         "source": measured.source,
+        "synthetic": measured.synthetic,
         "K": found.K,
         "unit": per_rate,
         "delta_x_deg": found.delta_x_deg,

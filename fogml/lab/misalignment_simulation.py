@@ -94,7 +94,9 @@ def measurements(
     axes = np.array([unit.input_axis(turn) for turn in state_angles_deg])[state.astype(int) - 1]
     output = unit.K * rate * np.sum(axes * unit.table_axis(set_tilt), axis=-1)
     output += noise * random.standard_normal(len(output))
-    return TableMeasurements(state, tilt, rate, output, output_unit, "synthetic", tuple(state_angles_deg))
+    return TableMeasurements(
+        state, tilt, rate, output, output_unit, "synthetic", tuple(state_angles_deg), synthetic=True
+    )
 
 
 def samples(

@@ -11,7 +11,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.lab.rate_pieces import Plateaus, find_oscillations, find_plateaus, merged
 from fogml.lab.rate_response import Gain, Slew, bandwidth, gain_of, slew
-from fogml.lab.rate_temperature import temperature_sensitivity
+from fogml.lab.rate_temperature import by_temperature, temperature_sensitivity
 from fogml.lab.rate_tests import (
     Answer,
     Bracket,
@@ -89,6 +89,7 @@ def rate_json(
         "schema": SCHEMA,
         "kind": "recorded" if twin is None else "simulated",
         "source": source,
+        "synthetic": twin is not None or any(run.facts.synthetic for run in runs),
         "runs": [run.name for run in runs],
         "criteria": asdict(criteria),
         "scale_factor": None if line is None else asdict(line),
@@ -133,15 +134,17 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
 
 
 def _main_ladder(read: _Read, criteria: Criteria) -> tuple[Line, Range] | None:
-    """Of the run with the most different large rates, as temperatures and small rates tell less."""
+    """Of the run, and the temperature, with the most different large rates; a scale factor that goes with
+    temperature is no nonlinearity."""
     best: tuple[Line, Range] | None = None
     most = 0
-    for _, plateaus in read.ladders:
-        found = scale_line(plateaus, criteria)
-        rate = merged(plateaus.rate, plateaus.rate_error)
-        levels = len(np.unique(rate[np.abs(rate) >= criteria.small * np.abs(rate).max()]))
-        if found is not None and levels > most:
-            best, most = found, levels
+    for run, whole in read.ladders:
+        for plateaus in by_temperature(run, whole):
+            found = scale_line(plateaus, criteria)
+            rate = merged(plateaus.rate, plateaus.rate_error)
+            levels = len(np.unique(rate[np.abs(rate) >= criteria.small * np.abs(rate).max()]))
+            if found is not None and levels > most:
+                best, most = found, levels
     return best
 
 

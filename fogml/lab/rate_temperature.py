@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from fogml.lab.rate_pieces import Plateaus
 from fogml.runs.run import FloatArray, Run
 from fogml.validation.scale_factor import find_steps
 
@@ -18,6 +19,18 @@ SAME_DEGC = 2.0
 """Turns this close in temperature are one point: a soak."""
 LEAST_PIECE_S = 5.0
 """Shortest piece beside a step [s]: loop, slew and logger have settled long before."""
+
+
+def by_temperature(run: Run, plateaus: Plateaus) -> list[Plateaus]:
+    """The plateaus of each temperature, those that lie within `SAME_DEGC` of a neighbour's as one."""
+    if not run.temperature_columns or len(plateaus) == 0:
+        return [plateaus]
+    temperature = run.temperature("T")
+    at = np.array([temperature[a:b].mean() for a, b in zip(plateaus.start, plateaus.stop)])
+    order = np.argsort(at, kind="stable")
+    group = np.empty(len(at), dtype=np.intp)
+    group[order] = np.concatenate([[0], np.cumsum(np.diff(at[order]) > SAME_DEGC)])
+    return [plateaus[group == number] for number in range(int(group.max()) + 1)]
 
 
 @dataclass(frozen=True, eq=False)

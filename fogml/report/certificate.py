@@ -17,13 +17,13 @@ from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import model_card, stated_limits, unseen, worst_run
 from fogml.report.words import averages, listed, number, percent, unit_of
-from fogml.runs.run import FloatArray
+from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 _POINTS = 700
 _NOT_STATED, _NOT_TOLD = "not stated", "not told"
-SYNTHETIC = "synthetic"
-"""What the notes of a simulated run begin with."""
+_Z90 = 1.6449
+"""Standard errors to either side of a 90 % interval."""
 _TERMS = {"N": "Angle random walk", "B": "Bias instability", "K": "Rate random walk"}
 _MOST_RUNS = 8
 
@@ -155,37 +155,8 @@ def _runs(runs: Sequence[RunJudgement]) -> Table:
 
 
 def is_synthetic(judgement: Judgement) -> bool:
-    """Whether a run comes from a simulation: its notes begin with that word."""
-    notes = [run.facts.notes or "" for run in (*judgement.train, *judgement.test)]
-    notes += [note for run in (*judgement.train, *judgement.test) for note in run.notes]
-    return any(note.lower().startswith(SYNTHETIC) for note in notes)
-
-
-def sample_deviation(values: FloatArray) -> tuple[float, tuple[float, float]] | None:
-    """Standard deviation of averages over n - 1, and its 90 % interval; None of fewer than three.
-
-    The interval is that of independent normal averages, by chi-square with n - 1 degrees of freedom; a bias
-    that wanders makes it wider.
-    """
-    from scipy.stats import chi2
-
-    n = len(values)
-    if n < 3:
-        return None
-    deviation = float(np.std(values, ddof=1))
-    low, high = (deviation * float(np.sqrt((n - 1) / chi2.ppf(p, n - 1))) for p in (0.95, 0.05))
-    return deviation, (low, high)
-
-
-def at_constant_temperature(run: RunJudgement) -> FloatArray | None:
-    """Averages after compensation in the longest soak [deg/h], shape (m,); None where there is no soak."""
-    soak = np.concatenate([[False], run.series.regime == "soak", [False]])
-    edges = np.flatnonzero(np.diff(soak.astype(np.int8)))
-    spans = sorted(zip(edges[::2].tolist(), edges[1::2].tolist()), key=lambda span: span[0] - span[1])
-    if not spans:
-        return None
-    first, stop = spans[0]
-    return np.asarray(run.series.after[first:stop])
+    """Whether a run comes from a simulation."""
+    return any(run.facts.synthetic for run in (*judgement.train, *judgement.test))
 
 
 def _figures(run: RunJudgement) -> Table:
@@ -195,26 +166,28 @@ def _figures(run: RunJudgement) -> Table:
     def add(name: str, value: str, interval: str, how: str) -> None:
         rows.append(Row((name, value, interval, how)))
 
-    per = "over n \N{MINUS SIGN} 1"
-    for name, values, how in (
-        ("Bias stability over temperature", run.series.after, f"all of the run, {per}"),
-        ("Bias stability at constant temperature", at_constant_temperature(run), f"the longest soak, {per}"),
+    few = "fewer than three averages"
+    for name, found, how, without in (
+        ("Bias stability over temperature", over_temperature(run), "all of the run", few),
+        (
+            "Bias stability at constant temperature",
+            held_constant(run),
+            "the longest soak",
+            f"no soak, or {few}",
+        ),
+        ("Bias stability, 10 s averages", of_10_s(run), "all of the run", "samples too far apart"),
     ):
-        found = None if values is None else sample_deviation(values)
         if found is None:
-            add(name, _NOT_TOLD, "", "no soak of three averages" if values is None else per)
+            add(name, _NOT_TOLD, "", without)
         else:
-            deviation, (low, high) = found
-            add(name, f"{number(deviation)} deg/h", f"{number(low)} to {number(high)}", how)
-    if run.after.bias_stability_10s is not None:
-        ten = number(run.after.bias_stability_10s)
-        add("Bias stability, 10 s averages", f"{ten} deg/h", "", "all of the run, over n")
-    error = run.after.scale_factor_error
+            low, high = (number(end) for end in found.ci90)
+            add(name, f"{number(found.value)} deg/h", f"{low} to {high}", f"{how}, n = {found.n}")
+    error, se = run.after.scale_factor_error, run.scale_factor_se
     add(
         "Scale factor error",
         _NOT_TOLD if error is None else f"{number(error)} ppm",
-        "",
-        "the table does not turn" if error is None else "all turns",
+        "" if error is None or se is None else f"{number(error - _Z90 * se)} to {number(error + _Z90 * se)}",
+        "the table does not turn" if error is None else "all turns, by their scatter",
     )
     for name, term in (run.noise or {}).get("terms", {}).items():
         if name in _TERMS and term and term.get("value") is not None:

@@ -19,7 +19,8 @@ def north_page(values: Mapping[str, Any]) -> str:
         "north.html",
         title=f"{name} – north",
         name=name,
-        kicker="North from recorded positions" if recorded else "North seeking under a drift (synthetic)",
+        kicker=("North from recorded positions" if recorded else "North seeking under a drift")
+        + (" · synthetic data" if values["synthetic"] else ""),
         values=values,
         verdict=_recorded_verdict(values) if recorded else _simulated_verdict(values),
         tiles=_tiles(values),

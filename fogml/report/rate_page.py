@@ -22,7 +22,7 @@ def rate_page(values: Mapping[str, Any]) -> str:
         "rate.html",
         title=f"{values['source']} – rate table",
         name=values["source"],
-        kicker="Tests on a rate table" + (" (synthetic)" if values["kind"] == "simulated" else ""),
+        kicker="Tests on a rate table" + (" · synthetic data" if values["synthetic"] else ""),
         values=values,
         tiles=_tiles(values),
         result=_result(values),

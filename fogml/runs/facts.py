@@ -24,6 +24,8 @@ _EXAMPLES = {
     "started": "2026-03-02T08:00:00Z",
     "in_use_since": "2026-01-15T08:00:00Z",
 }
+SYNTHETIC = "synthetic"
+"""What the notes of a simulated run begin with."""
 NAMES = ("unit", "axis", "notes")
 """Facts that are names, as text however they are written."""
 
@@ -91,6 +93,11 @@ class Facts(BaseModel):
     in_use_since: Annotated[datetime | None, BeforeValidator(_moment)] = None
     compensated: bool | None = None
     notes: str | None = None
+
+    @property
+    def synthetic(self) -> bool:
+        """Whether the run comes from a simulation: its notes begin with that word."""
+        return (self.notes or "").lower().startswith(SYNTHETIC)
 
     @property
     def earth_rate_deg_h(self) -> float | None:

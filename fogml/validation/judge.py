@@ -211,6 +211,8 @@ def _judge_run(
         notes=(*((run.facts.notes,) if run.facts.notes else ()), *errors.notes, *metrics.notes),
         power_on_known=run.facts.powered_on is not None,
         facts=run.facts,
+        short_averages=metrics.short_averages,
+        scale_factor_se=metrics.scale_factor_se(after),
         table_rates=(float(run.rate.min()), float(run.rate.max())) if "rate" in run.columns else None,
     )
 

@@ -120,6 +120,17 @@ class RunMetrics:
             "the largest scale factor error of single turns leaves them out for their noise",
         )
 
+    @property
+    def short_averages(self) -> int:
+        """How many averages over 10 s there are; 0 where samples are too far apart."""
+        if self.run.sample_s > SHORT_AVERAGING_S / 2.0:
+            return 0
+        return len(self.averages(self._time, window_s=SHORT_AVERAGING_S))
+
+    def scale_factor_se(self, error_deg_h: FloatArray) -> float | None:
+        """Standard error of the scale factor error of an error series of the whole run [ppm]."""
+        return None if self._steps is None else scale_factor_error(self._steps, error_deg_h).se
+
     def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
         """Averages over the averaging time of columns that hold the used rows only."""
         return block_averages(self._time, *columns, window_s=window_s or self.averaging_s)

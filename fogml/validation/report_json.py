@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
+from fogml.validation.certified import set_up, with_uncertainty
 from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
 
@@ -73,6 +74,8 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "bias_reference": judged.bias_reference,
         "serial_number": judged.unit,
         "axis": judged.axis,
+        "set_up": set_up(judged),
+        "with_uncertainty": with_uncertainty(judged),
         "noise": judged.noise,
         "findings": [finding.as_dict() for finding in judged.findings],
         "notes": list(judged.notes),

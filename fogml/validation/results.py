@@ -89,7 +89,9 @@ class RunJudgement:
     ``facts`` are the run's, ``table_rates`` the least and the greatest rate of the table [deg/s], None where
     none is recorded. ``floor`` is the noise at ``averaging_s`` [deg/h] as `fogml.signals.floor` defines it,
     with its 90 % interval and where it comes from; ``noise`` the run's own Allan terms with their intervals
-    and the raw minimum, as in ``noise.json``, None where the run is too short for them.
+    and the raw minimum, as in ``noise.json``, None where the run is too short for them. ``short_averages`` is
+    how many averages over 10 s there are, ``scale_factor_se`` the standard error of the scale factor error
+    after compensation [ppm], by what the turns scatter about it.
     """
 
     run: str
@@ -112,6 +114,8 @@ class RunJudgement:
     table_rates: tuple[float, float] | None = None
     floor_ci90: tuple[float, float] | None = None
     floor_source: str = "the run itself"
+    short_averages: int = 0
+    scale_factor_se: float | None = None
 
 
 @dataclass(frozen=True)

@@ -79,12 +79,14 @@ class Steps:
 class ScaleFactorError:
     """Scale factor error [ppm]: by least squares over all steps, and the greatest of single turns.
 
-    The greatest is that of the turns of some size; `left_out` is how many others there are.
+    The greatest is that of the turns of some size; `left_out` is how many others there are. `se` is the
+    standard error of the first by what the turns scatter about it [ppm], None for one turn.
     """
 
     overall: float
     largest: float
     left_out: int = 0
+    se: float | None = None
 
 
 def find_steps(run: Run, full: BoolArray) -> Steps | None:
@@ -145,10 +147,24 @@ def scale_factor_error(steps: Steps, error_deg_h: FloatArray) -> ScaleFactorErro
     products = steps.of(error_deg_h) * steps.height
     squares = steps.height**2
     turns, member = np.unique(steps.turn, return_inverse=True)
-    each = np.bincount(member, products, len(turns)) / np.bincount(member, squares, len(turns))
+    weight = np.asarray(np.bincount(member, squares, len(turns)), dtype=np.float64)
+    each = np.bincount(member, products, len(turns)) / weight
     large = np.bincount(member, steps.large, len(turns)) > 0
+    overall = float(products.sum() / squares.sum())
     return ScaleFactorError(
-        overall=float(1e6 * products.sum() / squares.sum()),
+        overall=1e6 * overall,
         largest=float(1e6 * np.abs(each[large]).max()),
         left_out=int((~large).sum()),
+        se=_standard_error(each - overall, weight),
     )
+
+
+def _standard_error(off: FloatArray, weight: FloatArray) -> float | None:
+    """Of a weighted mean of turns [ppm] that are `off` it, each by its own; None for one turn.
+
+    A turn is one, as its steps share pieces.
+    """
+    turns = len(off)
+    if turns < 2:
+        return None
+    return float(1e6 * np.sqrt(weight**2 @ off**2 * turns / (turns - 1)) / weight.sum())

@@ -69,6 +69,23 @@ def test_temperature_sensitivity_is_the_sum_of_its_causes() -> None:
     assert of_a_twin()["notes"] == []
 
 
+def test_a_scale_factor_over_temperature_is_no_nonlinearity() -> None:
+    """Turns in soaks of one run: the line is that of one temperature, and the run is said to be synthetic."""
+    turns = [
+        "turn at 10 deg/s for 60 s, then -10 deg/s for 60 s, then 40 deg/s for 60 s, then -40 deg/s for 60 s"
+    ]
+    steps = [{"soak at 25 degC for 2 h": [f"{turns[0]}, from minute 100"]}, "ramp to 60 degC at 5 degC/min"]
+    steps += [{"soak at 60 degC for 3 h": [f"{turns[0]}, from minute 160"]}]
+    run = simulate(steps, Twin().with_nominal(k1=20.0), sample_s=1.0).run
+    told = rate_json([run], source="a run")
+    line = told["scale_factor"]
+    assert line["nonlinearity_ppm"] < 1.0 and abs(line["asymmetry_ppm"]) < 1.0
+    assert told["temperature_sensitivity"]["ppm_per_degC"] == pytest.approx(20.0, rel=0.01)
+    assert told["synthetic"] and told["kind"] == "recorded"
+    bare = Run(run.name, run.columns, run.facts.model_copy(update={"notes": None}))
+    assert not rate_json([bare], source="a run")["synthetic"]
+
+
 def test_a_lag_is_no_slew_limit() -> None:
     twin = Twin().with_effect("loop_gain", 5e-3, power_slope=0.0, leak_time=1e9)
     told = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0, 20.0])), source="twin", twin=twin)

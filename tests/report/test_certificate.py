@@ -10,9 +10,10 @@ import numpy as np
 import pytest
 
 from fogml.report import certificate
-from fogml.report.certificate import at_constant_temperature, by_unit, sample_deviation
+from fogml.report.certificate import by_unit
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
+from fogml.validation.certified import at_constant_temperature, sample_deviation, set_up, with_uncertainty
 from tests.report.judgements import judged_run, judgement
 from tests.report.pages import Page
 
@@ -108,9 +109,9 @@ def test_the_sheet_tells_synthetic_data_set_up_and_figures_over_n_less_one() -> 
     whole, held = run.series.after, at_constant_temperature(run)
     assert len(held) == len(whole) // 5
     for values in (whole, held):
-        told, (low, high) = sample_deviation(values)
-        assert told == pytest.approx(np.sqrt(((values - values.mean()) ** 2).sum() / (len(values) - 1)))
-        assert low < told < high
+        told = sample_deviation(values)
+        assert told.value == pytest.approx(np.sqrt(((values - values.mean()) ** 2).sum() / (len(values) - 1)))
+        assert told.ci90[0] < told.value < told.ci90[1]
     assert "over temperature" in text and "at constant temperature" in text
     assert "synthetic data" not in Page(certificate(judgement())).text
 
@@ -119,7 +120,25 @@ def test_the_interval_of_a_deviation_covers_the_truth() -> None:
     rng = np.random.default_rng(0)
     hits = 0
     for _ in range(1000):
-        _, (low, high) = sample_deviation(2.0 * rng.standard_normal(12))
+        low, high = sample_deviation(2.0 * rng.standard_normal(12)).ci90
         hits += low <= 2.0 <= high
     assert hits / 1000 == pytest.approx(0.9, abs=0.03)
     assert sample_deviation(np.zeros(2)) is None
+
+
+def test_the_json_states_what_the_sheet_does() -> None:
+    facts = Facts(latitude=39.9, input_axis="down", notes="synthetic: programme x, seed 1")
+    run = replace(
+        judged_run(), facts=facts, table_rates=(-10.0, 100.0), scale_factor_se=2.0, short_averages=41
+    )
+    run = replace(run, after=replace(run.after, bias_stability_10s=0.1))
+    told, figures = set_up(run), with_uncertainty(run)
+    assert told["synthetic"] and told["input_axis"] == "down" and told["latitude"] == 39.9
+    assert told["table_rate_deg_s"] == [-10.0, 100.0] and told["span_h"] > 0.0
+    short = figures["bias_stability_10s"]
+    # From over 41 to over 40.
+    assert short["value"] == pytest.approx(0.1 * np.sqrt(41.0 / 40.0)) and short["n"] == 41
+    assert figures["scale_factor_error_se"] == 2.0
+    assert figures["bias_stability_over_temperature"]["n"] == len(run.series.after)
+    text = Page(certificate(replace(judgement(), test=(run,)))).text
+    assert "n = 41" in text and "over n \N{MINUS SIGN} 1" in text

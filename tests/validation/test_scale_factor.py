@@ -67,3 +67,16 @@ def test_a_spike_within_a_transition_is_cut():
     error = 3600.0 * run.rate * 100.0 / MILLION
     error[np.flatnonzero(np.diff(run.rate)) + 1] += 1e4
     assert result(run, error).overall == pytest.approx(100.0, rel=1e-9)
+
+
+def test_the_standard_error_is_that_of_turns_that_scatter():
+    """Independent scale factors of single turns, by their definition over n - 1; none of one turn."""
+    run = turning_run(turns=6)
+    ppm = np.array([10.0, -20.0, 35.0, 5.0, -7.0, 60.0])
+    each = np.zeros(len(run))
+    for k, value in enumerate(ppm):
+        each[720 * k : 720 * (k + 1)] = value
+    found = result(run, 3600.0 * run.rate * each / MILLION)
+    assert found.overall == pytest.approx(ppm.mean())
+    assert found.se == pytest.approx(ppm.std(ddof=1) / np.sqrt(6.0))
+    assert result(turning_run(turns=1), np.zeros(len(turning_run(turns=1)))).se is None

@@ -1,0 +1,100 @@
+"""What a certificate states of a run: set-up, and figures with their uncertainty."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from fogml.runs.run import FloatArray
+from fogml.validation.results import RunJudgement
+
+_COVERAGE = 0.9
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Standard deviation of n averages over n - 1 [deg/h], and its 90 % interval.
+
+    The interval is that of independent normal averages, by chi-square with n - 1 degrees of freedom; a bias
+    that wanders makes it wider.
+    """
+
+    value: float
+    ci90: tuple[float, float]
+    n: int
+
+
+def sample_deviation(values: FloatArray) -> Deviation | None:
+    """Of averages [deg/h], shape (n,); None of fewer than three."""
+    return None if len(values) < 3 else _deviation(float(np.std(values, ddof=1)), len(values))
+
+
+def _deviation(value: float, n: int) -> Deviation:
+    from scipy.stats import chi2
+
+    outside = 0.5 * (1.0 - _COVERAGE)
+    low, high = (value * float(np.sqrt((n - 1) / chi2.ppf(p, n - 1))) for p in (1.0 - outside, outside))
+    return Deviation(value, (low, high), n)
+
+
+def at_constant_temperature(run: RunJudgement) -> FloatArray | None:
+    """Averages after compensation in the longest soak [deg/h], shape (m,); None where there is no soak."""
+    soak = np.concatenate([[False], run.series.regime == "soak", [False]])
+    edges = np.flatnonzero(np.diff(soak.astype(np.int8)))
+    spans = sorted(zip(edges[::2].tolist(), edges[1::2].tolist()), key=lambda span: span[0] - span[1])
+    if not spans:
+        return None
+    first, stop = spans[0]
+    return np.asarray(run.series.after[first:stop])
+
+
+def over_temperature(run: RunJudgement) -> Deviation | None:
+    """Bias stability over temperature: of all averages after compensation."""
+    return sample_deviation(run.series.after)
+
+
+def held_constant(run: RunJudgement) -> Deviation | None:
+    """Bias stability at constant temperature: in the longest soak."""
+    values = at_constant_temperature(run)
+    return None if values is None else sample_deviation(values)
+
+
+def of_10_s(run: RunJudgement) -> Deviation | None:
+    """Bias stability of 10 s averages; None where samples are too far apart or too few."""
+    stability, n = run.after.bias_stability_10s, run.short_averages
+    if stability is None or n < 3:
+        return None
+    # The figures' own is over n.
+    return _deviation(stability * float(np.sqrt(n / (n - 1))), n)
+
+
+def set_up(run: RunJudgement) -> dict[str, Any]:
+    """Where the data come from, start, span, rates and attitude, ready for JSON."""
+    series, facts = run.series, run.facts
+    attitude = facts.as_dict()
+    return {
+        "synthetic": facts.synthetic,
+        "started": attitude.get("started"),
+        "span_h": float(np.ptp(series.time) + run.averaging_s) / 3600.0,
+        "temperature_degC": [float(series.temperature.min()), float(series.temperature.max())],
+        "temperature_rate_degC_min": float(np.abs(series.rate).max(initial=0.0)),
+        "table_rate_deg_s": None if run.table_rates is None else list(run.table_rates),
+        "input_axis": attitude.get("input_axis"),
+        "latitude": facts.latitude,
+    }
+
+
+def with_uncertainty(run: RunJudgement) -> dict[str, Any]:
+    """Figures after compensation over n - 1 with their intervals [deg/h], ready for JSON.
+
+    Null where the run does not tell; ``scale_factor_error_se`` is in ppm.
+    """
+    figures = {
+        "bias_stability_over_temperature": over_temperature(run),
+        "bias_stability_at_constant_temperature": held_constant(run),
+        "bias_stability_10s": of_10_s(run),
+    }
+    told = {name: None if found is None else asdict(found) for name, found in figures.items()}
+    return {**told, "scale_factor_error_se": run.scale_factor_se}
