@@ -114,12 +114,9 @@ def _expected_rows(run: str) -> float | None:
     """About how many rows a file holds, for the time left; None where that would take reading it."""
     path = Path(run)
     if path.suffix.lower() == ".parquet" and path.is_file():
-        import pyarrow.parquet as parquet
+        from fogml.runs.parquet_files import parquet_rows
 
-        try:
-            return float(parquet.read_metadata(path).num_rows)
-        except (OSError, ValueError):
-            return None  # reading it says what is wrong
+        return float(parquet_rows(path))
     if path.suffix.lower() not in (".csv", ".txt") or not path.is_file():
         return None
     with path.open("rb") as file:

@@ -24,6 +24,7 @@ from fogml.lab.misalignment_states import DOCUMENT_ANGLES_DEG, STATES, stated
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.csv_dialect import csv_dialect
 from fogml.runs.facts import read_side_file, side_file
+from fogml.runs.parquet_files import parquet_marks
 from fogml.runs.raw_table import RawTable
 from fogml.runs.reading import file_format, read_table
 from fogml.runs.run import FloatArray
@@ -184,10 +185,7 @@ def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
             rows = [row for row in lines if any(field.strip() for field in row)][1:]
         marks = np.array([row[place].strip().lower() if place < len(row) else "" for row in rows])
     elif kind == "parquet":
-        from pyarrow import parquet
-
-        column = parquet.read_table(path, columns=[cell]).column(0).to_pylist()
-        marks = np.array([str(value).strip().lower() for value in column])
+        marks = np.char.lower(np.char.strip(parquet_marks(path, cell)))
     else:
         raise InputError(
             f"{table.file}: text in column 'segment' is read from CSV and Parquet files; export it as "

@@ -1,4 +1,4 @@
-"""Reads HDF5 and MATLAB files for `fogml.runs.reader_process`, in a process of its own, as a script.
+"""Reads HDF5, MATLAB and Parquet files for `fogml.runs.reader_process`, in a process of its own, as a script.
 
 The libraries behind these formats are written for sound files: a damaged one may end the process, hang it
 or take all memory. Here that ends no more than this process. It needs the standard library, NumPy and the
@@ -24,6 +24,9 @@ _MOST_TEXT = 1 << 20
 _DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
+_BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
+_BATCH_ROWS = 1 << 16
+_LONGEST_MARK = 100
 _RESERVED = ("units", "facts")
 
 
@@ -158,6 +161,102 @@ class Mat:
             self.opened.close()
 
 
+class Parquet:
+    """A Parquet file: one array per column."""
+
+    def __init__(self, path: str, keys: list[str]) -> None:
+        from pyarrow.parquet import ParquetFile
+
+        # Without a buffer, streaming would hold a column's whole row group, however large.
+        self.file = ParquetFile(
+            path,
+            pre_buffer=False,
+            memory_map=False,
+            buffer_size=_BUFFER_BYTES,
+            page_checksum_verification=True,
+        )
+        schema = self.file.schema_arrow
+        names = schema.names
+        self.arrays = [ParquetColumn(self.file, i) for i in range(len(names))]
+        metadata = {text_of(key): text_of(value) for key, value in (schema.metadata or {}).items()}
+        self.told = {
+            "arrays": [described(name, array) for name, array in zip(names, self.arrays, strict=True)],
+            "facts": {key: metadata[key] for key in keys if key in metadata},
+        }
+
+    def close(self) -> None:
+        self.arrays.clear()
+        self.file.close()
+
+
+class ParquetColumn:
+    """A column, read forward in batches: a slice that begins where the last one ended costs its own rows."""
+
+    ndim = 1
+
+    def __init__(self, file: Any, index: int) -> None:
+        import pyarrow.types as types
+
+        names, self.dtype = file.schema_arrow.names, ParquetType(file.schema_arrow.types[index])
+        self.file, self.name = file, names[index]
+        self.same = names[:index].count(self.name)
+        self.shape = (file.metadata.num_rows,)
+        kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
+        self.dtype.kind = "f" if any(is_kind(self.dtype.type) for is_kind in kinds) else "O"
+        self.at, self.ahead, self.batches = 0, None, iter(())
+
+    def parts(self, start: int, stop: int) -> Iterator[Any]:
+        """The rows from `start` to `stop`, as Arrow holds them, in pieces."""
+        if start == 0 or start < self.at:
+            rows = min(max(stop - start, 1), _BATCH_ROWS)
+            batches = self.file.iter_batches(batch_size=rows, columns=[self.name], use_threads=False)
+            self.at, self.ahead, self.batches = 0, None, (batch.column(self.same) for batch in batches)
+        while self.at < stop:
+            part = self.ahead if self.ahead is not None else next(self.batches, None)
+            if part is None:
+                raise Refused(f"row {self.at + 1} of column {self.name} is missing")
+            self.ahead = None
+            if len(part) > stop - self.at:
+                part, self.ahead = part[: stop - self.at], part[stop - self.at :]
+            skipped = min(max(start - self.at, 0), len(part))
+            self.at += len(part)
+            yield part[skipped:]
+
+    def __getitem__(self, part: tuple[slice]) -> np.ndarray[Any, Any]:
+        start, stop = part[0].start, part[0].stop
+        found, at = np.empty(stop - start), 0
+        for piece in self.parts(start, stop):
+            # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
+            found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+            at += len(piece)
+        return found
+
+    def marks(self) -> tuple[list[str], np.ndarray[Any, Any]]:
+        """The different texts of a column of marks, and the place of each row's among them."""
+        found: dict[str, int] = {}
+        codes = np.empty(self.shape[0])
+        at = 0
+        for piece in self.parts(0, self.shape[0]):
+            for value in piece.to_pylist():
+                codes[at] = found.setdefault(text_of(value)[:_LONGEST_MARK], len(found))
+                at += 1
+            if len(found) > _MOST_NAMES:
+                raise Refused(f"more than {_MOST_NAMES} different marks")
+        return list(found), codes
+
+
+class ParquetType:
+    """A column's type as `described` tells it."""
+
+    kind = "O"
+
+    def __init__(self, held: Any) -> None:
+        self.type = held
+
+    def __str__(self) -> str:
+        return str(self.type)
+
+
 def is_dataset(value: Any) -> bool:
     """Whether samples still lie in the file."""
     return hasattr(value, "is_virtual")
@@ -240,14 +339,20 @@ def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, An
         files.pop(number).close()
         return {}, b""
     if request["do"] == "open":
-        kind = {"hdf5": Hdf5, "mat": Mat}[request["kind"]]
+        kind, package = {
+            "hdf5": (Hdf5, "h5py"), "mat": (Mat, "scipy.io"), "parquet": (Parquet, "pyarrow.parquet")
+        }[request["kind"]]  # fmt: skip
         # What a reader needs is loaded before memory is limited.
-        __import__("h5py" if kind is Hdf5 else "scipy.io")
+        __import__(package)
         limit_memory(request["memory"])
         files[number] = kind(request["path"], request["keys"])
         return files[number].told, b""
-    found = samples(files[number].arrays[request["array"]], request["start"], request["stop"])
-    return {"count": len(found)}, found.data.cast("B") if len(found) else b""
+    array, names = files[number].arrays[request["array"]], []
+    if request["do"] == "marks":
+        names, found = array.marks()
+    else:
+        found = samples(array, request["start"], request["stop"])
+    return {"count": len(found), "names": names}, found.data.cast("B") if len(found) else b""
 
 
 def main(parent: int) -> None:

@@ -1,4 +1,4 @@
-"""HDF5 and MATLAB files, read in a process of its own with limits on time and memory.
+"""HDF5, MATLAB and Parquet files, read in a process of its own with limits on time and memory.
 
 What a file holds is parsed by `fogml.runs.reader_child`; here come its names and samples, and where it ends
 without an answer, a message that names the file.
@@ -27,7 +27,7 @@ from fogml.errors import InputError, printable
 
 CHILD = Path(__file__).with_name("reader_child.py")
 _LONGEST_ANSWER = 1 << 26
-_LABELS = {"hdf5": "HDF5 file of numbers", "mat": "MATLAB file"}
+_LABELS = {"hdf5": "HDF5 file of numbers", "mat": "MATLAB file", "parquet": "Parquet file"}
 
 
 @dataclass(frozen=True)
@@ -129,6 +129,18 @@ class StoredFile:
         self.ask({"do": "read", "array": array.index, "start": start, "stop": stop}, values)
         return values
 
+    def marks(self, array: StoredArray) -> NDArray[np.str_]:
+        """The texts of a column of marks, shape (n,).
+
+        Raises
+        ------
+        InputError
+            If the file is damaged there.
+        """
+        codes = np.empty(max(array.shape), dtype=np.float64)
+        names = self.ask({"do": "marks", "array": array.index}, codes)["names"]
+        return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
+
     def ask(self, request: Mapping[str, Any], into: NDArray[np.float64] | None = None) -> dict[str, Any]:
         """The answer to a request."""
         megabytes = self.path.stat().st_size / 1e6 if self.path.exists() else 0.0
@@ -159,7 +171,7 @@ class _Fault(Exception):
 
 @contextlib.contextmanager
 def stored_file(
-    path: Path, kind: Literal["hdf5", "mat"], keys: Sequence[str], limits: ReadingLimits
+    path: Path, kind: Literal["hdf5", "mat", "parquet"], keys: Sequence[str], limits: ReadingLimits
 ) -> Iterator[StoredFile]:
     """A file opened in the other process; `keys` are the attributes that are read.
 
@@ -211,6 +223,8 @@ class ReaderProcess:
     def __init__(self, script: Path = CHILD) -> None:
         # Plug-ins of HDF5 are other people's code; arithmetic in several threads is of no use here.
         environment = {**os.environ, "HDF5_PLUGIN_PRELOAD": "::", "OPENBLAS_NUM_THREADS": "1"}
+        # Other allocators reserve more than a limited process may have.
+        environment |= {"ARROW_DEFAULT_MEMORY_POOL": "system"}
         environment.pop("HDF5_PLUGIN_PATH", None)
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-W", "ignore", str(script), str(os.getpid())],

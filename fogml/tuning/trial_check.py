@@ -54,6 +54,14 @@ class _Attributes(BaseModel):
         return self
 
 
+class _Drawn(BaseModel):
+    """What was drawn and found."""
+
+    model_config = ConfigDict(strict=True)
+    params: dict[str, FiniteFloat | int | str | bool | None]
+    values: list[FiniteFloat] | None
+
+
 def check_trials(study: optuna.Study, plan: Plan) -> None:
     """Check every trial that is there.
 
@@ -74,6 +82,7 @@ def check_trials(study: optuna.Study, plan: Plan) -> None:
 def _fault(trial: FrozenTrial, objectives: int) -> str:
     try:
         told = _Attributes.model_validate(trial.user_attrs)
+        drawn = _Drawn.model_validate({"params": trial.params, "values": trial.values})
     except ValidationError as error:
         first = error.errors()[0]
         return f"{'.'.join(str(part) for part in first['loc'][:2])}: {first['msg']}".lstrip(": ")
@@ -81,7 +90,7 @@ def _fault(trial: FrozenTrial, objectives: int) -> str:
         return ""
     if "model" not in told.model_fields_set or told.features is None:
         return "it names no model and features"
-    if len(trial.values or ()) != objectives:
+    if len(drawn.values or ()) != objectives:
         return f"{objectives} values were expected"
     if not (told.fold_errors and all(told.fold_errors)) or told.bytes is None or told.operations is None:
         return "it holds no figures"

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import header, parse_header
+from fogml.runs.parquet_files import parquet_blocks
 from fogml.runs.run import FloatArray
 
 _PART = "contribution of "
@@ -131,19 +132,15 @@ def read_truth(path: str | Path) -> Truth:
     InputError
         If it can't be read or is none.
     """
-    import pyarrow as arrow
-
     path = Path(path)
+    if path.suffix.lower() == ".parquet":
+        return truth_from_columns(next(parquet_blocks(path, None)).columns, path.name)
+    import pyarrow as arrow
+    from pyarrow import csv
+
     try:
-        if path.suffix.lower() == ".parquet":
-            from pyarrow import parquet
-
-            table = parquet.read_table(path)
-        else:
-            from pyarrow import csv
-
-            # "nan" is a number: a column of nothing else stays one of numbers.
-            table = csv.read_csv(path, convert_options=csv.ConvertOptions(null_values=[""]))
+        # "nan" is a number: a column of nothing else stays one of numbers.
+        table = csv.read_csv(path, convert_options=csv.ConvertOptions(null_values=[""]))
         columns = {name: table.column(name).to_numpy() for name in table.column_names}
     except (OSError, arrow.ArrowException) as error:
         raise InputError(f"{path}: no truth can be read from it ({str(error).splitlines()[0]})") from None

@@ -387,7 +387,7 @@ def test_a_zero_byte_far_below_is_a_fault_of_its_line(write, tmp_path):
         ("unit: deg/s", "unit: deg/s, scale: '2'", "columns.gyro.scale"),
         ("unit: deg/s", "unit: deg/s, scale: true", "columns.gyro.scale"),
         ("description:", "encoding: punycode\ndescription:", "no text encoding is called 'punycode'"),
-        ("description:", 'encoding: "a\\0b"\ndescription:', "no text encoding"),
+        ("description:", 'encoding: "a\\0b"\ndescription:', "a character of code 0"),
         ("description:", "skip_lines: 9000000000\ndescription:", "no data rows"),
         ("description:", "header_lines: 9000000000\ndescription:", "no data rows"),
         ("description:", "fields: 9000000000\ndescription:", "9000000000 fields were expected"),

@@ -1,4 +1,4 @@
-"""HDF5 and MATLAB files in a process of their own: whatever they do to it, the caller gets a message."""
+"""Files in a process of their own: whatever they do to it, the caller gets a message."""
 
 from __future__ import annotations
 
@@ -31,6 +31,8 @@ def hdf5(tmp_path):
 def test_files_that_crash_or_hang_their_library_are_damaged_files():
     with pytest.raises(InputError, match=r"crashes\.mat: damaged"):
         read_run(DAMAGED / "crashes.mat")
+    with pytest.raises(InputError, match=r"crashes\.parquet: damaged"):
+        read_run(DAMAGED / "crashes.parquet")
     with pytest.raises(InputError, match=r"hangs\.h5: damaged"):
         read_run(DAMAGED / "hangs.h5", limits=ReadingLimits(cpu_s=1.0))
 

@@ -18,11 +18,15 @@ SOUND: dict[str, Any] = {
 }  # fmt: skip
 
 
-def checked(home: object, **attributes: Any) -> None:
+def checked(home: object, drawn: dict[str, Any] | None = None, **attributes: Any) -> None:
     optuna.logging.disable_default_handler()
     study = optuna.create_study()
     told = {key: value for key, value in {**SOUND, **attributes}.items() if value is not ...}
-    study.add_trial(create_trial(state=TrialState.COMPLETE, value=1.0, user_attrs=told))
+    trial = create_trial(state=TrialState.COMPLETE, value=1.0, user_attrs=told)
+    trial.number = 0
+    for name, value in (drawn or {}).items():
+        setattr(trial, f"_{name}", value)
+    study.get_trials = lambda deepcopy=True: [trial]
     check_trials(study, plan(home))
 
 
@@ -49,3 +53,12 @@ def test_what_a_sweep_writes_is_taken(tmp_path, attributes):
 def test_what_it_does_not_write_is_told(tmp_path, attributes):
     with pytest.raises(InputError, match="trial 0 is damaged"):
         checked(tmp_path, **attributes)
+
+
+@pytest.mark.parametrize(
+    "drawn",
+    [{"values": ["low"]}, {"values": [float("inf")]}, {"params": {3: 1.0}}, {"params": {"ridge": []}}],
+)
+def test_what_it_does_not_draw_is_told(tmp_path, drawn):
+    with pytest.raises(InputError, match="trial 0 is damaged"):
+        checked(tmp_path, drawn)
