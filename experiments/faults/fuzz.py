@@ -79,21 +79,25 @@ def fuzz(
         tally = Tally(limits, seed)
         do = functools.partial(_one, seed, world, kinds, limits)
         shown = began
-        for index, outcome in outcomes(inputs, do, Path(name), limits, workers=workers):
-            if time.monotonic() - began > most_s:
-                break
-            kind, case = drawn(seed, max(index, 0), world, kinds)
-            tally.note(kind.name, outcome)
-            if kept is not None and outcome.faults:
-                _keep(kept, kind.name, index, case, outcome)
-            if progress and time.monotonic() - shown > _SHOWN_EVERY_S:
-                shown = time.monotonic()
-                print(
-                    f"{tally.inputs} of {inputs}, {shown - began:.0f} s: {tally.line()}",
-                    file=sys.stderr,
-                    flush=True,
-                )
-    return tally.values(time.monotonic() - began)
+        notes = []
+        try:
+            for index, outcome in outcomes(inputs, do, Path(name), limits, workers=workers):
+                if time.monotonic() - began > most_s:
+                    break
+                kind, case = drawn(seed, max(index, 0), world, kinds)
+                tally.note(kind.name, outcome)
+                if kept is not None and outcome.faults:
+                    _keep(kept, kind.name, index, case, outcome)
+                if progress and time.monotonic() - shown > _SHOWN_EVERY_S:
+                    shown = time.monotonic()
+                    print(
+                        f"{tally.inputs} of {inputs}, {shown - began:.0f} s: {tally.line()}",
+                        file=sys.stderr,
+                        flush=True,
+                    )
+        except Exception as error:  # a fault of the examination itself loses no count
+            notes = [f"The examination itself ended early: {error!r}."]
+    return tally.values(time.monotonic() - began) | {"notes": notes}
 
 
 def _one(

@@ -237,7 +237,9 @@ def _structured_hdf5(rng: Random) -> bytes:
             else:
                 file[cell] = values
         if rng.random() < 0.4:
-            key, value = rng.choice(list(mutate.tree(rng, sound.FACTS).items()) or [("latitude", 1)])
+            facts = mutate.tree(rng, sound.FACTS)
+            stated = list(facts.items()) if isinstance(facts, dict) else []
+            key, value = rng.choice(stated or [("latitude", 1)])
             try:
                 file.attrs[key] = value if isinstance(value, str | int | float) else json.dumps(value)
             except (TypeError, ValueError, OSError, RuntimeError, OverflowError):

@@ -85,7 +85,8 @@ def test_every_unit_of_the_run_format_is_tested():
     conversions = {(spec.name, unit) for spec in KNOWN.values() for unit in spec.units if unit != "count"}
     trivial = {(name, unit) for name, unit in conversions if unit == KNOWN[name].internal}
     assert conversions - trivial - tested <= {
-        ("compressor", "%"), ("heater", "%"), ("B_y", "G"), ("B_z", "G"), ("T_case", "K")
+        ("compressor", "%"), ("heater", "%"), ("B_y", "G"), ("B_z", "G"), ("T_case", "K"),
+        ("T_top", "K"), ("T_bottom", "K"),
     }  # fmt: skip
 
 
