@@ -151,7 +151,10 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
                 rows = write_world(before, out, run.truth, work.advance)
             terminal.say(f"{rows} samples of {programme.name}, started {run.started}, written to {out}")
             results.append({"run": out.name, "rows": rows, "started": run.started.isoformat()})
-    terminal.result({"schema": "fogml.simulation/1", "twin": twin.name, "runs": results})
+    for note in twin.notes:
+        terminal.say(note)
+    values = {"schema": "fogml.simulation/1", "twin": twin.name, "runs": results, "notes": list(twin.notes)}
+    terminal.result(values)
 
 
 def _simulate(
@@ -187,6 +190,7 @@ def _print(
         "programme": programme.name,
         "twin": twin.name,
         "effects": list(twin.settings),
+        "notes": list(twin.notes),
     }
     terminal.say(
         f"{rows} samples every {settings.sample_s:g} s, {programme.total_hours:.3g} h of {programme.name}, "
@@ -194,6 +198,8 @@ def _print(
     )
     on = ", ".join(twin.settings) or "none"
     terminal.say(f"Twin {twin.name}, seed {settings.seed}; effects: {on}.")
+    for note in twin.notes:
+        terminal.say(note)
     if settings.truth:
         terminal.say(f"The truth of every node and effect is in {settings.truth}.")
     terminal.result(values)

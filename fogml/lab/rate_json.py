@@ -109,7 +109,8 @@ def rate_json(
         "ladder": _ladder(read),
         "unit": None if twin is None else unit_facts(twin),
     }
-    return values | {"notes": _notes(values)}
+    told = () if twin is None else twin.notes
+    return values | {"notes": [*told, *_notes(values)]}
 
 
 def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:

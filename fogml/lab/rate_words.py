@@ -23,7 +23,7 @@ def result_rows(values: Mapping[str, Any], number: Number) -> list[ResultRow]:
     rows = []
     line = values["scale_factor"]
     if line is not None:
-        ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm"
+        ppm = f"{1e6 * (line['scale_factor'] - 1.0):+.1f} ppm".replace("-", "\N{MINUS SIGN}")
         rows.append(ResultRow("scale factor", f"{line['scale_factor']:.7f}", number(line["se"]), "1", ppm))
         for key, name in (("nonlinearity_ppm", "nonlinearity"), ("asymmetry_ppm", "asymmetry")):
             if line[key] is not None:

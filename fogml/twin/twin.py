@@ -148,6 +148,23 @@ class Twin:
         course = self.settings.get("light_power")
         return Light(self.receiver) if course is None else Light(self.receiver, **course.shape)
 
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What of its noise does not go together as one may think, in sentences."""
+        if not self.noise.N:
+            return ()
+        stated = f"noise: N = {self.noise.N:g} deg/sqrt(h)"
+        if "arw_physics" in self.settings:
+            return (
+                f"{stated} comes on top of the photon noise of 'arw_physics'; state N: 0 for that alone.",
+            )
+        if "light_power" in self.settings:
+            return (
+                f"{stated} stays as it is where 'light_power' takes light away; the effect 'arw_physics' in "
+                "its place goes with the light.",
+            )
+        return ()
+
     @cached_property
     def network(self) -> ThermalNetwork:
         """The thermal plant with the effects that change it, and with the coil's ends if they are needed."""

@@ -274,3 +274,12 @@ def test_axial_gradient_brings_its_nodes_and_replays() -> None:
     assert np.abs(replay(stated, made.run, only="axial_gradient")).max() != pytest.approx(
         np.abs(replay(twin, made.run, only="axial_gradient")).max(), rel=0.1
     )
+
+
+def test_a_noise_stated_as_a_number_is_said_not_to_follow_the_light() -> None:
+    twin = Twin(noise=NoiseConstants(N=0.01))
+    assert twin.notes == ()
+    (dimmed,), (doubled,) = twin.with_effect("light_power").notes, twin.with_effect("arw_physics").notes
+    assert "N = 0.01 deg/sqrt(h) stays as it is" in dimmed and "'arw_physics' in its place" in dimmed
+    assert "comes on top of the photon noise" in doubled
+    assert Twin().with_effect("light_power").with_effect("arw_physics").notes == ()
