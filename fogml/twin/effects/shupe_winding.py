@@ -23,8 +23,8 @@ class ShupeWinding(BiasEffect):
     that of ``pigtail_shupe``: d_1 and d_2 are the rates of T_electronics and T_case less that of T. Length,
     diameter, winding, layers, pitch, diffusivity and leads are those of the twin's ``coil``. A is the size
     over that of theory, 1 for a faultless winding; crossings and uneven tension make up to some times as
-    much. At the onset of a ramp of 1 degC/min the reference coil has 22 (cylinder), 1.7 (dipole), 0.22
-    (quadrupole) or 0.05 deg/h (octupole) with faces 120 and 240 s behind; on its plateau none.
+    much. At the onset of a ramp of 1 degC/min the reference coil has 22.5 (cylinder), 1.76 (dipole), 0.23
+    (quadrupole) or 0.054 deg/h (octupole) with faces 120 and 240 s behind; on its plateau none.
 
     Source: Shupe, Applied Optics 19 (1980) 654; Frigo, SPIE 412 (1983) 268; conduction derived; the range of
     A is an engineering one.
