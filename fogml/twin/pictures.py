@@ -53,7 +53,7 @@ class Picture:
         Chamber air [degC], shape (n,).
     values
         The effect's part of the output [deg/h], shape (n,). Of a thermal effect that acts by way of the
-        plant, what it changes in the temperature of the first of `places` [degC].
+        plant, what it changes in the temperature of the first of `places`, where that is most [degC].
     unit
         Of the values.
     places
@@ -178,8 +178,9 @@ def _picture(declared: Effect, on: Scene) -> Picture:
         plain = _truth(on, unit)
         changes = {name: (true.nodes[name] - plain.nodes[name])[shown] for name in PLACES}
         changed = {name: change for name, change in changes.items() if change.any()} or changes
-        first = next(iter(changed))
-        return Picture(on.name, hours, chamber, changed[first], "degC", changed)
+        most = max(changed, key=lambda name: float(np.abs(changed[name]).max()))
+        ordered = {most: changed[most], **changed}
+        return Picture(on.name, hours, chamber, changed[most], "degC", ordered)
     drawn = isinstance(declared, NoiseEffect) and not declared.steady
     values = true.noise if drawn else true.contributions[declared.id]
     return Picture(on.name, hours, chamber, values[shown])

@@ -42,7 +42,7 @@ class ArwPhysics(WhiteNoiseEffect):
         "H. C. Lefevre, The Fiber-Optic Gyroscope",
         "arXiv 2208.11213",
     )
-    shows = "the Allan deviation at middle times, with slope -1/2; more of it far from room temperature"
+    shows = "the Allan deviation at middle times, with slope -1/2; more off 25 degC unless excess noise leads"
     confused_with = {
         "angle_random_walk": "not apart: this one says where that one comes from",
     }
