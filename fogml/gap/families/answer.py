@@ -240,8 +240,7 @@ def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOu
     rows = []
     for others in [[], beside] if beside else [[]]:
         ids = tuple(dict.fromkeys(found.columns.families[m.family].id for m in others))
-        held = found.field.beside([(m.node, m.size) for m in others])
-        for f, member in search.best_members(held).items():
+        for f, member in search.best_members(others).items():
             family = found.columns.families[f]
             if family.kind != "known" or family.id in ids:
                 continue

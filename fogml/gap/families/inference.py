@@ -39,7 +39,7 @@ WHITE_FACTORS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
 """White noise beside what was found, over that beside nothing."""
 SURE = 5
 """Sets by which white noise is judged again."""
-RESCORED = 40
+RESCORED = 24
 """Sets whose evidence is taken at every noise."""
 Progress = Callable[[str], None]
 

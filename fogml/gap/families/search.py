@@ -7,10 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import solve_triangular
 
-from fogml.gap.families.family import Family
+from fogml.gap.families.blocks import Blocks
 from fogml.gap.families.frame import Field
-from fogml.gap.families.linear_gaussian import LinearGaussian, log_sum_exp, size_gains
+from fogml.gap.families.linear_gaussian import log_sum_exp, size_gains
 from fogml.runs.run import FloatArray
 
 REFINED = 12
@@ -70,17 +71,14 @@ class Explanation:
 
 
 @dataclass(frozen=True, eq=False)
-class _Blocks:
-    """A family's nodes at one noise: their prior by size, and their inner products beside the constants.
+class _Held:
+    """Members that are integrated out: their rows of inner products, sizes, a factor, the data along it."""
 
-    ``groups`` hold blocks of one width: rows among the nodes, places of columns, inner products.
-    """
-
-    nodes: list[int]
-    prior: FloatArray
-    lengths: FloatArray
-    span: slice
-    groups: list[tuple[FloatArray, FloatArray, FloatArray]]
+    rows: list[FloatArray]
+    size: FloatArray
+    factor: FloatArray
+    along: FloatArray
+    log_evidence: float
 
 
 class Search:
@@ -97,11 +95,11 @@ class Search:
         self.priors = held.setting.priors
         self.families = held.columns.families
         self.log_odds = self._log_odds()
-        self._known = held.base.basis.shape[1]
+        self._rows: dict[int, FloatArray] = {}
         self._across = held.base.basis.T @ held.white
         self._fits = held.white.T @ held.base.data - self._across.T @ (held.base.basis.T @ held.base.data)
-        self.blocks = {f: self._blocks(f) for f in range(len(self.families))}
-        self.blocks = {f: b for f, b in self.blocks.items() if b.nodes}
+        every = {f: Blocks.of(held, self._across, f) for f in range(len(self.families))}
+        self.blocks = {f: b for f, b in every.items() if b.nodes}
 
     def explanations(self) -> list[Explanation]:
         """The sets worth keeping, the likeliest first.
@@ -142,12 +140,12 @@ class Search:
 
     def alone(self) -> Mapping[int, float]:
         """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
-        across, fits = self._beside(self.field.base)
+        across, fits = self._beside(self._held(()))
         return {f: log_sum_exp(self._gains(f, across, fits) + b.prior) for f, b in self.blocks.items()}
 
-    def best_members(self, held: LinearGaussian) -> dict[int, Member]:
-        """The node and size that stand for each family beside what is held."""
-        across, fits = self._beside(held)
+    def best_members(self, beside: Sequence[Member]) -> dict[int, Member]:
+        """The node and size that stand for each family beside members."""
+        across, fits = self._beside(self._held(beside))
         return {f: self._averaged(f, self._gains(f, across, fits))[0] for f in self.blocks}
 
     def exchanged(self, explanation: Explanation, family: int) -> dict[int, Explanation]:
@@ -191,8 +189,7 @@ class Search:
         """The set without some families, at the one noise."""
         members = tuple(m for m in explanation.members if m.family not in families)
         prior = sum(self._odds(members[:i], m.family) for i, m in enumerate(members))
-        held = self.field.beside([(m.node, m.size) for m in members])
-        return Explanation(members, prior, held.log_evidence)
+        return Explanation(members, prior, self._held(members).log_evidence)
 
     def _odds(self, members: Sequence[Member], f: int) -> float:
         """Of a family beside members: a second one of a known family, or unknown, is a mixture of forms."""
@@ -215,12 +212,12 @@ class Search:
 
     def _each_more(self, explanation: Explanation, joining: Sequence[int]) -> dict[int, Explanation]:
         """The set with each of some families more."""
-        held = self.field.beside(explanation.nodes)
+        held = self._held(explanation.members)
         across, fits = self._beside(held)
         return {f: self._grown(explanation, held, f, across, fits) for f in joining}
 
     def _grown(
-        self, rest: Explanation, held: LinearGaussian, f: int, across: FloatArray, fits: FloatArray
+        self, rest: Explanation, held: _Held, f: int, across: FloatArray, fits: FloatArray
     ) -> Explanation:
         gains = self._gains(f, across, fits)
         member, averaged, spread = self._averaged(f, gains)
@@ -245,7 +242,7 @@ class Search:
         spreads = [0.0] * len(members)
         total = explanation.log_evidence
         for i, member in enumerate(members):
-            held = self.field.beside([(m.node, m.size) for j, m in enumerate(members) if j != i])
+            held = self._held([m for j, m in enumerate(members) if j != i])
             across, fits = self._beside(held, self.blocks[member.family].span)
             gains = self._gains(member.family, across, fits, self.blocks[member.family].span.start)
             members[i], averaged, spreads[i] = self._averaged(member.family, gains)
@@ -254,11 +251,34 @@ class Search:
             explanation, members=tuple(members), log_evidence=total + sum(spreads), spread=sum(spreads)
         )
 
-    def _beside(self, held: LinearGaussian, span: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
+    def _row(self, node: int) -> FloatArray:
+        """Inner products of a node's columns with all columns beside the constants, shape (k, columns)."""
+        if node not in self._rows:
+            own = self.field.block(node).T @ self.field.white
+            self._rows[node] = own - self._across[:, self.field.at[node]].T @ self._across
+        return self._rows[node]
+
+    def _held(self, members: Sequence[Member]) -> _Held:
+        """The data beside constants and members, by inner products alone."""
+        spans = [self.field.at[m.node] for m in members]
+        at = np.concatenate([np.arange(s.start, s.stop) for s in spans] or [np.arange(0)])
+        size = np.concatenate(
+            [np.full(s.stop - s.start, m.size) for s, m in zip(spans, members)] or [np.empty(0)]
+        )
+        rows = [self._row(m.node) for m in members]
+        gram = np.concatenate([row[:, at] for row in rows] or [np.empty((0, 0))]) * np.outer(size, size)
+        factor = np.linalg.cholesky(np.eye(len(at)) + 0.5 * (gram + gram.T))
+        along = solve_triangular(factor, size * self._fits[at], lower=True) if members else np.empty(0)
+        gained = 0.5 * float(along @ along) - float(np.log(np.diagonal(factor)).sum())
+        return _Held(rows, size, factor, along, self.field.base.log_evidence + gained)
+
+    def _beside(self, held: _Held, span: slice = slice(None)) -> tuple[FloatArray, FloatArray]:
         """Of columns: inner products with what is held beyond the constants, and with the data beside it."""
-        more = held.basis[:, self._known :]
-        across = more.T @ self.field.white[:, span]
-        return across, self._fits[span] - across.T @ (more.T @ held.data)
+        if not held.rows:
+            return np.empty((0, len(self._fits[span]))), self._fits[span]
+        rows = np.concatenate([row[:, span] for row in held.rows])
+        across = solve_triangular(held.factor, held.size[:, None] * rows, lower=True, check_finite=False)
+        return across, self._fits[span] - across.T @ held.along
 
     def _gains(self, f: int, across: FloatArray, fits: FloatArray, first: int = 0) -> FloatArray:
         """Gain of each node of a family at each size, shape (nodes, sizes); columns begin at `first`."""
@@ -271,25 +291,6 @@ class Search:
             out[rows] = size_gains(gram, fits[at], blocks.lengths)
         return out
 
-    def _blocks(self, f: int) -> _Blocks:
-        held, family = self.field, self.families[f]
-        nodes = [i for i, n in enumerate(held.columns.nodes) if n.family == f and i in held.at]
-        lengths = self.priors.plant_lengths if family.kind == "plant" else self.priors.lengths
-        weights = np.array([held.columns.nodes[n].log_weight for n in nodes])
-        prior = weights[:, None] - math.log(len(lengths)) + self._range_penalties(family, nodes, lengths)
-        widths: dict[int, list[int]] = {}
-        for row, n in enumerate(nodes):
-            widths.setdefault(held.at[n].stop - held.at[n].start, []).append(row)
-        groups = []
-        for rows in widths.values():
-            places = np.array([np.arange(held.at[nodes[r]].start, held.at[nodes[r]].stop) for r in rows])
-            grams = np.array([held.block(nodes[r]).T @ held.block(nodes[r]) for r in rows])
-            beside = self._across.T[places]
-            groups.append((np.array(rows), places, grams - beside @ beside.transpose(0, 2, 1)))
-        spans = [held.at[n] for n in nodes]
-        span = slice(min(s.start for s in spans), max(s.stop for s in spans)) if spans else slice(0, 0)
-        return _Blocks(nodes, prior, lengths, span, groups)
-
     def _log_odds(self) -> FloatArray:
         count = {kind: sum(f.kind == kind for f in self.families) for kind in ("known", "unknown", "plant")}
         mass = {
@@ -298,14 +299,3 @@ class Search:
             "plant": self.priors.other_plant,
         }
         return np.array([self.priors.log_odds(min(mass[f.kind] / count[f.kind], 0.5)) for f in self.families])
-
-    def _range_penalties(self, family: Family, nodes: Sequence[int], lengths: FloatArray) -> FloatArray:
-        """Logarithm of how likely each node's sizes are by the card's range, shape (nodes, sizes)."""
-        if family.kind != "known":
-            return np.zeros((len(nodes), len(lengths)))
-        from fogml.twin.registry import effect
-
-        _, high = effect(family.id).amplitude.range(self.field.setting.scene.grade)  # type: ignore[arg-type]
-        scales = np.array([self.field.scale[n] for n in nodes])
-        over = np.log(np.maximum(scales[:, None] * lengths / high, 1.0))
-        return np.asarray(-0.5 * (over / math.log(self.priors.beyond_range)) ** 2)
