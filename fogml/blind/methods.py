@@ -11,8 +11,8 @@ from fogml.blind.folders import DIAGNOSIS, CaseFiles
 from fogml.errors import InputError
 from fogml.json_files import write_json
 
-Method = Callable[[CaseFiles, Path], Any]
-"""Reads a case's runs and writes ``gap.json`` into a folder."""
+Method = Callable[..., Any]
+"""Reads a case's runs, given as `CaseFiles`, and writes ``gap.json`` into a folder; options by name."""
 
 _PACKAGE = "fogml.blind"
 FAMILIES = "families"
@@ -77,8 +77,8 @@ def diagnosis(case: CaseFiles, out: Path) -> Any:
     return found
 
 
-def families(case: CaseFiles, out: Path) -> Any:
-    """The diagnosis on families; as `diagnosis`."""
+def families(case: CaseFiles, out: Path, *, cost_of_false_name: float = 1.0) -> Any:
+    """The diagnosis on families; as `diagnosis`, with the cost of a false name over that of a missed one."""
     from fogml.gap.families.answer import diagnose
     from fogml.gap.twin_model import TwinModel
     from fogml.runs.reading import read_run
@@ -92,6 +92,7 @@ def families(case: CaseFiles, out: Path) -> Any:
         noise=read_run(case.noise) if case.noise else None,
         without=case.without,
         seed=case.seed,
+        cost_of_false_name=cost_of_false_name,
     )
     write_json(out / "gap.json", found.as_dict(), indent=None)
     found.write_model(model, out / "twin.yaml")

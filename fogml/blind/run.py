@@ -56,6 +56,8 @@ class RunPlan:
         Folder of the answers, where it is not the method's.
     seed
         Of what a method draws.
+    options
+        What the method is asked besides, by name.
     """
 
     folder: BlindFolder
@@ -70,6 +72,7 @@ class RunPlan:
     only: tuple[str, ...] | None = None
     into: Path | None = None
     seed: int = 0
+    options: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         i, n = self.shard
@@ -234,7 +237,9 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
     files = case_stamp(case)
     out.mkdir()
     try:
-        answer = worker.ask({"case": name, "out": out.name, "seed": plan.seed}, plan.limit_s)
+        answer = worker.ask(
+            {"case": name, "out": out.name, "seed": plan.seed, "options": plan.options}, plan.limit_s
+        )
         if answer["done"] and not (out / "gap.json").is_file():
             answer |= {"done": False, "reason": "no answer", "message": "no gap.json was written"}
     except WorkerLost as lost:

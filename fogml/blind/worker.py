@@ -1,7 +1,7 @@
 """The sealed process that answers cases: one line of JSON in, one line out, many cases in a life.
 
 ``python -m fogml.blind.worker METHOD [CODE_FOLDER]`` in the folder that it may use; METHOD is
-``package.module:function``, called with `CaseFiles` and the folder for its answer.
+``package.module:function``, called with `CaseFiles`, the folder for its answer, and options.
 """
 
 from __future__ import annotations
@@ -47,7 +47,9 @@ def _answer(method: Any, home: Path, line: str) -> dict[str, Any]:
     began = time.perf_counter()
     answer: dict[str, Any] = {"case": asked["case"], "done": True, "reason": None, "message": ""}
     try:
-        method(case_files(home / asked["case"], asked["seed"]), home / asked["out"])
+        method(
+            case_files(home / asked["case"], asked["seed"]), home / asked["out"], **asked.get("options", {})
+        )
     except FogmlError as error:
         answer |= {"done": False, "reason": "refused", "message": str(error)}
     except Exception as error:

@@ -105,7 +105,7 @@ def run(
         list[str] | None,
         typer.Option(
             "--method",
-            help="diagnosis (default), a baseline's name, 'baselines', or module:function; may be repeated.",
+            help="diagnosis (default), families, a baseline, 'baselines', or module:function; repeatable.",
         ),
     ] = None,
     code: Annotated[
@@ -121,6 +121,14 @@ def run(
         str | None, typer.Option("--shard", metavar="I/N", help="Every N-th case from the I-th on.")
     ] = None,
     retry: Annotated[bool | None, typer.Option("--retry", help="Try failed cases again.")] = None,
+    cost: Annotated[
+        float | None,
+        typer.Option(
+            "--cost-of-false-name",
+            metavar="RATIO",
+            help="Of 'families': a false name costs so many times what a missed one does (1).",
+        ),
+    ] = None,
     seed: options.Seed = None,
     config: options.Config = None,
     as_json: options.Json = False,
@@ -139,6 +147,7 @@ def run(
         "limit": limit,
         "shard": shard,
         "retry": retry,
+        "cost_of_false_name": cost,
         "seed": seed,
     }
     run_and_tell(RunSettings.gather(config, flags), Terminal(as_json, quiet))

@@ -82,6 +82,7 @@ class RunSettings(SuiteSettings):
     limit: float = 600.0
     shard: str = "1/1"
     retry: bool = False
+    cost_of_false_name: float | None = None
 
     @property
     def part(self) -> tuple[int, int]:
@@ -185,13 +186,18 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer cases by each method, and say how many failed."""
-    from fogml.blind.methods import BASELINES, ORACLE
+    from fogml.blind.methods import BASELINES, FAMILIES, ORACLE
     from fogml.blind.oracle_run import run_oracle
     from fogml.blind.run import RunPlan, run_cases
 
     methods = [m for name in settings.methods for m in (BASELINES if name == _BASELINES else (name,))]
     if len(methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
+    options = {}
+    if settings.cost_of_false_name is not None:
+        if methods != [FAMILIES] or not settings.cost_of_false_name > 0.0:
+            raise InputError(f"--cost-of-false-name: a positive number, for --method {FAMILIES} alone")
+        options = {"cost_of_false_name": settings.cost_of_false_name}
     told = {}
     config = settings.in_full().yaml("blind run", "run.yaml")
     for method in methods:
@@ -206,6 +212,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
             shard=settings.part,
             retry=settings.retry,
             seed=settings.seed,
+            options=options,
         )
         with terminal.work(method, total=len(plan.left())) as work:
 

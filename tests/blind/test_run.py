@@ -10,6 +10,8 @@ import pytest
 from fogml.blind.folders import BlindFolder
 from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
 from fogml.blind.sealing import own_roots
+from fogml.cli.blind_job import RunSettings, run_and_tell
+from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 
 CHEAT = """
@@ -149,3 +151,9 @@ def test_a_truth_among_readable_folders_is_refused(folder: BlindFolder) -> None:
 def test_a_method_that_does_not_load_is_said_at_once(folder: BlindFolder) -> None:
     with pytest.raises(InputError, match="did not start"):
         run_cases(RunPlan(folder, "nowhere:nothing"))
+
+
+def test_the_cost_of_a_false_name_is_asked_of_families_alone(folder: BlindFolder) -> None:
+    settings = RunSettings(directory=str(folder.path), methods=["abstain"], cost_of_false_name=3.0)
+    with pytest.raises(InputError, match="families"):
+        run_and_tell(settings, Terminal())
