@@ -45,8 +45,8 @@ class Cause:
 
     @property
     def odds(self) -> float:
-        """Logarithm of its odds, by the evidence or by what carries over, whichever is less."""
-        return min(_log_odds(self.evidence), max(self.carried, 0.0))
+        """Logarithm of its odds by the evidence, less what the runs foretell each other worse with it."""
+        return _log_odds(self.evidence) + min(self.carried, 0.0)
 
 
 @dataclass(frozen=True)
@@ -64,8 +64,8 @@ class Judgement:
 def judge(found: Inference) -> Judgement:
     """Causes of the likeliest set with their classes.
 
-    The odds of a cause are those of all sets that hold a member of its class, or those by which it helps to
-    foretell each run from the others where these are lower, through the prior's trust.
+    The odds of a cause are those of all sets that hold a member of its class; where runs foretell each other
+    worse with it than with the best of what is unknown in its place, less so. The prior's trust maps them.
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
     best = found.explanations[0]
@@ -97,7 +97,7 @@ def judge(found: Inference) -> Judgement:
 
     known_share = 1.0 - weight(lambda e: any(families[f].kind == "unknown" for f in e.key))
     for cause in causes:
-        known_share *= 1.0 - max(cause.evidence - _chance(cause.odds), 0.0)
+        known_share *= 1.0 - max(cause.evidence - cause.probability, 0.0)
     nothing = weight(lambda e: all(families[f].kind == "plant" for f in e.key))
     return Judgement(best, tuple(causes), nothing, 1.0 - known_share, explanations, weights)
 

@@ -21,8 +21,8 @@ class Priors:
     unknown
         Probability that a cause acts that no catalogue holds: about one gap in four.
     other_plant
-        Probability that heat flows otherwise than the model's plant says, beyond what constants take up: one
-        unit in twenty.
+        Probability that heat flows otherwise than the model's plant says, beyond what constants take up: no
+        plant of a few nodes is a gyro, and in one unit of five it shows.
     mixed_forms
         Probability that it takes two members of its family to hold a known cause, or two families an unknown
         one: a real cause is a distribution over forms, which is often narrow.
@@ -41,11 +41,10 @@ class Priors:
         Explanations this far behind the best are not gone on from [nats].
     exchange
         Members of a class cost less than this to be exchanged [nats]: one in twenty.
-    carried
-        What a name has to add to the prediction of each run from the others, all together [nats].
     trust, doubt
         Logarithms of a name's odds are multiplied by the first, then less the second, for what no family
-        describes: a monotone map, the same for all.
+        describes: a monotone map, the same for all, fitted on development cases of two realities by
+        ``python -m experiments.families --calibrate``.
     slow_noise
         Prior standard deviations from the median at which random walk is integrated over; flicker at all but
         the last. Far above, since a short static run shows little of a walk.
@@ -59,7 +58,7 @@ class Priors:
 
     expected_causes: float = 1.0
     unknown: float = 0.25
-    other_plant: float = 0.05
+    other_plant: float = 0.2
     mixed_forms: float = 0.3
     least_size: float = 3.0
     greatest_size: float = 60.0
@@ -70,9 +69,8 @@ class Priors:
     beam: int = 6
     hopeless: float = 12.0
     exchange: float = 3.0
-    carried: float = 2.0
-    trust: float = 1.0
-    doubt: float = 1.4
+    trust: float = 0.5
+    doubt: float = 3.3
     slow_noise: tuple[float, ...] = (-1.0, 0.0, 0.6, 1.2, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
