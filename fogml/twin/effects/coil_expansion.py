@@ -16,8 +16,8 @@ class CoilExpansion(ScaleFactorEffect):
         s = (alpha_L + alpha_D) (T - 25)
 
     alpha_D is 0.55 ppm/degC for free silica and 5 to 25 on a former or in adhesive, alpha_L 0.5 to 5; a
-    navigation gyro has a former of low expansion, which fibre and diameter follow. It is one with the
-    nominal gyro's own slope of the scale factor.
+    navigation gyro has a former of low expansion, which fibre and diameter follow. T stands for the
+    coil's mean. It is one with the nominal gyro's own slope of the scale factor.
 
     Source: Lefevre (literature); ranges partly engineering ones.
     """

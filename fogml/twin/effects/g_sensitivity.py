@@ -18,9 +18,9 @@ class GSensitivity(BiasEffect):
 
         b = g_1 a_ia + g_2 a_x
 
-    a in g along the input axis and along the gyro's x axis, which points up when the input axis is
-    horizontal; the attitude is the set-up's, and changes where a table turns about a horizontal axis. The
-    amplitude is g_1 [deg/h/g], ``cross_ratio`` g_2 / g_1.
+    a in g along the input axis and along the gyro's x axis, 1 where an axis points up; x does so when the
+    input axis is horizontal. The attitude is the set-up's, and changes where a table turns about a horizontal
+    axis. The amplitude is g_1 [deg/h/g], ``cross_ratio`` g_2 / g_1.
 
     Source: IEEE Std 952-1997 (literature); ranges are engineering ones, usually 0 in a fibre-optic gyro.
     """
