@@ -103,6 +103,13 @@ def _start_rows(told: Mapping[str, Any]) -> str:
     return "\n".join(lines)
 
 
+_IN_SAMPLE = {True: "reproduced, with a condition", False: "reproduced in part"}
+_TWO_ORDERS = {
+    True: "two orders are reached on the quiet unit only",
+    False: "two orders are not reached on the quiet unit either",
+}
+
+
 def _ratio(forms: Mapping[str, Any], form: str, key: str) -> float:
     return float(forms["none"]["runs"]["in sample"][key] / forms[form]["runs"]["in sample"][key])
 
@@ -124,6 +131,7 @@ def page(values: Mapping[str, Any], settings: Mapping[str, Any]) -> str:
     cycle, own = "the thermal cycle", f"a start-up at {room}"
     one, four = "1 point 5/3", "4 points 5/3"
     one_range = 1.0 - 1.0 / _ratio(forms, one, "range_100s")
+    two_orders = max(_ratio(quiet, four, key) for key in ("std_10s", "std_100s")) >= 100.0
     told = settings["start_up"]
     unlimited_rows = "\n".join(
         f"| {name} | " + " | ".join(f"{row[run]:.3f}" for run in RUNS) + " |" for name, row in free.items()
@@ -145,12 +153,13 @@ deviations of 10 s samples, where the noise realised (the floor) is {floor["floo
 no loop, no ripple, and a floor of {low:.4f} deg/h at 10 s. Config: `config.yaml`; fogml {__version__};
 `python -m experiments.multipoint_model`.
 
-**Verdict. In sample: reproduced, with a condition.** Four points lower the 10 s stability by
+**Verdict. In sample: {_IN_SAMPLE[two_orders]}.** Four points lower the 10 s stability by
 {_ratio(forms, four, "std_10s"):.0f} times, down to the floor, and 100 s averages by
-{_ratio(forms, four, "std_100s"):.0f} times; two orders are reached on the quiet unit only
+{_ratio(forms, four, "std_100s"):.0f} times; {_TWO_ORDERS[two_orders]}
 ({_ratio(quiet, four, "std_10s"):.0f} times, 100 s averages {_ratio(quiet, four, "std_100s"):.0f} times). One
 point lowers stability {_ratio(forms, one, "std_10s"):.1f} times, not ten, and the range by
-{one_range:.0%}, as told. **The knee at two: reproduced** in sample and on a repeat. **"5 and 3 are
+{one_range:.0%}, where some 60 % are told.
+**The knee at two: reproduced** in sample and on a repeat. **"5 and 3 are
 best": contradicted on other runs.** At 2 °C/min four points 5/3 leave {fast[four]:.3f} deg/h
 ({free[four]["2 degC/min"]:.3f} without fogml's limits) and reversed {back[four]:.3f}, orders 2/1
 {fast["4 points 2/1"]:.3f} and {back["4 points 2/1"]:.3f}. **Start-up: reproduced on a repeat of the very
