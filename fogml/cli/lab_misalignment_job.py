@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, ClassVar
 
 from pydantic import field_validator
@@ -55,7 +56,7 @@ def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
     se, intervals = values["se"], values["intervals"]
     rows = [
-        [label, f"{values[key]:.8g}", number(se.get(key)), *_interval(intervals.get(key)), unit]
+        [label, *_figures(values[key], se.get(key), intervals.get(key)), unit]
         for label, key, unit in (
             ("scale factor K", "K", values["unit"]),
             ("delta x", "delta_x_deg", "deg"),
@@ -65,7 +66,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     ]
     fixture_se = se.get("fixture_error_deg", [None, None])
     for axis, value, error in zip("xy", values["fixture_error_deg"], fixture_se, strict=True):
-        rows.append([f"fixture error {axis}", f"{value:.6g}", number(error), "–", "–", "deg"])
+        rows.append([f"fixture error {axis}", *_figures(value, error, None), "deg"])
     level = f"{values['level']:.0%}"
     terminal.table(
         f"{values['source']}: scale factor and misalignment, four states"
@@ -74,7 +75,11 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         rows,
     )
     rows = [
-        [m["name"], *(number(m[key]) for key in ("K", "K_difference_ppm", "delta_x_deg", "delta_y_deg"))]
+        [
+            m["name"],
+            f"{m['K']:.9g}",
+            *(number(m[key]) for key in ("K_difference_ppm", "delta_x_deg", "delta_y_deg")),
+        ]
         for m in values["methods"]
     ]
     header = ["method", f"K [{values['unit']}]", "K less four states [ppm]", "delta x [deg]", "delta y [deg]"]
@@ -83,5 +88,8 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         terminal.say(note)
 
 
-def _interval(ends: list[float] | None) -> list[str]:
-    return [f"{end:.8g}" for end in ends] if ends else ["–", "–"]
+def _figures(value: float, error: float | None, ends: list[float] | None) -> list[str]:
+    """Value, standard error and interval, to the first digit of the standard error."""
+    places = 6 if not error else max(-math.floor(math.log10(error)), 0)
+    told = [f"{end:.{places}f}" for end in ends] if ends else ["–", "–"]
+    return [f"{value:.{places}f}", "–" if error is None else f"{error:.2g}", *told]
