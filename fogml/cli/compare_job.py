@@ -11,7 +11,7 @@ from pydantic import field_validator
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import LimitSettings, Repairing
 from fogml.cli.terminal import Terminal, number
-from fogml.cli.train_job import check_settings, noise_run
+from fogml.cli.train_job import check_settings, floor_words, noise_run
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
@@ -117,6 +117,9 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
 
 
 def _print(comparison: Comparison, terminal: Terminal) -> None:
+    from fogml.report.compare_page import ranked
+    from fogml.report.verdict import own_noise, worst_run
+
     several = len(next(iter(comparison.judgements.values())).test) > 1
     rows = []
     for name, judgement in comparison.judgements.items():
@@ -126,9 +129,11 @@ def _print(comparison: Comparison, terminal: Terminal) -> None:
             rows.append([label, str(judgement.model["parameters"]), *(number(value) for value in figures)])
     run = next(iter(comparison.judgements.values())).test[0]
     terminal.table(
-        f"After compensation, {run.averaging_s:g} s averages, deg/h (noise floor {number(run.floor)})",
+        f"After compensation, {run.averaging_s:g} s averages, deg/h; noise floor {floor_words(run, number)}",
         ["model", "parameters", "rms", "bias", "bias stability", "range"],
         rows,
     )
+    best = ranked(comparison.judgements)[0]
+    terminal.say(f"{best} leaves least. {own_noise(worst_run(comparison.judgements[best].test))}")
     for name, reason in comparison.failed.items():
         terminal.say(f"{name}: not fitted: {reason}")

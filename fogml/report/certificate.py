@@ -15,7 +15,7 @@ from fogml.report.page import render
 from fogml.report.reduce import drawn
 from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
-from fogml.report.verdict import model_card, stated_limits, unseen, worst_run
+from fogml.report.verdict import floor_told, model_card, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import averages, listed, number, percent, unit_of
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
@@ -245,6 +245,6 @@ def _figure(worst: RunJudgement) -> tuple[Markup, str]:
     words = (
         f"{worst.run}, {averages(worst.averaging_s)}: "
         f"before (dashed), rms {number(worst.before.rms)} deg/h, "
-        f"and after (solid), rms {number(worst.after.rms)} deg/h. Noise floor {number(worst.floor)} deg/h."
+        f"and after (solid), rms {number(worst.after.rms)} deg/h; {floor_told(worst)}. {own_noise(worst)}"
     )
     return line_figure(curves, f"time [{unit}]", "drift [deg/h]", words), words

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from fogml.report.figures_compare import BASELINES, residuals_in_time, rms_bars
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
-from fogml.report.verdict import stated_limits, unseen, worst_run
+from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import MISSING, averages, listed, number, percent
 from fogml.validation.results import Judgement
 
@@ -66,7 +66,8 @@ def _verdict(judgements: Mapping[str, Judgement], order: list[str]) -> list[str]
     best = worst_run(judgements[order[0]].test)
     sentences = [
         f"{order[0]} leaves least: rms {number(best.after.rms)} deg/h of {number(best.before.rms)} deg/h on "
-        f"{best.run} ({averages(best.averaging_s)}); the noise floor is {number(best.floor)} deg/h."
+        f"{best.run} ({averages(best.averaging_s)}); {floor_told(best)}.",
+        own_noise(best),
     ]
     close = [
         name for name in order[1:] if worst_run(judgements[name].test).after.rms <= _WITHIN * best.after.rms

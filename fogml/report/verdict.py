@@ -60,6 +60,22 @@ def improves(judged: RunJudgement) -> bool:
     return judged.after.rms < judged.before.rms
 
 
+def floor_told(run: RunJudgement) -> str:
+    """A run's noise floor with its 90 % interval and where it comes from, as a part of a sentence."""
+    told = f"the noise floor is {number(run.floor)} deg/h"
+    if run.floor_ci90 is None:
+        return told
+    low, high = run.floor_ci90
+    return f"{told} ({number(low)} to {number(high)}, from {run.floor_source})"
+
+
+def own_noise(run: RunJudgement) -> str:
+    """Whether what is left is the gyro's own noise, as a sentence."""
+    if left_is_noise(run):
+        return "What is left is the gyro's own noise, as far as these averages tell."
+    return "What is left is not the gyro's own noise alone."
+
+
 def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
     kind = str(judgement.model.get("kind", "drift"))
     several = len(judgement.test) > 1
@@ -68,15 +84,7 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
     )
     before, after = number(worst.before.bias_stability), number(worst.after.bias_stability)
     over = averages(worst.averaging_s)
-    floor = f"the noise floor is {number(worst.floor)} deg/h"
-    if worst.floor_ci90 is not None:
-        low, high = worst.floor_ci90
-        floor += f" ({number(low)} to {number(high)}, from {worst.floor_source})"
-    own = (
-        "What is left is the gyro's own noise, as far as these averages tell."
-        if left_is_noise(worst)
-        else "What is left is not the gyro's own noise alone."
-    )
+    floor = floor_told(worst)
     if kind in ("none", "mean"):
         left = f"{where} nothing is compensated"
         if kind == "mean":
@@ -94,7 +102,7 @@ def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:
         did = f"leaves {after} deg/h of {before} deg/h (bias stability, {over})"
     sentence = f"{where} the {kind} model {did}; {floor}."
     harmed = [run.run for run in judgement.test if not improves(run)]
-    return [sentence, own, *([f"It makes {listed(harmed)} worse."] if harmed else [])]
+    return [sentence, own_noise(worst), *([f"It makes {listed(harmed)} worse."] if harmed else [])]
 
 
 def _bias(worst: RunJudgement) -> list[str]:
