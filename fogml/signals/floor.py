@@ -22,8 +22,10 @@ from numpy.typing import ArrayLike, NDArray
 from fogml.errors import InputError
 from fogml.signals.allan import Segments, segment_bounds
 from fogml.signals.averages import block_averages
+from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
 from fogml.signals.noise_spectrum import spectrum_of
-from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms, term_shapes
+from fogml.signals.quiet_rows import quiet_parts, without_spikes
+from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -35,14 +37,10 @@ Z90 = 1.6448536269514722
 PER_WINDOW = 20
 """Half periods in an averaging time of the fastest noise that is looked at: a faster one, an output filter, a
 dither or repeated values do not matter to the averages, and do not enter."""
-_SPIKE = 8.0
-"""A sample, or a step of the sub-averages, further than this many standard deviations is no noise."""
-_BLOCKS, _LOUD = 32, 4.0
-"""Blocks of time, and the multiple of their median mean square from which one is left out."""
 _LIGHT = 1e-4
 """Weight below which a model no longer counts."""
-_LEAST = 8
-"""Steps between means that tell a typical one."""
+_NOTICED = 0.02
+"""Share of the rows from which it is told that they are left out."""
 _FEWEST = 64
 """Coefficients of slow noise that are enough to leave the fast ones out."""
 _DRIFT = ("K", "D")
@@ -75,21 +73,27 @@ class FloorModel:
     weights: FloatArray
     sample_s: float
     counted: tuple[str, ...]
+    fast: FastNoise
+    loud: float = 0.0
+    """Share of the rows that is loud, or a step, and is left out."""
 
     def floor(self, averaging_s: float, windows: int, source: str = "the run itself") -> Floor:
         """The floor of so many windows over an averaging time."""
+        if self.loud > _NOTICED:
+            source += f" without the {self.loud:.0%} of it that is loud"
+        measured, its_variance = self.fast.averages_variance(averaging_s, windows)
         squares, errors = [], []
         for model, fit in self.fits:
             share = np.array(
                 [
-                    averages_variance(name, self.sample_s, averaging_s, windows)
+                    averages_variance(name, self.sample_s, averaging_s, windows, self.fast.from_hz)
                     if name in self.counted
                     else 0.0
                     for name in fit.terms.names
                 ]
             )
-            squares.append(float(share @ fit.coefficients))
-            errors.append(float(share @ _covariance(model, fit) @ share))
+            squares.append(measured + float(share @ fit.coefficients))
+            errors.append(its_variance + float(share @ _covariance(model, fit) @ share))
         square = float(self.weights @ squares)
         variance = float(self.weights @ (np.array(errors) + (np.array(squares) - square) ** 2))
         if square <= 0.0:
@@ -167,8 +171,8 @@ def floor_model(
     drifts: bool = True,
 ) -> FloorModel | None:
     """The noise models behind a floor; None where there is no noise. Parameters as in `noise_floor`."""
-    parts = _quiet(values, starts, stops, max(int(averaging_s / sample_s / PER_WINDOW), 1))
-    stretches = [_without_spikes(values[a:b]) for a, b in parts]
+    parts = quiet_parts(values, starts, stops, max(int(averaging_s / sample_s / PER_WINDOW), 1))
+    stretches = [without_spikes(values[a:b]) for a, b in parts]
     if all(np.ptp(part) == 0.0 for part in stretches):
         return None
     tables = None if columns is None else [columns(np.arange(a, b)) for a, b in parts]
@@ -176,9 +180,12 @@ def floor_model(
     if not np.any(spectrum.power > 0.0):
         return None
     # Faster noise does not matter to the averages; but short runs need all that they have.
-    slow = spectrum.frequency_hz[:, -1] < 0.5 * PER_WINDOW / averaging_s
+    from_hz = min(0.5 * PER_WINDOW / averaging_s, 0.5 / sample_s)
+    slow = spectrum.frequency_hz[:, -1] < from_hz
     if float(spectrum.count[slow].sum()) < _FEWEST:
         slow = np.ones(len(spectrum.power), dtype=np.bool_)
+        from_hz = 0.5 / sample_s
+    fast = fast_noise(spectrum, ~slow, from_hz, sum(map(len, stretches)))
     kept = slow | (np.arange(len(slow)) < len(spectrum.values))
     spectrum = replace(
         spectrum,
@@ -201,38 +208,13 @@ def floor_model(
     weights = np.exp(np.array(evidence) - max(evidence))
     live = np.flatnonzero(weights > _LIGHT)
     chosen = weights[live] / weights[live].sum()
-    return FloorModel(tuple(fits[i] for i in live), chosen, sample_s, ("N", *own))
+    whole = int(np.sum(stops - starts))
+    loud = 1.0 - sum(map(len, stretches)) / whole
+    return FloorModel(tuple(fits[i] for i in live), chosen, sample_s, ("N", *own), fast, loud)
 
 
 def _subsets(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:
     return chain.from_iterable(combinations(names, size) for size in range(len(names) + 1))
-
-
-def averages_variance(name: str, sample_s: float, averaging_s: float, windows: int) -> float:
-    """Expected variance about their mean of so many averages, of a term of coefficient 1.
-
-    Parameters
-    ----------
-    name
-        N, B, K or Q, as in `fogml.signals.spectrum_fit.Terms`.
-    sample_s
-        Interval of the samples that are averaged [s].
-    averaging_s
-        Averaging time [s].
-    windows
-        Consecutive averages.
-    """
-    m = max(averaging_s / sample_s, 1.0)
-    lowest = 1.0 / (50.0 * m * windows)
-    cycles = np.geomspace(lowest, 0.5, int(64 * np.log2(0.5 / lowest)) + 1)
-    density = term_shapes(cycles / sample_s, sample_s, SpectrumTerms((name,)))[..., 0]
-    sine = np.sin(np.pi * cycles)
-    # Where the grid no longer follows a square, its mean does.
-    one = np.where(m * cycles < 8.0, np.sin(np.pi * m * cycles) ** 2, 0.5) / (m * sine) ** 2
-    all_m = m * windows
-    whole = np.where(all_m * cycles < 8.0, np.sin(np.pi * all_m * cycles) ** 2, 0.5) / (all_m * sine) ** 2
-    response = np.maximum(one - whole, 0.0)
-    return float(np.trapezoid(density * response * cycles / sample_s, np.log(cycles)))
 
 
 def realised_noise_floor(time: ArrayLike, noise: ArrayLike, averaging_s: float) -> float:
@@ -272,49 +254,3 @@ def _covariance(model: SpectrumModel, fit: SpectrumFit) -> FloatArray:
         size, size
     )
     return covariance
-
-
-def _quiet(values: FloatArray, starts: IntArray, stops: IntArray, width: int) -> list[tuple[int, int]]:
-    """Rows without loud blocks, cut at steps, as told by means of so many samples; gaps stay cuts."""
-    means = [
-        values[a : a + (b - a) // width * width].reshape(-1, width).mean(axis=1)
-        for a, b in zip(starts.tolist(), stops.tolist())
-    ]
-    whole = [(a, b) for a, b in zip(starts.tolist(), stops.tolist()) if b - a >= 3]
-    steps = [np.abs(np.diff(part)) for part in means]
-    count = sum(map(len, steps))
-    typical = float(np.median(np.concatenate(steps))) / 0.6745 if count >= _LEAST else 0.0
-    if typical == 0.0:
-        return whole
-    block = max(count // _BLOCKS, 4)
-    kept: list[tuple[int, int]] = []
-    for start, stop, step in zip(starts.tolist(), stops.tolist(), steps):
-        bad = np.zeros(len(step), dtype=np.bool_)
-        for first in range(0, len(step), block):
-            inside = np.sort(step[first : first + block])
-            # A block with one step in it is not loud but for that.
-            if float(np.sum(inside[:-1] ** 2)) > _LOUD * typical**2 * len(inside) and len(inside) >= 4:
-                bad[first : first + block] = True
-        bad |= step > _SPIKE * typical
-        edges = np.flatnonzero(np.diff(np.concatenate(([True], bad, [True])).astype(np.int8)))
-        for a, b in zip(edges[::2].tolist(), edges[1::2].tolist()):
-            # Means a to b are quiet; the last goes on to the stretch's end.
-            kept.append((start + a * width, stop if b == len(step) else start + (b + 1) * width))
-    kept = [(a, b) for a, b in kept if b - a >= 3]
-    return kept if sum(b - a for a, b in kept) >= 0.5 * sum(b - a for a, b in whole) else whole
-
-
-def _without_spikes(values: FloatArray) -> FloatArray:
-    """Values with those far from both neighbours replaced by the neighbours' mean."""
-    if len(values) < 3:
-        return values
-    beside = 0.5 * (values[:-2] + values[2:])
-    away = values[1:-1] - beside
-    # White noise of one unit is 3/2 away in variance.
-    limit = _SPIKE * float(np.median(np.abs(away))) / 0.6745
-    lone = (np.abs(away) > limit) & (np.abs(values[2:] - values[:-2]) <= limit)
-    if limit == 0.0 or not np.any(lone):
-        return values
-    cleaned = values.copy()
-    cleaned[1:-1][lone] = beside[lone]
-    return cleaned

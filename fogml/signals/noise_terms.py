@@ -107,7 +107,7 @@ class NoiseTerms:
         if self.search is None:
             return np.zeros_like(taus)
         ramp = self.terms["R"].fitted / _SCALES["R"]
-        variance = _allan_variance(self.search.best, self.search.spectrum.sample_s, taus, filtered=filtered)
+        variance = _allan_variance(self.search.best, self.search.spectrum, taus, filtered=filtered)
         return np.asarray(np.sqrt(variance + 0.5 * (ramp * taus) ** 2))
 
 
@@ -193,8 +193,8 @@ def noise_terms_of(values: FloatArray, sample_s: float, level: float = 0.9) -> N
 def _holds_from(search: NoiseSearch, taus: FloatArray) -> float:
     """Shortest of the times at which no filter bends the Allan deviation, and no row left out counts [s]."""
     spectrum, fit = search.spectrum, search.best
-    plain = _allan_variance(fit, spectrum.sample_s, taus, filtered=False)
-    bent = np.flatnonzero(_allan_variance(fit, spectrum.sample_s, taus) < (1.0 - _BENT) * plain)
+    plain = _allan_variance(fit, spectrum, taus, filtered=False)
+    bent = np.flatnonzero(np.abs(_allan_variance(fit, spectrum, taus) - plain) > _BENT * plain)
     first = float(taus[min(bent[-1] + 1, len(taus) - 1)]) if len(bent) else spectrum.sample_s
     if fit.filter.kind == "none" and not np.all(fit.used):
         first = max(first, 1.0 / float(spectrum.frequency_hz[fit.used].max()))
@@ -292,12 +292,14 @@ def _bias_instability(
 
 
 def _allan_variance(
-    fit: SpectrumFit, sample_s: float, taus: FloatArray, *, filtered: bool = True
+    fit: SpectrumFit, spectrum: Spectrum, taus: FloatArray, *, filtered: bool = True
 ) -> FloatArray:
     """Allan variance of a fitted model [(deg/h)^2]: its density through the response of the variance.
 
-    The response of m samples is ``2 sin^4(pi m x) / (m sin(pi x))^2``, x in cycles per sample.
+    The response of m samples is ``2 sin^4(pi m x) / (m sin(pi x))^2``, x in cycles per sample. Where a form
+    that is not known leaves rows out of the fit, the density behind it is the measured one.
     """
+    sample_s = spectrum.sample_s
     factors = np.maximum(taus / sample_s, 1.0)
     lowest = 1.0 / (100.0 * float(factors.max()))
     points = int(64 * np.log2(0.5 / lowest)) + 1
@@ -308,6 +310,11 @@ def _allan_variance(
     for coefficient, name, shape in zip(fit.coefficients, fit.terms.names, shapes.T):
         if name != "E":
             density += coefficient * shape * (gain if filtered and name not in AFTER else 1.0)
+    if filtered and fit.filter.kind == "none" and not np.all(fit.used):
+        middles = spectrum.frequency_hz.mean(axis=1)
+        order = np.argsort(middles)
+        measured = np.interp(cycles / sample_s, middles[order], spectrum.power[order])
+        density = np.where(cycles > spectrum.frequency_hz[fit.used].max() * sample_s, measured, density)
     variance = np.empty(len(factors))
     for place, m in enumerate(factors):
         # Where the grid no longer follows the fourth power, its mean does.

@@ -2,11 +2,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
+from scipy.signal import butter, lfilter
 
 from fogml.errors import InputError
+from fogml.signals.averages_noise import averages_variance
 from fogml.signals.flicker import Flicker
-from fogml.signals.floor import averages_variance, noise_floor, realised_noise_floor
+from fogml.signals.floor import noise_floor, realised_noise_floor
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.noise_model import NoiseModel
 
@@ -64,6 +65,29 @@ def test_quantised_angles_fall_faster_than_white_noise():
     y = np.diff(rng.uniform(-0.5, 0.5, size=40_001)) + 0.002 * rng.normal(size=40_000)
     want = np.sqrt(2 / 12 / 100**2 + 0.002**2 / 100)
     assert noise_floor(y, 1.0, 100.0).value == pytest.approx(want, rel=0.1)
+
+
+def test_fast_noise_counts_as_it_is_whatever_filter_or_resonance_makes_it():
+    """Angle noise that ends far below half the sampling rate: no term says how much of it there is."""
+    rng = np.random.default_rng(6)
+    low_pass = butter(4, 0.3)
+    squares, found = [], []
+    for _ in range(4):
+        y = lfilter(*low_pass, np.diff(5.0 * rng.normal(size=40_001))) + 0.01 * rng.normal(size=40_000)
+        found.append(noise_floor(y, 1.0, 100.0).value)
+        squares.append(np.var(y.reshape(-1, 100).mean(axis=1)))
+    assert np.mean(found) == pytest.approx(np.sqrt(np.mean(squares)), rel=0.05)
+
+
+def test_loud_parts_that_are_left_out_are_told():
+    rng = np.random.default_rng(12)
+    steady = rng.normal(size=20_000)
+    loud = steady.copy()
+    loud[5000:8000] *= 20.0
+    told = noise_floor(loud, 1.0, 100.0)
+    assert told.value == pytest.approx(0.1, rel=0.15)
+    assert told.source.startswith("the run itself without the ") and told.source.endswith("that is loud")
+    assert noise_floor(steady, 1.0, 100.0).source == "the run itself"
 
 
 def expected(windows: int, white: float, flicker: float) -> float:

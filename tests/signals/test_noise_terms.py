@@ -226,3 +226,14 @@ def test_windows_must_overlap():
     series = np.arange(100.0) % 7
     with pytest.raises(InputError, match="overlapping"):
         noise_terms(spectrum_of([series], SAMPLE_S), allan_deviation(series, SAMPLE_S, overlapping=False))
+
+
+def test_behind_a_form_that_is_not_known_the_curve_is_the_measured_one():
+    """Angle noise that ends far below half the sampling rate: the terms alone would leave many times as much."""
+    rng = np.random.default_rng(3)
+    y = lfilter(*butter(4, 0.1), np.diff(5.0 * rng.normal(size=20_001))) + 0.05 * rng.normal(size=20_000)
+    terms = noise_terms_of(y, 1.0)
+    seen = allan_deviation(y, 1.0, [1.0, 4.0, 16.0, 64.0])
+    assert terms.deviation(seen.taus_s) == pytest.approx(seen.adev, rel=0.07)
+    assert np.all(terms.deviation(seen.taus_s, filtered=False) > 2.0 * seen.adev)
+    assert terms.holds_from_s > 64.0
