@@ -26,6 +26,7 @@ PARTS = {
     "floors": "one floor for one run",
     "sweeps": "sweeps' winners against the default",
     "fleet": "the fleet's test of agreement",
+    "recordings": "what moved on the shipped recordings",
 }
 """Module with ``section(quick: bool) -> Section`` to what it is about, in the page's order."""
 
