@@ -36,6 +36,19 @@ def held(times: int) -> Callable[[np.random.Generator], FloatArray]:
     return lambda rng: np.repeat(white(rng, SAMPLES // times, 0.01 * times), times)
 
 
+def counted(
+    corner_hz: float, rate_hz: float, count_deg: float
+) -> Callable[[np.random.Generator], FloatArray]:
+    """Behind a low pass, as whole counts of angle whose rest stays for the next sample."""
+    rate = filtered(corner_hz, rate_hz)
+
+    def make(rng: np.random.Generator) -> FloatArray:
+        angle = np.cumsum(rate(rng) + 7.0) / 3600.0 / rate_hz
+        return np.diff(np.floor(angle / count_deg), prepend=0.0) * count_deg * 3600.0 * rate_hz - 7.0
+
+    return make
+
+
 KINDS: dict[str, tuple[float, Callable[[np.random.Generator], FloatArray]]] = {
     "white": (100.0, lambda rng: white(rng, SAMPLES, 0.01)),
     **{f"{corner:g} Hz filter": (100.0, filtered(corner, 100.0)) for corner in (1.0, 2.0, 5.0, 10.0, 20.0)},
@@ -45,6 +58,7 @@ KINDS: dict[str, tuple[float, Callable[[np.random.Generator], FloatArray]]] = {
         lambda rng: np.convolve(white(rng, SAMPLES, 0.01), np.full(10, 0.1), "valid"),
     ),
     "0.3 Hz filter at 10 Hz": (10.0, filtered(0.3, 10.0)),
+    "the same in counts of 0.1 arcsec": (10.0, counted(0.3, 10.0, 0.1 / 3600.0)),
 }
 """Sampling rate [Hz] and maker of each kind of log."""
 

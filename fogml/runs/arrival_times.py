@@ -63,10 +63,12 @@ class EvenClock:
     def words(self) -> str:
         """What was rebuilt, and how well it is known."""
         gaps = {0: "no gap", 1: "1 gap"}.get(self.gaps, f"{self.gaps} gaps")
+        rounding = 1e-6 * self.interval_s
+        good = "rounding" if self.error_s < rounding else f"{self.error_s:.2g} s"
         return (
-            f"clock rebuilt from the mean interval of {self.interval_s:.6g} s (drift {self.drift_ppm:.3g} "
-            f"ppm over the run, {gaps} kept), each time good to {self.error_s:.2g} s, and all of them late "
-            "by one unknown delay"
+            f"clock rebuilt from the mean interval of {self.interval_s:.6g} s (drift "
+            f"{round(self.drift_ppm, 3) + 0.0:.3g} ppm over the run, {gaps} kept), each time good to "
+            f"{good}, and all of them late by one unknown delay"
         )
 
 

@@ -159,7 +159,7 @@ def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[Noise
         ]
         penalty = 0.5 * size + _of_levels(spectrum, used)
         tried = [
-            NoiseChoice(m, m.scanned(corners if m.filter.free else corners[:1]), penalty) for m in models
+            NoiseChoice(m, _scanned(m, corners if m.filter.free else corners[:1]), penalty) for m in models
         ]
         return [c for c in tried if _holds_back(c)]
 
@@ -176,6 +176,18 @@ def _filtered(spectrum: Spectrum, plain: NoiseChoice, size: float) -> list[Noise
         used = np.asarray(ends <= _ENDS * best.density)
         found = fitted(first, begin, used)
     return found + fitted([form for form in LOW_PASSES if form not in first], begin, used)
+
+
+def _scanned(model: SpectrumModel, corners: FloatArray) -> SpectrumFit:
+    """The best fit from corners; of the series' ends only once a filter is found without them.
+
+    Ends that make up for a wrong corner are a best fit of their own, far below the right one.
+    """
+    if model.terms.names[-1] != "E":
+        return model.scanned(corners)
+    names = model.terms.names[:-1]
+    without = SpectrumModel(model.spectrum, SpectrumTerms(names), model.filter, model.used).scanned(corners)
+    return model.fit(replace(without, terms=model.terms, coefficients=np.append(without.coefficients, 0.0)))
 
 
 def _holds_back(choice: NoiseChoice) -> bool:
@@ -246,8 +258,9 @@ def _correlated(spectrum: Spectrum, best: NoiseChoice, size: float, times: int =
         model = SpectrumModel(spectrum, terms, fit.filter, best.model.used)
         start = replace(fit, terms=terms, coefficients=np.append(fit.coefficients, 1e-6 * fit["N"] / tau))
         fitted = model.fit(start)
-        # What makes the density at its upper end too is white noise behind a filter of first order.
+        # What is more than white noise at the upper end too is white noise behind a filter of first order.
         top = int(np.flatnonzero(model.used)[-1])
-        if fitted["G"] * model.design(fitted.log_corner)[0][top, -1] < 0.5 * fitted.density[top]:
+        ahead = model.design(fitted.log_corner)[0][top] * fitted.coefficients
+        if ahead[-1] < ahead[terms.names.index("N")]:
             found.append(NoiseChoice(model, fitted, best.penalty + size))
     return sorted(found, key=lambda c: c.fit.loss)[:1]
