@@ -229,7 +229,7 @@ def test_windows_must_overlap():
 
 
 def test_behind_a_form_that_is_not_known_the_curve_is_the_measured_one():
-    """Angle noise that ends far below half the sampling rate: the terms alone would leave many times as much."""
+    """Angle noise that ends far below half the sampling rate: its terms alone would leave far more."""
     rng = np.random.default_rng(3)
     y = lfilter(*butter(4, 0.1), np.diff(5.0 * rng.normal(size=20_001))) + 0.05 * rng.normal(size=20_000)
     terms = noise_terms_of(y, 1.0)
