@@ -62,7 +62,6 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "atom_bits": scales.atoms.tolist(),
         "column_bits": scales.columns.tolist(),
         "drift_bits": scales.drift,
-        "tick_us": round(windows.tick_s * 1e6),
         "signal_note": f", steps of 2^-{_HELD_BITS}",
         "output_note": f", steps of 2^-{OUTPUT_BITS}",
     }
@@ -72,9 +71,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         else f"output as rate, whole steps of 2^-{OUTPUT_BITS} deg/h"
     )
     compensated = f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below."
-    units = units_of(
-        plan, gyro, "time_us [us]", f"whole steps of 2^-{bits} degC, in the order of the places below"
-    )
+    units = units_of(plan, gyro, f"whole steps of 2^-{bits} degC, in the order of the places below")
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
     rates = any(o.method not in ("first", "lag") or (not o.lag and o.unit_s) for o in windows.operators)
     return {
@@ -83,8 +80,6 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "ratios": rates or bool(windows.of_method("lag")) or bool(plan.centres and plan.edge_columns),
         "real": "int64_t",
         "suffix": "",
-        "time_type": "int64_t",
-        "time_name": "time_us",
         "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
         "gyro_type": "int32_t",
         "atom_type": "int32_t",
@@ -98,7 +93,6 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "exp_error": EXP_ERROR,
         "exp_terms": exp_terms,
         "signal_expressions": [_signal(signal.parts, bits) for signal in windows.signals],
-        "gap": {i: f"INT64_C({round(operator.gap_s * 1e6)})" for i, operator in enumerate(windows.operators)},
         "evaluate": _evaluations(plan, windows, scales),
         "exponential_arguments": _exponential_arguments(windows),
         "atom_expressions": [_atom(i, plan, windows, scales) for i in range(len(plan.atoms))],
@@ -163,7 +157,7 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
         else:
             unit = round(operator.unit_s * 1e6)
             divide = _divide_bits(unit)
-            rate = f"rate_of({difference}, interval, {divide}, INT64_C({unit}))"
+            rate = f"rate_of({difference}, interval_us, {divide}, INT64_C({unit}))"
             found[i] = f"scaled({rate}, {_HELD_BITS + divide - bits[i]})"
     return found
 
@@ -224,13 +218,6 @@ def _columns(plan: Plan, scales: Scales) -> list[str]:
 
 def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[str]:
     lines = []
-    if windows.operators:
-        lines += [
-            f"#define LONGEST_GAP_US INT64_C({round(windows.longest_gap_s * 1e6)}) /* longest gap */",
-            "#define TICKS_LIMIT (INT64_C(1) << 61)",
-        ]
-        if round(windows.tick_s * 1e6) > 1:
-            lines.append(f"#define TICK_US INT64_C({round(windows.tick_s * 1e6)})")
     if plan.atoms:
         limits, steps = plan.limits, 2.0**scales.atoms
         lines += [

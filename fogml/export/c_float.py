@@ -73,8 +73,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "fixed": None,
         "real": real,
         "suffix": suffix,
-        "time_type": real,
-        "time_name": "time_s",
+        "second_us": number(1e-6),
         "temperature_type": real,
         "gyro_type": real,
         "atom_type": real,
@@ -83,13 +82,12 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "exp_type": real,
         "phase_type": real,
         "held_type": "int64_t" if real == "double" else "int32_t",
-        "units": units_of(plan, gyro, "time_s [s]", temperature),
+        "units": units_of(plan, gyro, temperature),
         "constants": _constants(plan, windows, dtype, real),
         "exp_error": EXP_ERROR[dtype],
         "exp_most": number(EXP_MOST[dtype]).removesuffix("f"),
         "exp_constants": _exponential(dtype),
         "signal_expressions": [_signal(signal, plan, number) for signal in windows.signals],
-        "gap": {i: number(operator.gap_s) for i, operator in enumerate(windows.operators)},
         "evaluate": _evaluations(windows, number),
         "exponential_arguments": {
             i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
@@ -201,18 +199,6 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         if not all(is_temperature(name) for name in plan.sensors):
             most = [2.0**RANGE_BITS if is_temperature(name) else OTHER_LIMIT for name in plan.sensors]
             lines += array("INPUT_LIMIT", most, dtype, "[FOGML_TEMPERATURES]", real, "either way")
-    if windows.operators:
-        lines += [
-            f"#define TIME_LIMIT {number(1e15)} /* [s] */",
-            f"#define LONGEST_GAP_S {number(windows.longest_gap_s)} /* a longer one restarts all windows */",
-            "#define TICKS_LIMIT (INT64_C(1) << 61)",
-            f"#define TICKS_PER_S {number(1.0 / windows.tick_s)}",
-        ]
-        if dtype == "float32":
-            lines += [
-                f"#define SAMPLE_S {number(plan.sample_s)}",
-                f"#define TICKS_PER_SAMPLE INT64_C({round(plan.sample_s / windows.tick_s)})",
-            ]
     if windows.ring:
         bits = windows.temperature_bits
         lines.append(

@@ -82,7 +82,7 @@ class CProgram:
         types = {"double": "f8", "float": "f4", "int64_t": "i8", "int32_t": "i4", "int16_t": "i2"}
         self._types = {
             name: np.dtype("<" + types[source.numbers[f"{name}_type"]])
-            for name in ("time", "temperature", "gyro", "atom", "exp")
+            for name in ("temperature", "gyro", "atom", "exp")
         }
         self.places = max(1, len(source.plan.sensors))
 
@@ -100,14 +100,21 @@ class CProgram:
         return self._done("self-test").status
 
     def steps(self, time: Any, temperatures: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
-        """Outputs and flags of `fogml_step`, all in the numbers that the code takes."""
+        """Outputs and flags of `fogml_step`, all in the numbers that the code takes.
+
+        Times are in seconds, or whole microseconds where they are integers; those may be negative, as clocks
+        wrap.
+        """
+        time = np.asarray(time)
+        if time.dtype.kind == "f":
+            time = np.round(time * 1e6).astype(np.int64)
         fields = [
-            ("time", self._types["time"]),
+            ("time", "<u8"),
             ("temperatures", self._types["temperature"], (self.places,)),
             ("gyro", self._types["gyro"]),
         ]
         records = np.zeros(len(time), dtype=fields)
-        records["time"], records["gyro"] = time, gyro
+        records["time"], records["gyro"] = time.astype(np.uint64), gyro
         if np.size(temperatures):
             records["temperatures"] = temperatures
         return self._outputs(self._run("steps", records.tobytes()))

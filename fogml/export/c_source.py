@@ -12,7 +12,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from fogml import __version__
 from fogml.errors import InputError
-from fogml.escaping import c_text
+from fogml.escaping import CCode, c_text
 from fogml.export.c_fixed import fixed_context
 from fogml.export.c_float import float_context, input_units, sensor_identifier
 from fogml.export.layout import Layout, Number, layout
@@ -102,6 +102,7 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     )
     numbers["card"] = list(card)
     test = test or make_self_test(plan, windows, dtype, numbers)
+    numbers["constants"] = [*_clock_constants(windows), *numbers["constants"]]
     context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
     render = _templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
@@ -138,6 +139,8 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),
+        "tick_us": windows.tick_us,
+        "gap": {i: f"INT64_C({round(o.gap_s * 1e6)})" for i, o in enumerate(windows.operators)},
         "gyro_unit": plan.gyro_unit if plan.form == "joint" else "deg/h",
         "blocks": windows.of_method("block"),
         "slopes": windows.of_method("slope"),
@@ -152,6 +155,24 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
     }
 
 
+def _clock_constants(windows: Layout) -> list[str]:
+    """Lines of the clock's constants: longest gap, tick, and where ticks begin."""
+    if not windows.operators:
+        return []
+    longest = round(windows.longest_gap_s * 1e6)
+    # Ticks begin a little before their low 32 bits wrap: every unit, and the self-test, goes past that.
+    needed = max(operator.needed_ticks for operator in windows.operators)
+    lines = [
+        f"#define LONGEST_GAP_US UINT64_C({longest}) /* a longer one restarts all windows */",
+        "#define TICKS_LIMIT (INT64_C(1) << 61)",
+        f"#define FIRST_TICK INT64_C({(1 << 32) - needed // 2 - 1})",
+        *([f"#define TICK_US INT64_C({windows.tick_us})"] if windows.tick_us > 1 else []),
+    ]
+    if longest >= 1 << 31:
+        lines += ["#ifdef FOGML_CLOCK_32", "#error a window spans more than a 32-bit clock tells", "#endif"]
+    return [CCode(line) for line in lines]
+
+
 def _spare(plan: Plan, windows: Layout) -> int:
     """By how many per cent samples may come faster than nominal before a ring is too short."""
     if not windows.ring:
@@ -160,10 +181,10 @@ def _spare(plan: Plan, windows: Layout) -> int:
     return int(np.floor(100.0 * ((windows.ring - 1) * plan.sample_s / longest - 1.0)))
 
 
-def units_of(plan: Plan, gyro: str, time: str, temperature: str) -> list[str]:
+def units_of(plan: Plan, gyro: str, temperature: str) -> list[str]:
     """Lines that tell what goes in and comes out."""
     lines = [
-        f"  time          {time}, going up; any origin",
+        "  time          time_us [us], going up; any origin, and it may wrap",
         f"  temperatures  {temperature}: {', '.join(plan.sensors) or 'none'}",
         f"  gyro          {gyro}",
         "  compensated   deg/h",

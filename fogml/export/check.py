@@ -86,10 +86,9 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     gyro = np.round(past.gyro / gyro_step) * gyro_step if fixed else past.gyro
     expected, flags = plan.compensated(past.atoms(plan), gyro)
     if fixed:
-        time = np.round(past.time * 1e6).astype(np.int64)
         temperatures = np.round(past.temperatures / fixed["temperature_value"])
         most = fixed["temperature_most"]
-        out, told = program.steps(time, np.clip(temperatures, -most, most), np.round(gyro / gyro_step))
+        out, told = program.steps(past.time, np.clip(temperatures, -most, most), np.round(gyro / gyro_step))
         out = out * fixed["compensated_value"]
     else:
         out, told = program.steps(past.time, past.temperatures, gyro)
@@ -174,7 +173,7 @@ def expected_outputs(source: CSource, program_folder: Path) -> tuple[list[float]
     first, rise, jump = (np.asarray(values).astype(kind) for values in (test.first, test.rise, test.jump))
     temperatures = first + rise * phase[:, None]
     temperatures[test.checks[-1] :] += jump
-    time = step.astype(kind) * np.asarray(test.interval).astype(kind)
+    time = step * np.int64(test.interval_us) - np.int64(test.before_wrap_us)
     out, flags = program.steps(time, temperatures, np.full(len(step), np.asarray(test.gyro).astype(kind)))
     checks = list(test.checks)
     return [float(value) for value in out[checks]], [int(flag) for flag in flags[checks]]

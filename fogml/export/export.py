@@ -40,6 +40,8 @@ TARGETS: tuple[str, ...] = get_args(Target)
 DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
 ONNX_FILE = "fogml_model.onnx"
 
+CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None}
+"""C code's clock: unsigned, of which only differences are taken, so that uptime is unlimited (None)."""
 TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
 """Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
 LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
@@ -232,7 +234,7 @@ def _write_c(
     for name, text in source.files.items():
         (folder / name).write_text(text, encoding="ascii")
     fixed = source.numbers["fixed"]
-    report: dict[str, Any] = {"difference": difference, "cortex_m4": size}
+    report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}
     if plan.centres:
         report["exp_error"] = source.numbers["exp_error"]
     if fixed:

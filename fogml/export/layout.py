@@ -31,7 +31,6 @@ TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
 """Held temperatures are multiples of 2**-bits degC."""
 RANGE_BITS = 9
 """Temperatures up to 2**9 degC either way are taken."""
-_TICK_BITS = 20
 _SPAN_BITS = 30
 _NOISE_TICKS = 2
 _LONGEST_RING = 1 << 20
@@ -53,7 +52,7 @@ class Operator:
         Place of its signal among the rings; -1 where none is needed.
     unit_s
         Time unit of the rate [s]; None for a difference.
-    gap_s, gap_ticks
+    gap_s
         Longest interval that does not restart it.
     window_ticks, both_ticks, needed_ticks
         Age at which a sample leaves the newest window, both windows; time until full.
@@ -68,7 +67,6 @@ class Operator:
     held: int
     unit_s: float | None
     gap_s: float
-    gap_ticks: int
     window_ticks: int
     both_ticks: int
     needed_ticks: int
@@ -88,8 +86,8 @@ class Layout:
 
     Attributes
     ----------
-    tick_s
-        Length of a tick [s].
+    tick_us
+        Length of a tick [us].
     temperature_bits
         Held temperatures are multiples of 2**-bits degC.
     signals
@@ -104,13 +102,13 @@ class Layout:
         Places of the signals that have a ring.
     ring
         Samples that each ring holds.
-    longest_gap_s, longest_gap_ticks
+    longest_gap_s
         An interval longer than this restarts everything but plays, which know no time.
     plays
         The distinct play operators.
     """
 
-    tick_s: float
+    tick_us: int
     temperature_bits: int
     signals: tuple[Signal, ...]
     operators: tuple[Operator, ...]
@@ -119,8 +117,12 @@ class Layout:
     held: tuple[int, ...]
     ring: int
     longest_gap_s: float
-    longest_gap_ticks: int
     plays: tuple[Atom, ...] = ()
+
+    @property
+    def tick_s(self) -> float:
+        """Length of a tick [s]."""
+        return self.tick_us * 1e-6
 
     def of_method(self, method: str) -> list[tuple[int, Operator]]:
         """Operators of a method with their places."""
@@ -155,7 +157,9 @@ def layout(plan: Plan, number: Number) -> Layout:
             "[exp, ...], or run the model at a longer --sample-s"
         )
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
-    tick_s = _tick_s(plan.sample_s, max([w.span_s for _, w, _, _ in keys] + gaps, default=0.0), number)
+    held_s = [w.span_s for _, w, _, _ in keys if w.method in ("block", "slope")]
+    tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
+    tick_s = tick_us * 1e-6
     operators = []
     for (signal, window, unit_s, lag), gap_s in zip(keys, gaps):
         place = signals.index(signal)
@@ -164,7 +168,7 @@ def layout(plan: Plan, number: Number) -> Layout:
     of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
     longest_gap = max(gaps, default=0.0)
     return Layout(
-        tick_s,
+        tick_us,
         TEMPERATURE_BITS[number],
         signals,
         tuple(operators),
@@ -173,7 +177,6 @@ def layout(plan: Plan, number: Number) -> Layout:
         held,
         ring,
         longest_gap,
-        round(longest_gap / tick_s),
         tuple(dict.fromkeys(atom for atom in plan.atoms if atom.operator == "play")),
     )
 
@@ -225,20 +228,17 @@ def _gap_s(window: Window, sample_s: float) -> float:
     return GAP_INTERVALS * sample_s if window.method == "first" else longest_gap_s(window.length_s, sample_s)
 
 
-def _tick_s(sample_s: float, longest_s: float, number: Number) -> float:
-    """Length of a tick [s]: a binary part of the sample interval, or in fixed point of microseconds."""
-    if number == "fixed":
-        tick_s = 1e-6
-        while longest_s / tick_s >= 2.0**_SPAN_BITS:
-            tick_s *= 10.0
-        if sample_s < 8.0 * _NOISE_TICKS * tick_s:
-            raise InputError(
-                f"export: samples every {sample_s:g} s with windows of {longest_s:g} s need a finer clock "
-                "than fixed point has; use float32, or shorter windows"
-            )
-        return tick_s
-    bits = min(_TICK_BITS, math.floor(_SPAN_BITS - math.log2(max(longest_s / sample_s, 1.0))))
-    return float(sample_s / 2.0**bits)
+def _tick_us(sample_s: float, longest_s: float) -> int:
+    """Length of a tick [us]: a power of ten, so that ages in windows stay below 2**30 ticks."""
+    tick_us = 1
+    while longest_s * 1e6 / tick_us >= 2.0**_SPAN_BITS:
+        tick_us *= 10
+    if sample_s * 1e6 < 8.0 * _NOISE_TICKS * tick_us:
+        raise InputError(
+            f"export: samples every {sample_s:g} s with windows of {longest_s:g} s need a finer clock than C "
+            "code has; use shorter windows, or [exp, ...]"
+        )
+    return tick_us
 
 
 def _operator(
@@ -264,7 +264,6 @@ def _operator(
         held.index(signal) if signal in held and window.method in ("block", "slope") else -1,
         unit_s,
         gap_s,
-        round(gap_s / tick_s),
         ticks(window.length_s),
         ticks(2.0 * window.length_s),
         max(0, ticks(needed)) if needed > 0 else 0,

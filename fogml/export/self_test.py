@@ -27,8 +27,8 @@ class SelfTest:
     first, rise, jump
         Temperatures at its begin, their rise from step to step, and their jump at the end; in the
         numbers that the code takes, shape (sensors,).
-    interval
-        Time between steps, in the numbers that the code takes.
+    interval_us
+        Time between steps [us].
     gyro
         The output, constant.
     period
@@ -42,7 +42,7 @@ class SelfTest:
     first: tuple[float, ...]
     rise: tuple[float, ...]
     jump: tuple[float, ...]
-    interval: float
+    interval_us: int
     gyro: float
     period: int
     checks: tuple[int, ...]
@@ -53,6 +53,11 @@ class SelfTest:
     def steps(self) -> int:
         """Number of steps."""
         return self.checks[-1] + 1
+
+    @property
+    def before_wrap_us(self) -> int:
+        """How long before a clock's wrap the sequence begins [us]: it wraps between two checks."""
+        return self.interval_us * (self.checks[-1] - _PERIOD // 2)
 
     def literals(self, dtype: str) -> dict[str, Any]:
         """The template's values."""
@@ -76,9 +81,8 @@ class SelfTest:
             "jump_at": self.checks[-1],
             "period": self.period,
             "gyro": number(self.gyro),
-            "time": f"(int64_t)step * INT64_C({int(self.interval)})"
-            if whole
-            else f"({'double' if dtype == 'float64' else 'float'})step * {number(self.interval)}",
+            "interval_us": self.interval_us,
+            "before_wrap_us": self.before_wrap_us,
             "tolerance": "0" if whole else number(_FLOAT_TOLERANCE[dtype] * size),
         }
 
@@ -89,6 +93,7 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
     Steps are as long as the windows can span, so that it is short.
     """
     interval_s, full_at = _interval(plan, windows)
+    interval_us = round(interval_s * 1e6)
     period = max(_PERIOD, full_at)
     first, rise, jump = np.zeros((3, len(plan.sensors)))
     for i, sensor in enumerate(plan.sensors):
@@ -101,14 +106,14 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
     fixed = numbers["fixed"]
     if fixed is None:
         return SelfTest(
-            tuple(first), tuple(rise), tuple(jump), interval_s, gyro, period, (*checks, checks[-1] + 1)
+            tuple(first), tuple(rise), tuple(jump), interval_us, gyro, period, (*checks, checks[-1] + 1)
         )
     unit = fixed["temperature_value"]
     return SelfTest(
         tuple(np.round(first / unit)),
         tuple(np.maximum(np.round(rise / unit), 1.0)),
         tuple(np.clip(np.round(jump / unit), 0, fixed["temperature_most"] / 2 - np.round(first / unit))),
-        round(interval_s * 1e6),
+        interval_us,
         round(gyro / fixed["gyro_value"]),
         period,
         (*checks, checks[-1] + 1),
