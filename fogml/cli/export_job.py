@@ -82,4 +82,6 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         rows.append(["Cortex-M4", f"{size['flash_bytes']} bytes of flash, {size['ram_bytes']} of RAM"])
     elif report["to"] == "c":
         rows.append(["Cortex-M4", "not measured: arm-none-eabi-gcc is not installed"])
+    if beyond := report.get("beyond_the_box"):
+        rows.append(["beyond the trained box", beyond])
     terminal.table(f"{report['model']['kind']} exported to {settings.out}", ["", ""], rows)

@@ -100,8 +100,21 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             i: f"INT64_C({round(operator.window.length_s * 1e6)}), INT64_C({operator.needed_ticks})"
             for i, operator in windows.of_method("lag")
         },
+        "rule": _thermometer(plan, bits, fixed["temperature_most"]),
         "half_widths": [f"INT64_C({round(atom.memory * 2.0**_HELD_BITS)})" for atom in windows.plays],
         "columns": _columns(plan, scales),
+    }
+
+
+def _thermometer(plan: Plan, bits: int, most: float) -> dict[str, str]:
+    """What a thermometer can show, in the steps of temperatures; the ends of their type are none."""
+    rule, step = plan.thermometer, 2.0**-bits
+    return {
+        "low": f"INT32_C({round(max(rule.low_degC / step, 1.0 - most))})",
+        "high": f"INT32_C({round(min(rule.high_degC / step, most - 1.0))})",
+        "jump": f"INT64_C({round(rule.jump_degC / step)})",
+        "rate": f"INT64_C({round(rule.rate_degC_s / step)})",
+        "note": f", steps of 2^-{bits}",
     }
 
 

@@ -98,6 +98,13 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
             for i, operator in windows.of_method("lag")
         },
+        "rule": {
+            "low": number(max(plan.thermometer.low_degC, -(2.0**RANGE_BITS))),
+            "high": number(min(plan.thermometer.high_degC, 2.0**RANGE_BITS)),
+            "jump": number(plan.thermometer.jump_degC),
+            "rate": number(plan.thermometer.rate_degC_s),
+            "note": "",
+        },
         "half_widths": [number(atom.memory) for atom in windows.plays],
         "columns": column_expressions(plan),
     }
@@ -194,11 +201,9 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         lines += [
             f"#define ATOMS {len(plan.atoms)} /* what features are made of */",
             f"#define COLUMNS {len(plan.steps)} /* features */",
-            f"#define TEMPERATURE_LIMIT {number(2.0**RANGE_BITS)} /* [degC], either way */",
         ]
         if not all(is_temperature(name) for name in plan.sensors):
-            most = [2.0**RANGE_BITS if is_temperature(name) else OTHER_LIMIT for name in plan.sensors]
-            lines += array("INPUT_LIMIT", most, dtype, "[FOGML_TEMPERATURES]", real, "either way")
+            lines.append(f"#define INPUT_LIMIT {number(OTHER_LIMIT)} /* of other columns, either way */")
     if windows.ring:
         bits = windows.temperature_bits
         lines.append(

@@ -116,6 +116,9 @@ class CProgram:
         records = np.zeros(len(time), dtype=fields)
         records["time"], records["gyro"] = time.astype(np.uint64), gyro
         if np.size(temperatures):
+            kind = self._types["temperature"]
+            if kind.kind == "i":
+                temperatures = np.clip(temperatures, np.iinfo(kind).min, np.iinfo(kind).max)
             records["temperatures"] = temperatures
         return self._outputs(self._run("steps", records.tobytes()))
 

@@ -132,6 +132,8 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "identifier": sensor_identifier,
         "input_units": input_units(plan),
         "others": not all(is_temperature(name) for name in plan.sensors),
+        "thermometers": [name for name in plan.sensors if is_temperature(name)],
+        "other_inputs": [name for name in plan.sensors if not is_temperature(name)],
         "beyonds": any(atom.operator == "beyond" for atom in plan.atoms),
         "decays": any(atom.operator == "since_on" for atom in plan.atoms),
         "plays": windows.plays,

@@ -87,8 +87,7 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     expected, flags = plan.compensated(past.atoms(plan), gyro)
     if fixed:
         temperatures = np.round(past.temperatures / fixed["temperature_value"])
-        most = fixed["temperature_most"]
-        out, told = program.steps(past.time, np.clip(temperatures, -most, most), np.round(gyro / gyro_step))
+        out, told = program.steps(past.time, temperatures, np.round(gyro / gyro_step))
         out = out * fixed["compensated_value"]
     else:
         out, told = program.steps(past.time, past.temperatures, gyro)

@@ -255,13 +255,15 @@ def _write_numbers(
     rows: TrainingRows | None,
 ) -> tuple[dict[str, Any], Plan]:
     from fogml.export import number_files
+    from fogml.export.onnx_graph import BEYOND
 
     inputs = _own_atoms(plan, settings.seed, rows)
     columns = plan.compose(plan.limited(inputs, np.ones(len(inputs), dtype=np.bool_))[0])
     stored, exported = stored_plan(plan, dtype, columns)
     seed = settings.seed
     if settings.to == "onnx":
-        return {"difference": _write_onnx(plan, folder, dtype, settings, stored, card)}, exported
+        difference = _write_onnx(plan, folder, dtype, settings, stored, card)
+        return {"difference": difference, "beyond_the_box": BEYOND[settings.pipeline]}, exported
     if settings.to == "json":
         number_files.write_json(folder, plan, stored, dtype, card)
         read = [*number_files.read_json(folder, plan)]

@@ -21,6 +21,12 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 OPSET, IR_VERSION = 17, 8
+BEYOND = {
+    True: "levelled off, and flagged by the output 'flag'",
+    False: "neither levelled off nor flagged: limit the features to the trained box first, as fogml's "
+    "Features.limit does, or export --with-pipeline or --to c",
+}
+"""What a graph does beyond the trained box, by whether it is one from a window."""
 _MOST_WINDOW = 200_000
 
 
@@ -31,7 +37,8 @@ def onnx_model(
 
     Inputs are ``features`` (n, k), limited as `Features.limit` does, or with `pipeline`
     ``temperatures`` (n, m, s): n windows of the last m samples of s temperatures, newest last; a
-    joint model takes ``gyro`` (n) [deg/h] besides. The output is ``drift`` (n) [deg/h].
+    joint model takes ``gyro`` (n) [deg/h] besides. The output is ``drift`` (n) [deg/h]; with `pipeline`,
+    which levels off beyond the trained box itself, ``flag`` (n) too: 1 outside the box, else 0.
 
     Raises
     ------
@@ -57,7 +64,7 @@ def onnx_model(
     if pipeline:
         weights = window_weights(plan)
         inputs.append(helper.make_tensor_value_info("temperatures", kind, ["n", *weights.shape[:2]]))
-        columns = _columns_of_window(graph, plan, weights)
+        columns, outside = _columns_of_window(graph, plan, weights)
     else:
         inputs.append(helper.make_tensor_value_info("features", kind, ["n", len(plan.names)]))
         columns = "features"
@@ -65,8 +72,11 @@ def onnx_model(
     if plan.form == "joint":
         inputs.append(helper.make_tensor_value_info("gyro", kind, ["n"]))
     graph.add("Identity", [drift], "drift")
-    output = helper.make_tensor_value_info("drift", kind, ["n"])
-    whole = helper.make_graph(graph.nodes, "fogml", inputs, [output], graph.constants, doc_string=card)
+    outputs = [helper.make_tensor_value_info("drift", kind, ["n"])]
+    if pipeline:
+        graph.add("Identity", [outside], "flag")
+        outputs.append(helper.make_tensor_value_info("flag", TensorProto.INT64, ["n"]))
+    whole = helper.make_graph(graph.nodes, "fogml", inputs, outputs, graph.constants, doc_string=card)
     opset = [helper.make_opsetid("", OPSET)]
     model = helper.make_model(
         whole, opset_imports=opset, ir_version=IR_VERSION, producer_name="fogml", producer_version=__version__
@@ -76,6 +86,7 @@ def onnx_model(
         "sample_s": repr(plan.sample_s),
         "unit": "deg/h",
         "model": plan.kind,
+        "beyond_the_box": BEYOND[pipeline],
     }
     helper.set_model_props(model, facts)
     checker.check_model(model, full_check=True)
@@ -171,7 +182,8 @@ class _Graph:
         return self.add("Gather", [value, self.whole(list(places))], axis=1)
 
 
-def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> str:
+def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[str, str]:
+    """Feature columns (n, k), and whether a window's end lies outside the trained box, int64 (n)."""
     flat = graph.add("Reshape", ["temperatures", graph.whole([-1, weights.shape[0] * weights.shape[1]])])
     atoms = graph.add("MatMul", [flat, graph.constant(weights.reshape(-1, weights.shape[2]))])
     signs = np.array([atom.operator == "sign" for atom in plan.atoms])
@@ -183,6 +195,15 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> str:
         direction = graph.add("Sub", [up, down])
         atoms = graph.add("Where", [graph.constant(signs, np.bool_), direction, atoms])
     limits = plan.limits
+    past = graph.add(
+        "Or",
+        [
+            graph.add("Less", [atoms, graph.constant(limits.inner)]),
+            graph.add("Greater", [atoms, graph.constant(limits.outer)]),
+        ],
+    )
+    whole = graph.add("Cast", [past], to=7)  # TensorProto.INT64, as not every type can be the greatest
+    outside = graph.add("ReduceMax", [whole], axes=[1], keepdims=0)
     low, high, margin, zero = (graph.constant(v) for v in (limits.low, limits.high, limits.margin, 0.0))
     over = graph.add("Max", [graph.add("Sub", [atoms, high]), zero])
     under = graph.add("Max", [graph.add("Sub", [low, atoms]), zero])
@@ -197,7 +218,7 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> str:
         for factor in factors:
             value = graph.add("Mul", [value, factor])
         columns.append(value)
-    return graph.add("Concat", columns, axis=1)
+    return graph.add("Concat", columns, axis=1), outside
 
 
 def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str) -> str:

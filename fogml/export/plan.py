@@ -16,6 +16,7 @@ from fogml.features.features import Features
 from fogml.features.reach import reaching_box
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
+from fogml.runs.dropouts import RULE, DropoutRule
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -104,6 +105,8 @@ class Plan:
         Median sample interval of training [s].
     gyro_unit
         Unit of the output that the model takes.
+    thermometer
+        What a thermometer can show; other readings are taken for none.
     """
 
     kind: str
@@ -119,6 +122,7 @@ class Plan:
     columns: tuple[int, ...] = ()
     edge_columns: tuple[int, ...] = ()
     edge: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
+    thermometer: DropoutRule = RULE
 
     @classmethod
     def of(cls, model: DriftModel, sample_s: float | None = None) -> Plan:
@@ -186,7 +190,7 @@ class Plan:
 
     def limited(self, atoms: FloatArray, full: BoolArray) -> tuple[FloatArray, BoolArray]:
         """Limited atoms (n, a), and which rows lie outside the trained box (n,)."""
-        return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :])
+        return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :] | (atoms != 0.0))
 
     def compensated(self, atoms: AtomValues, gyro: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
         """Compensated output [deg/h] and flags, each (n,), from atoms (n, a) and the output (n,)."""

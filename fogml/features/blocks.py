@@ -7,7 +7,8 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.features.atoms import AtomValues, Memories
 from fogml.features.features import Features
-from fogml.runs.run import Run
+from fogml.features.unmeasured import unmeasured_rows
+from fogml.runs.run import FloatArray, Run
 
 
 class FeatureBlocks:
@@ -28,6 +29,7 @@ class FeatureBlocks:
         self._sample_s = sample_s
         self._history: Run | None = None
         self._memories: Memories = {}
+        self._last: tuple[FloatArray, bool] | None = None
 
     def push(self, block: Run) -> AtomValues:
         """Atom values of the next block, as `Features.atom_values` gives them for the whole.
@@ -48,10 +50,20 @@ class FeatureBlocks:
         values, full, settled = self._features.atom_values(
             joined, self._sample_s, memories=self._memories, skip=added
         )
+        unmeasured = unmeasured_rows(self._features.atoms, joined)
+        if unmeasured is not None and self._last is not None:
+            # Before the block's first measured row, what the block before ended with is held.
+            held = slice(added, added + int(np.argmin(np.append(unmeasured[added:], False))))
+            values[held], settled[held] = self._last
         if len(joined):
+            self._last = values[-1].copy(), bool(settled[-1])
             # Two intervals more than the memory, so that no window's edge can fall off.
             oldest = joined.time[-1] - self._features.memory_s - 2.0 * self._sample_s
-            kept = min(int(np.searchsorted(joined.time, oldest)), len(joined) - 1)
+            # From the row before that on: a gap may lie between, which windows span.
+            kept = max(0, int(np.searchsorted(joined.time, oldest, side="right")) - 1)
+            if unmeasured is not None:
+                # From a measured row on, so that its windows are as long.
+                kept = max([0, *np.flatnonzero(~unmeasured[: kept + 1])[-1:].tolist()])
             self._history = joined.end(kept, self._kept(joined))
         return AtomValues(values[added:], full[added:], settled[added:])
 

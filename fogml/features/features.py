@@ -258,7 +258,7 @@ class Features:
             Shape (n, a).
         full
             Where the windows are full, as `atom_values` tells, shape (n,). Elsewhere windowed
-            atoms stay 0 and don't count as outside. None takes all as full.
+            atoms that are 0 stay so and don't count as outside. None takes all as full.
         linear
             Whether the model goes on linearly beyond its training rows.
 
@@ -270,8 +270,12 @@ class Features:
             Rows with an atom more than 1 % of its span beyond the box.
         """
         in_full = None if full is None else np.asarray(full, dtype=np.bool_)
-        heeded = [None if atom.window is None else in_full for atom in self._atoms]
         values, box = atom_matrix(atom_values, len(self._atoms)), self._learned_box()
+        heeded = [
+            # What is held while a thermometer fails is of windows that were full.
+            None if atom.window is None or in_full is None else in_full | (column != 0.0)
+            for atom, column in zip(self._atoms, values.T)
+        ]
         limited, outside = box.limit(values, heeded)
         if linear and limited is not values:
             limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)

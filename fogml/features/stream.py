@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
@@ -12,6 +13,8 @@ from fogml.errors import InputError
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window, direction
 from fogml.features.features import Features
 from fogml.features.signal import TIME_ON, Signal
+from fogml.runs.columns import is_temperature
+from fogml.runs.thermometer_stream import ThermometerStream, Told
 from fogml.signals import window_streams
 
 FloatArray = NDArray[np.float64]
@@ -82,17 +85,30 @@ class FeatureStream:
             _ = features.box
         self._last_s = -np.inf
         self._weights: dict[Signal, dict[str, float]] | None = None
+        self._sample_s = sample_s
+        self._thermometers: dict[str, ThermometerStream] = {}
+        self._start()
+
+    def _start(self) -> None:
+        """Windows and memories of which nothing is known yet."""
         self._operators = {
-            key: _operator(key[1], sample_s, key[2])
-            for key in map(_operator_key, features.atoms)
+            key: _operator(key[1], self._sample_s, key[2])
+            for key in map(_operator_key, self._features.atoms)
             if key is not None
         }
         self._memories = {
-            atom: memory for atom in features.atoms if (memory := atom.memory_operator(sample_s)) is not None
+            atom: memory
+            for atom in self._features.atoms
+            if (memory := atom.memory_operator(self._sample_s)) is not None
         }
+        count = len(self._features.atoms)
+        self._held = StreamStep(np.zeros(len(self._features)), np.zeros(count), False, False, False)
 
     def step(self, time_s: float, temperatures: Mapping[str, float]) -> StreamStep:
         """Take one sample.
+
+        One at which a temperature was not measured (`fogml.runs.dropouts`) is not taken in: what the last
+        measured sample gave is held, its windows not full.
 
         Parameters
         ----------
@@ -122,6 +138,8 @@ class FeatureStream:
         except KeyError as error:
             raise InputError(f"feature stream: no column {error} at {time_s} s") from error
         self._last_s = time_s
+        if not self._measured(time_s, temperatures):
+            return self._held._replace(full=False)
         steps = {
             key: operator.step(time_s, signal_values[key[0]]) for key, operator in self._operators.items()
         }
@@ -145,7 +163,21 @@ class FeatureStream:
         if self._judged:
             heeded, outside = self._features.limit(atoms, [full], linear=self._linear)
         values = self._features.compose(heeded if self._limited else atoms)
-        return StreamStep(values[0], atoms[0], full, settled, bool(outside[0]))
+        self._held = StreamStep(values[0], atoms[0], full, settled, bool(outside[0]))
+        return self._held
+
+    def _measured(self, time_s: float, temperatures: Mapping[str, float]) -> bool:
+        """Whether all temperatures in use are readings; where a first one was none, begin anew."""
+        assert self._weights is not None
+        used = dict.fromkeys(name for weights in self._weights.values() for name in weights)
+        told = [
+            self._thermometers.setdefault(name, ThermometerStream()).read(time_s, temperatures[name])
+            for name in used
+            if is_temperature(name)
+        ]
+        if Told.FIRST in told:
+            self._start()
+        return Told.MISSING not in told and all(math.isfinite(temperatures[name]) for name in used)
 
 
 def _operator_key(atom: Atom) -> tuple[Signal, Window, float | None] | None:

@@ -1,12 +1,20 @@
-"""Rows at which a temperature was not measured: no window over them is full."""
+"""Rows at which a temperature was not measured: no window or memory takes them in."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from fogml.features.atoms import Atom, Memories, evaluate
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.signals.clock import longest_gap_s
+
+
+def unmeasured_rows(atoms: Sequence[Atom], run: Run) -> BoolArray | None:
+    """Rows at which a temperature of the atoms was not measured (`Run.dropouts`); None if there are none."""
+    names = dict.fromkeys(name for atom in atoms for name in atom.signal.sensors)
+    masks = [bad for name in names if (bad := run.dropouts(name)) is not None]
+    return np.logical_or.reduce(masks) if masks else None
 
 
 def evaluate_measured(
@@ -17,32 +25,29 @@ def evaluate_measured(
     memories: Memories | None,
     skip: int,
 ) -> tuple[BoolArray, BoolArray]:
-    """As `evaluate` of atoms into `values` of shape (n, a), with windows full only of measurements.
+    """As `evaluate` of atoms into `values` of shape (n, a), from the rows alone at which all was measured.
 
-    No window is full where a temperature was not measured (`Run.dropouts`), nor after so long a time
-    without a measurement that it would be a gap.
+    To windows and memories the other rows are a gap. At those the values of the last measured row are held,
+    before the first one its own, and no window counts as full.
     """
-    full, settled = evaluate(atoms, run, sample_s, list(values.T), memories, skip)
-    names = dict.fromkeys(name for atom in atoms for name in atom.signal.sensors)
-    unmeasured = [bad for name in names if (bad := run.dropouts(name)) is not None]
-    if not unmeasured:
-        return full, settled
-    window_s = max((atom.window.span_s for atom in atoms if atom.window is not None), default=0.0)
-    spoiled = _spoiled(run, np.logical_or.reduce(unmeasured), window_s, sample_s)
-    for atom, column in zip(atoms, values.T, strict=True):
-        if atom.window is not None:
-            column[spoiled] = 0.0
-    return full & ~spoiled, settled
+    unmeasured = unmeasured_rows(atoms, run)
+    if unmeasured is None:
+        return evaluate(atoms, run, sample_s, list(values.T), memories, skip)
+    measured = ~unmeasured
+    if not measured.any():
+        values[:] = 0.0
+        return measured, measured.copy()
+    part = np.empty((int(np.count_nonzero(measured)), len(atoms)), order="F")
+    taken = int(np.count_nonzero(measured[:skip]))
+    nominal = run.sample_s if sample_s is None else sample_s
+    full, settled = evaluate(atoms, _rows(run, measured), nominal, list(part.T), memories, taken)
+    held = np.maximum(np.cumsum(measured) - 1, 0)
+    values[:] = part[held]
+    return full[held] & measured, settled[held]
 
 
-def _spoiled(run: Run, unmeasured: BoolArray, window_s: float, sample_s: float | None) -> BoolArray:
-    """Rows without a measurement, and those after so many that a window would take them for a gap."""
-    if not window_s or not unmeasured.any():
-        return unmeasured
-    longest = longest_gap_s(window_s, run.sample_s if sample_s is None else sample_s)
-    edges = np.flatnonzero(np.diff(unmeasured, prepend=False, append=False))
-    spoiled = unmeasured.copy()
-    for start, stop in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
-        if stop < len(run) and run.time[stop] - run.time[max(start - 1, 0)] > longest:
-            spoiled[stop : int(np.searchsorted(run.time, run.time[stop] + window_s))] = True
-    return spoiled
+def _rows(run: Run, measured: BoolArray) -> Run:
+    """The rows of a mask at which all was measured; a thermometer not in use goes on as it is held."""
+    rows = np.flatnonzero(measured)
+    columns = {name: values[rows] for name, values in run.without_dropouts.columns.items()}
+    return Run.derived(run.name, columns, run.facts, run.gyro_unit)

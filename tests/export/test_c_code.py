@@ -18,6 +18,7 @@ from fogml.export.c_program import FLAGS, RUNNING, CProgram, cortex_m4_size
 from fogml.export.c_source import c_source
 from fogml.export.check import expected_outputs
 from fogml.export.plan import Plan
+from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 from tests.export.conftest import NAMES, training_run
@@ -49,7 +50,8 @@ def disturbed(seed: int, jitter: float = 0.0) -> Run:
 def outputs(program: CProgram, source, run: Run):
     """Outputs [deg/h] and flags of the program for a run."""
     plan, fixed = source.plan, source.numbers["fixed"]
-    temperatures = np.column_stack([run.temperature(name) for name in plan.sensors]) if plan.sensors else []
+    recorded = [run.columns["T_in" if name == "T" else name] for name in plan.sensors]
+    temperatures = np.column_stack(recorded) if recorded else []
     if fixed is None:
         return program.steps(run.time, temperatures, run.gyro)
     whole = np.round(np.asarray(temperatures) / fixed["temperature_value"])
@@ -141,22 +143,58 @@ def test_the_self_test_notices_a_changed_number(model_of, tmp_path, dtype):
     assert CProgram(source, tmp_path).self_test() != 0
 
 
-def test_a_broken_sensor_or_clock_is_flagged_and_nothing_is_subtracted(model_of, tmp_path):
-    program = CProgram(
-        c_source(Plan.of(model_of("polynomial")), "float64", []),
-        tmp_path,
-        flags=SANITIZERS,
-        running=WITH_SHADOW,
-    )
-    time = 2.0 * np.arange(200.0)
-    temperature = np.full((200, 1), 20.0)
-    temperature[150], temperature[151], temperature[152] = np.nan, np.inf, -1e30
-    out, flag = program.steps(time, temperature, np.full(200, 3.0))
-    for broken in (150, 151, 152):
-        assert flag[broken] == 1
-        assert out[broken] == 3.0
-    assert np.all(np.isfinite(np.delete(out, [150, 151, 152])))
-    assert flag[199] == 0
+def faulty(run: Run) -> Run:
+    """The run with readings that are none: sentinels and jumps, alone and in spells."""
+    rng = np.random.default_rng(11)
+    columns = {name: values.copy() for name, values in run.columns.items()}
+    for place in np.flatnonzero(rng.random(len(run)) < 0.02):
+        spell = slice(max(place, 20), max(place, 20) + int(rng.choice([1, 3, 40], p=[0.8, 0.15, 0.05])))
+        columns[rng.choice(["T_in", "T_out"])][spell] = rng.choice([-127.0, 85.0, 999.0, -9999.0])
+    return Run("faulty", columns)
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype"), [("memory", "float64"), ("polynomial", "float32"), ("rich", "q31")]
+)
+def test_readings_that_are_none_enter_neither_windows_nor_memories(model_of, tmp_path, name, dtype):
+    model, run = model_of(name), faulty(disturbed(5))
+    source = c_source(Plan.of(model), dtype, [])
+    expected = model.compensate(run)
+    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    scale = 1.0 if dtype == "float64" else 5.0
+    np.testing.assert_allclose(out, expected.compensated, atol=scale * BOUND[dtype], rtol=1e-6)
+    assert np.count_nonzero(flag != expected.flag) <= (0 if dtype == "float64" else 4)
+    # Sample by sample and block by block as the whole.
+    stream, names = model.stream(run.sample_s), ("T_in", "T_out")
+    rows = zip(run.time, *(run.columns[name] for name in names))
+    steps = [stream.step(time, dict(zip(names, readings))) for time, *readings in rows]
+    drift = model.regressor_.predict(np.array([step.values for step in steps]))
+    np.testing.assert_allclose(drift, expected.drift, atol=1e-9)
+    parts = [run[low : low + 70] for low in range(0, len(run), 70)]
+    in_blocks = [part for _, part in compensate_blocks(model, parts)]
+    np.testing.assert_allclose(np.concatenate([p.drift for p in in_blocks]), expected.drift, atol=1e-9)
+    np.testing.assert_array_equal(np.concatenate([p.flag for p in in_blocks]), expected.flag)
+    # Where a reading is none the last drift is held.
+    bad = np.logical_or.reduce([run.dropouts(sensor) for sensor in model.sensors])
+    assert np.all(expected.flag[bad] == 2)
+    held = np.flatnonzero(bad)
+    np.testing.assert_allclose(expected.drift[held], expected.drift[held - 1], atol=1e-12)
+
+
+def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model_of, tmp_path):
+    source = c_source(Plan.of(model_of("polynomial")), "float64", [])
+    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
+    temperature = np.full((300, 1), 20.0)
+    for place, broken in ((150, np.nan), (151, np.inf), (152, -1e30), (153, 85.0), (154, 85.0)):
+        temperature[place] = broken
+    out, flag = program.steps(2.0 * np.arange(300.0), temperature, np.full(300, 3.0))
+    np.testing.assert_array_equal(out[150:155], out[149])
+    np.testing.assert_array_equal(flag[148:156], [0, 0, 2, 2, 2, 2, 2, 0])
+    temperature[0] = 85.0  # as a DS18B20 shows at power-on
+    late, flag_late = program.steps(2.0 * np.arange(300.0), temperature, np.full(300, 3.0))
+    np.testing.assert_array_equal(flag_late[2:150], flag[1:149])
+    np.testing.assert_array_equal(flag_late[150:], flag[150:])
+    np.testing.assert_array_equal(late[3:], out[3:])
 
 
 def test_a_clock_that_steps_back_starts_the_windows_anew(model_of, tmp_path):

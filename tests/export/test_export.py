@@ -93,7 +93,8 @@ def test_onnx(model_of, tmp_path, name, pipeline, dtype):
     run = training_run() if name != "joint" else disturbed(4)
     plan = Plan.of(model)
     real = np.float64 if dtype == "float64" else np.float32
-    assert [output.name for output in session.get_outputs()] == ["drift"]
+    names = ["drift", "flag"] if pipeline else ["drift"]
+    assert [output.name for output in session.get_outputs()] == names
     if pipeline:
         entry = session.get_inputs()[0]
         assert entry.name == "temperatures"
@@ -110,7 +111,9 @@ def test_onnx(model_of, tmp_path, name, pipeline, dtype):
         feed = {"features": model.features_.transform(run, limited=True, linear=True)[ends].astype(real)}
     if name == "joint":
         feed["gyro"] = run.gyro[ends].astype(real)
-    drift = session.run(["drift"], feed)[0]
+    drift, *flag = session.run(names, feed)
+    if flag:
+        np.testing.assert_array_equal(flag[0], model.compensate(run).flag[ends] == 1)
     bound = {"float64": 1e-8, "float32": 2e-3, "int8": 0.2}[dtype]
     np.testing.assert_allclose(drift, model.predict(run)[ends], atol=bound)
 
