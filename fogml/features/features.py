@@ -16,7 +16,7 @@ from fogml.features.grammar import parse_terms
 from fogml.features.reach import reaching_box
 from fogml.features.signal import check_holds
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
-from fogml.features.unmeasured import evaluate_measured
+from fogml.features.unmeasured import evaluate_measured, heeded_rows
 from fogml.runs.run import Run
 
 if TYPE_CHECKING:
@@ -257,8 +257,8 @@ class Features:
         atom_values
             Shape (n, a).
         full
-            Where the windows are full, as `atom_values` tells, shape (n,). Elsewhere windowed
-            atoms that are 0 stay so and don't count as outside. None takes all as full.
+            Where the windows are full, as `atom_values` tells, shape (n,); None takes all as full.
+            Elsewhere windowed atoms that are 0 stay so and don't count as outside.
         linear
             Whether the model goes on linearly beyond its training rows.
 
@@ -271,11 +271,7 @@ class Features:
         """
         in_full = None if full is None else np.asarray(full, dtype=np.bool_)
         values, box = atom_matrix(atom_values, len(self._atoms)), self._learned_box()
-        heeded = [
-            # What is held while a thermometer fails is of windows that were full.
-            None if atom.window is None or in_full is None else in_full | (column != 0.0)
-            for atom, column in zip(self._atoms, values.T)
-        ]
+        heeded = heeded_rows(self._atoms, values, in_full)
         limited, outside = box.limit(values, heeded)
         if linear and limited is not values:
             limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)

@@ -46,6 +46,20 @@ def evaluate_measured(
     return full[held] & measured, settled[held]
 
 
+def heeded_rows(atoms: Sequence[Atom], values: FloatArray, full: BoolArray | None) -> list[BoolArray | None]:
+    """For each atom the rows (n,) at which its value (n, a) means something; None where all do.
+
+    A windowed atom is 0 where its window is not full, save what is held of a full one while a thermometer
+    fails.
+    """
+    if full is None:
+        return [None] * len(atoms)
+    return [
+        None if atom.window is None else full | (column != 0.0)
+        for atom, column in zip(atoms, values.T, strict=True)
+    ]
+
+
 def _rows(run: Run, measured: BoolArray) -> Run:
     """The rows of a mask at which all was measured; a thermometer not in use goes on as it is held."""
     rows = np.flatnonzero(measured)
