@@ -12,6 +12,7 @@ from fogml.twin import registry
 from fogml.twin.effect import SET_UP, STAGES, Effect
 from fogml.twin.inputs import REST, STAND_INS
 from fogml.twin.quantities import GRADES
+from fogml.twin.scenes import scene_names
 
 _WORD = re.compile(r"[a-z]{2,}(_[a-z]{2,})*\Z")
 
@@ -31,6 +32,7 @@ def check_declaration(effect: Effect) -> None:
     assert re.search(r"\bSources?:", text), f"{name}: the docstring has no line 'Source:'"
     assert effect.sources and all(source.strip() for source in effect.sources), f"{name} states no sources"
     assert effect.shows.strip(), f"{name} does not say where it shows"
+    assert effect.shown_on in scene_names(), f"{name} is shown on '{effect.shown_on}', which is no scene"
     for other, what in effect.confused_with.items():
         assert other != effect.id and what.strip(), f"{name}: confused_with '{other}' says nothing"
     known = {*STAND_INS, *REST, *SET_UP}
