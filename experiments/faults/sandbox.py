@@ -56,13 +56,12 @@ class Limits:
     wall_s
         Time after which a process that waits is killed [s]; on a busy machine all takes longer.
     memory_bytes
-        Growth of the process's memory [bytes]. A page of a Parquet file states its size in 31 bits, and
-        room for that much is taken before its checksum is known to be wrong.
+        Growth of the process's memory [bytes].
     """
 
     cpu_s: float = 10.0
     wall_s: float = 120.0
-    memory_bytes: int = 9 << 28
+    memory_bytes: int = 1 << 30
 
 
 @dataclass
