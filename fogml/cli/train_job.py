@@ -99,6 +99,7 @@ def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], 
         raise InputError("no test run is given; name at least one after --test")
     train_runs = open_runs(settings.runs, terminal, repair=settings.repair)
     test_runs = open_runs(settings.test, terminal, repair=settings.repair)
+    check_turn_on_band(settings.turn_on_band, (*train_runs, *test_runs))
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *test_runs)])
     return train_runs, test_runs

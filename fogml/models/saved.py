@@ -99,7 +99,7 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
 
 
 def load_model(folder: str | Path) -> DriftModel:
-    """The model in a folder that `save_model` wrote, or whose ``model.json`` is given.
+    """The model of a folder that `save_model` wrote, of its ``model.json``, or of the results that hold it.
 
     Raises
     ------
@@ -109,6 +109,8 @@ def load_model(folder: str | Path) -> DriftModel:
     folder = Path(folder)
     if folder.name == MODEL_FILE:
         folder = folder.parent
+    if not (folder / MODEL_FILE).is_file() and (folder / "model" / MODEL_FILE).is_file():
+        folder = folder / "model"  # results of a training were named
     path = folder / MODEL_FILE
     values = read_json(path, _REMEDY, _MOST_MODEL_BYTES)
     if isinstance(values, dict) and values.get("schema") == "fogml.model/1":

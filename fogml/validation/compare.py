@@ -74,7 +74,7 @@ def compare(
     """
     limits = check_limits(limits or {})
     check_design_index(design_index)
-    check_turn_on_band(turn_on_band)
+    check_turn_on_band(turn_on_band, (*train_runs, *(test_runs or ())))
     contest = _Contest(dict(makers), averaging_s, turn_on_band, any_unit, noise, step or (lambda name: None))
     if test_runs is not None:
         judgements = contest.judged(train_runs, test_runs, design_index, limits)

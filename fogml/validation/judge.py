@@ -20,6 +20,7 @@ from fogml.validation.reach import out_of_reach
 from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import AveragedSeries, Judgement, RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors, training_means
+from fogml.validation.turn_on import check_turn_on_band
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -88,6 +89,7 @@ def judge(
         raise InputError("a judgement needs at least one training run and one test run")
     limits = check_limits(limits or {})
     check_design_index(design_index)
+    check_turn_on_band(turn_on_band, (*train, *test))
     train_errors = [_within(run_errors(model, run, any_unit=True), beside) for run in train]
     test_errors = [_within(run_errors(model, run, any_unit=any_unit), beside) for run in test]
     return judgement_of(

@@ -3,21 +3,27 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray
+from fogml.runs.run import FloatArray, Run
 
 SETTLED_SHARE = 0.25
 """The last quarter of a run's averages tells the settled bias."""
 LEAST_AVERAGES = 8
 
 
-def check_turn_on_band(band: float | None) -> None:
-    """Raise `InputError` for a band that is no positive number of deg/h."""
+def check_turn_on_band(band: float | None, runs: Iterable[Run] | None = None) -> None:
+    """Raise `InputError` for a band that is no positive number of deg/h, or that no run of `runs` answers."""
     if band is not None and not (math.isfinite(band) and band > 0.0):
         raise InputError(f"turn-on band {band:g} deg/h: a positive number is needed")
+    if band is not None and runs is not None and all(run.facts.powered_on is None for run in runs):
+        raise InputError(
+            f"turn-on band {band:g} deg/h: no run states when the gyro was switched on; write "
+            "'powered_on: SECONDS' into a side file, on the run's own clock, or leave the band out"
+        )
 
 
 def turn_on_time(

@@ -412,3 +412,7 @@ class TestScikitLearn:
         self.swap(folder, skops.io.dumps(StandardScaler()))
         with pytest.raises(InputError, match="regressor"):
             load_model(folder)
+
+
+def test_results_of_a_training_name_their_model(folder, model, train):
+    assert np.array_equal(load_model(folder.parent).predict(train), model.predict(train))

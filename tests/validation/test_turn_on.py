@@ -70,3 +70,9 @@ def test_what_a_run_does_not_tell_is_not_told():
 def test_a_band_must_be_positive(band):
     with pytest.raises(InputError, match="turn-on band"):
         told(warming(), band)
+
+
+def test_a_band_that_no_run_answers_is_told():
+    unknown = warming(powered_on=None)
+    with pytest.raises(InputError, match="no run states when the gyro was switched on"):
+        judge(KnownDrift().fit(unknown), unknown, unknown, turn_on_band=0.05)
