@@ -22,9 +22,12 @@ class TrainRunsCommand(typer.core.TyperCommand):
 @app.command(cls=TrainRunsCommand)
 def export(
     model: Annotated[
-        str | None, typer.Argument(metavar="MODEL", help="Folder of the model: DIR/model.")
+        list[str] | None,
+        typer.Argument(metavar="MODEL...", help="Folder of the model; of tables, up to three axes."),
     ] = None,
-    to: Annotated[str | None, typer.Option("--to", help="c, onnx, json or mat.")] = None,
+    to: Annotated[
+        str | None, typer.Option("--to", help="c, onnx, json, mat; segments, px4 or ardupilot.")
+    ] = None,
     dtype: Annotated[
         str | None, typer.Option("--dtype", help="float64, float32, float16, int8, q15 or q31.")
     ] = None,
@@ -39,6 +42,16 @@ def export(
     tolerance: Annotated[
         float | None,
         typer.Option("--tolerance", metavar="DEG/H", help="Largest difference from the model allowed."),
+    ] = None,
+    breakpoints: Annotated[
+        int | None,
+        typer.Option("--breakpoints", metavar="K", help="Of segments; as few as the tolerance allows."),
+    ] = None,
+    matrix: Annotated[
+        str | None,
+        typer.Option(
+            "--matrix", metavar="FILE", help="3 x 3 matrix (YAML) that three axes are multiplied by."
+        ),
     ] = None,
     sample_s: Annotated[
         float | None,
@@ -61,6 +74,9 @@ def export(
     Writes fogml_model.* and export.json. C code takes raw temperatures sample by sample; it is
     compiled and run against the model before it is written. Exit status 2, and nothing written, if
     it differs by more than the tolerance.
+
+    Segments are a table of bias and scale factor over one temperature (CSV, JSON, C); px4 and
+    ardupilot are parameter files with a cubic. Both hold what the model says at rest.
     """
     from fogml.cli.export_job import ExportJobSettings, export_and_write
 
@@ -73,6 +89,8 @@ def export(
             "bytes": byte_budget,
             "with_pipeline": with_pipeline,
             "tolerance": tolerance,
+            "breakpoints": breakpoints,
+            "matrix": matrix,
             "sample_s": sample_s,
             "train": train,
             "out": str(out) if out else None,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any, ClassVar
+
+from pydantic import field_serializer, field_validator
 
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import Settings, absolute
@@ -11,37 +14,52 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
+TABLE_TARGETS = ("segments", "px4", "ardupilot")
+
 
 class ExportJobSettings(Settings):
     """Settings of ``fogml export``."""
 
-    path_keys: ClassVar[tuple[str, ...]] = ("model", "train")
-    model: str | None = None
+    path_keys: ClassVar[tuple[str, ...]] = ("model", "train", "matrix")
+    model: list[str] = []
     to: str = "c"
     dtype: str | None = None
     bytes: int | None = None
     with_pipeline: bool = False
     tolerance: float | None = None
     sample_s: float | None = None
+    breakpoints: int | None = None
+    matrix: str | None = None
     train: list[str] = []
     out: str = "export-results"
 
     def in_full(self) -> ExportJobSettings:
         """The settings with every path in full."""
-        assert self.model is not None
-        paths = {"model": absolute(self.model), "out": absolute(self.out)}
-        return self.model_copy(update={**paths, "train": [absolute(path) for path in self.train]})
+        lists = {key: [absolute(path) for path in getattr(self, key)] for key in ("model", "train")}
+        matrix = None if self.matrix is None else absolute(self.matrix)
+        return self.model_copy(update={**lists, "matrix": matrix, "out": absolute(self.out)})
+
+    @field_serializer("model")
+    def _one_as_text(self, value: list[str]) -> str | list[str]:
+        return value[0] if len(value) == 1 else value
+
+    @field_validator("model", mode="before")
+    @classmethod
+    def _one_or_several(cls, value: object) -> object:
+        return [value] if isinstance(value, str) else value
 
 
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:
     """Export a model into ``settings.out``, whole or not at all, and print what came of it."""
     from fogml.export.export import ExportSettings, export_model
+    from fogml.export.tables import TableSettings, export_tables
     from fogml.models.saved import load_model
 
     if not settings.model:
         raise InputError("no model is given; name the folder of the model, e.g. train-results/model")
+    _check_form(settings)
     with whole_folder(settings.out) as folder:
-        model = load_model(settings.model)
+        models = [load_model(path) for path in settings.model]
         train = open_runs(settings.train, terminal) if settings.train else []
         wanted = ExportSettings(
             settings.to,
@@ -52,13 +70,58 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
             settings.sample_s,
             settings.seed,
         )
-        with terminal.work(f"exporting {model.kind} to {settings.to}"):
-            report = export_model(model, folder, wanted, train)
+        with terminal.work(f"exporting {models[0].kind} to {settings.to}"):
+            if settings.to in TABLE_TARGETS:
+                matrix = None if settings.matrix is None else Path(settings.matrix)
+                tables = TableSettings(
+                    settings.to, settings.dtype, settings.breakpoints, settings.tolerance, matrix
+                )
+                report = export_tables(models, folder, tables, train)
+            else:
+                report = export_model(models[0], folder, wanted, train)
         write_json(folder / "export.json", report)
         settings.write_into(folder, "export")
-    _print(settings, report, terminal)
+    (_print_tables if settings.to in TABLE_TARGETS else _print)(settings, report, terminal)
     terminal.result(report)
     return report
+
+
+def _check_form(settings: ExportJobSettings) -> None:
+    """Hold that what is asked for is of the form asked for."""
+    of_tables = settings.to in TABLE_TARGETS
+    if not of_tables and len(settings.model) > 1:
+        raise InputError(f"--to {settings.to} takes one model; several axes go to {', '.join(TABLE_TARGETS)}")
+    given = {
+        "--bytes": settings.bytes is not None,
+        "--with-pipeline": settings.with_pipeline,
+        "--sample-s": settings.sample_s is not None,
+    }
+    others = {"--breakpoints": settings.breakpoints is not None, "--matrix": settings.matrix is not None}
+    for name, stated in (given if of_tables else others).items():
+        if stated:
+            raise InputError(f"{name} is not for --to {settings.to}; leave it out")
+    if settings.breakpoints is not None and settings.to != "segments":
+        raise InputError(f"--breakpoints is for --to segments; {settings.to} takes a cubic")
+
+
+def _print_tables(settings: ExportJobSettings, report: dict[str, Any], terminal: Terminal) -> None:
+    for axis, told in report["axes"].items():
+        low, high = told["range_degc"]
+        rms, largest = told["rms_difference_at_rest"], told["largest_difference_at_rest"]
+        rows = [
+            ["over", f"{told['thermometer']}, {low:.4g} to {high:.4g} degC"],
+            ["off from the model at rest",
+             f"rms {rms:.2g}, largest {largest:.2g} deg/h"],
+        ]  # fmt: skip
+        if "breakpoints" in told:
+            rows.append(["breakpoints", f"{told['breakpoints']}, {told['bytes']} bytes"])
+        if loss := told.get("accuracy"):
+            text = f"{loss['rms_model']:.4g} deg/h with the model, {loss['rms_exported']:.4g} with the table"
+            rows.append([f"rms of {loss['averaging_s']:g} s averages on the training runs", text])
+        if told["leaves_out"]:
+            rows.append(["leaves out", ", ".join(told["leaves_out"])])
+        title = f"axis {axis}: {told['model']['kind']} as {report['to']}, written to {settings.out}"
+        terminal.table(title, ["", ""], rows)
 
 
 def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Terminal) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -137,6 +137,24 @@ class CProgram:
     def _outputs(self, data: bytes) -> tuple[NDArray[Any], NDArray[np.int32]]:
         answers = np.frombuffer(data, dtype=[("out", self._types["gyro"]), ("flag", "<i4")])
         return answers["out"], answers["flag"]
+
+
+def compiled_output(files: Mapping[str, str], main: str, folder: Path, data: bytes) -> bytes:
+    """What a program of generated C writes for `data`: its files are compiled into `folder` and run.
+
+    Raises
+    ------
+    InputError
+        If the compiler refuses them, or the program fails.
+    """
+    for name, text in files.items():
+        (folder / name).write_text(text, encoding="utf-8")
+    program = folder / "program"
+    _compile([host_compiler(), *FLAGS, str(folder / main), "-o", str(program)])
+    done = _limited([str(program)], RUNNING, "the generated C", data)
+    if done.status != 0:
+        raise InputError(f"export: the generated C failed ({done.status}): {_told(done)}")
+    return done.output
 
 
 def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:

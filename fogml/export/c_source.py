@@ -104,14 +104,15 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     test = test or make_self_test(plan, windows, dtype, numbers)
     numbers["constants"] = [*_clock_constants(windows), *numbers["constants"]]
     context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
-    render = _templates().get_template
+    render = templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
     driver = render("driver.c.j2").render(context)
     return CSource(files, driver, dtype, plan, windows, numbers, test)
 
 
 @cache
-def _templates() -> Environment:
+def templates() -> Environment:
+    """The templates of generated C; all that goes into them is escaped for it."""
     return Environment(
         loader=PackageLoader("fogml.export"),
         undefined=StrictUndefined,

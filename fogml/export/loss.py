@@ -93,6 +93,21 @@ def accuracy_loss(
         rows.target - _value(plan, rows.atoms_of(plan), np.zeros(len(rows.target)))
         for plan in (whole, exported)
     ]
+    return averaged_loss(rows, left, averaging_s)
+
+
+def averaged_loss(rows: TrainingRows, left: Sequence[FloatArray], averaging_s: float) -> dict[str, Any]:
+    """Root mean squares of averages of what a model and an export leave, in all and on five folds of them.
+
+    Parameters
+    ----------
+    rows
+        The training rows.
+    left
+        What the model leaves of their target, and what the export leaves [deg/h], each of shape (n,).
+    averaging_s
+        Averaging time [s].
+    """
     squares: list[FloatArray] = []
     for number in np.unique(rows.run):
         mine = rows.run == number

@@ -88,8 +88,8 @@ def _fault(trial: FrozenTrial, objectives: int) -> str:
         return f"{'.'.join(str(part) for part in first['loc'][:2])}: {first['msg']}".lstrip(": ")
     if trial.state.name != "COMPLETE":
         return ""
-    if "model" not in told.model_fields_set or told.features is None:
-        return "it names no model and features"
+    if not told.model_fields_set >= {"model", "parameters"} or told.features is None:
+        return "it names no model, features and parameters"
     if len(drawn.values or ()) != objectives:
         return f"{objectives} values were expected"
     if not (told.fold_errors and all(told.fold_errors)) or told.bytes is None or told.operations is None:

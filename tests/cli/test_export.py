@@ -74,3 +74,17 @@ def test_without_a_compiler_c_is_refused(invoke, model, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(tmp_path))
     result = invoke("export", model, "-o", tmp_path / "refused", status=2)
     assert "no C compiler" in result.stderr
+
+
+def test_a_table_with_what_it_loses(invoke_json, invoke, model, run_files, tmp_path):
+    out = tmp_path / "table"
+    values = invoke_json("export", model, "--to", "segments", "--train", run_files[0], "-o", out)
+    assert json.loads((out / "export.json").read_text()) == values
+    told = values["axes"]["x"]
+    assert told["accuracy"]["rms_model"] <= told["accuracy"]["rms_exported"]
+    assert (out / "fogml_segments.csv").is_file() and (out / "fogml_segments.h").is_file()
+    again = yaml.safe_load((out / "export.config.yaml").read_text())
+    assert again["model"] == str(model)
+    assert "leave it out" in invoke("export", model, "--to", "px4", "--bytes", 9, status=2).stderr
+    assert "takes one model" in invoke("export", model, model, status=2).stderr
+    assert "leave it out" in invoke("export", model, "--breakpoints", 4, status=2).stderr

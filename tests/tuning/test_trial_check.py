@@ -48,6 +48,7 @@ def test_what_a_sweep_writes_is_taken(tmp_path, attributes):
         {"model": 5},
         {"reference": 7},
         {"bytes": ...},
+        {"parameters": ...},
     ],
 )
 def test_what_it_does_not_write_is_told(tmp_path, attributes):

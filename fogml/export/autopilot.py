@@ -1,0 +1,118 @@
+"""Cubics over temperature as parameters of PX4 and ArduPilot.
+
+PX4 subtracts ``X0 + X1 d + X2 d^2 + X3 d^3`` with d = T - TREF (docs.px4.io, "Sensor Thermal Compensation").
+ArduPilot subtracts ``(g1 d + g2 d^2 + g3 d^3) 1e-6`` with d = T - 35 degC, and a constant offset that it
+finds at each start (AP_InertialSensor_tempcal.cpp). Both hold T within TMIN and TMAX, and work in rad/s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.export.static_curve import StaticCurve
+
+FloatArray = NDArray[np.float64]
+PX4_FILE, ARDUPILOT_FILE = "fogml_px4.params", "fogml_ardupilot.param"
+ARDUPILOT_REFERENCE_DEGC = 35.0
+ARDUPILOT_SHARE = 1e-6
+RAD_S_PER_DEG_H = np.pi / 180.0 / 3600.0
+_MAV_FLOAT, _MAV_INT = 9, 6
+_NUMBERS = {"x": 0, "y": 1, "z": 2}
+
+
+def write(
+    folder: Path, to: str, curves: Mapping[str, StaticCurve], cards: Mapping[str, Mapping[str, Any]]
+) -> tuple[dict[str, dict[str, Any]], dict[str, float]]:
+    """Write a parameter file, and tell of each axis its coefficients and errors.
+
+    Parameters
+    ----------
+    folder
+        An existing folder.
+    to
+        ``px4`` or ``ardupilot``.
+    curves
+        By axis: the model at rest.
+    cards
+        By axis: what the model is.
+
+    Returns
+    -------
+    told, largest
+        By axis: what ``export.json`` says, and the largest error at rest [deg/h].
+
+    Raises
+    ------
+    InputError
+        If an axis is none of x, y and z, or a model has a scale factor.
+    """
+    low = max(float(curve.temperature[0]) for curve in curves.values())
+    high = min(float(curve.temperature[-1]) for curve in curves.values())
+    if not low < high:
+        raise InputError("export: the axes were trained at different temperatures; they share no range")
+    reference = ARDUPILOT_REFERENCE_DEGC if to == "ardupilot" else 0.5 * (low + high)
+    told: dict[str, dict[str, Any]] = {}
+    coefficients: dict[int, FloatArray] = {}
+    for axis, curve in curves.items():
+        if axis not in _NUMBERS:
+            raise InputError(f"export: {to} knows the axes x, y and z; the model is of axis {axis}")
+        if np.any(curve.scale != 1.0):
+            raise InputError(f"export: {to} has no scale factor over temperature; export the bias model")
+        within = (curve.temperature >= low) & (curve.temperature <= high)
+        temperature, bias = curve.temperature[within], curve.bias[within] * RAD_S_PER_DEG_H
+        fit = Polynomial.fit(temperature - reference, bias, 3).convert()
+        cubic = np.asarray(fit.coef, dtype=np.float64)
+        held = np.zeros(4, dtype=np.float32)
+        held[: len(cubic)] = cubic
+        if to == "ardupilot":
+            held[1:] = np.asarray(cubic[1:] / ARDUPILOT_SHARE, dtype=np.float32)
+        coefficients[_NUMBERS[axis]] = held.astype(np.float64)
+        share = np.array([1.0, *[ARDUPILOT_SHARE if to == "ardupilot" else 1.0] * 3])
+        value = np.polynomial.polynomial.polyval(temperature - reference, share * held)
+        off = (value - bias) / RAD_S_PER_DEG_H
+        told[axis] = {
+            "coefficients": [float(number) for number in held],
+            "reference_degc": reference,
+            "rms_difference_at_rest": float(np.sqrt(np.mean(off**2))),
+            "largest_difference_at_rest": float(np.max(np.abs(off))),
+        }
+    text = _px4 if to == "px4" else _ardupilot
+    name = PX4_FILE if to == "px4" else ARDUPILOT_FILE
+    (folder / name).write_text(text(coefficients, low, high, reference), encoding="ascii")
+    return told, {axis: values["largest_difference_at_rest"] for axis, values in told.items()}
+
+
+def _px4(coefficients: Mapping[int, FloatArray], low: float, high: float, reference: float) -> str:
+    """The format of QGroundControl: vehicle, component, name, value and type, with tabs."""
+    floats = {"TC_G0_TMIN": low, "TC_G0_TMAX": high, "TC_G0_TREF": reference}
+    for axis, held in coefficients.items():
+        floats |= {f"TC_G0_X{power}_{axis}": float(value) for power, value in enumerate(held)}
+    lines = [
+        "# Gyro rate offsets over temperature, written by fogml.",
+        "# Set TC_G0_ID to the device id of the sensor (CAL_GYRO0_ID) before TC_G_ENABLE takes effect.",
+        "# Vehicle-Id Component-Id Name Value Type",
+        f"1\t1\tTC_G_ENABLE\t1\t{_MAV_INT}",
+        *(f"1\t1\t{name}\t{np.float32(value):.9g}\t{_MAV_FLOAT}" for name, value in floats.items()),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _ardupilot(coefficients: Mapping[int, FloatArray], low: float, high: float, reference: float) -> str:
+    lines = [
+        "# Gyro rate offsets over temperature, written by fogml.",
+        "INS_TCAL1_ENABLE,1",
+        f"INS_TCAL1_TMIN,{low:.9g}",
+        f"INS_TCAL1_TMAX,{high:.9g}",
+    ]
+    for axis, held in coefficients.items():
+        letter = "XYZ"[axis]
+        lines += [f"INS_TCAL1_GYR{power}_{letter},{np.float32(held[power]):.9g}" for power in (1, 2, 3)]
+        lines.append(f"INS_GYROFFS_{letter},{np.float32(held[0]):.9g}")
+    return "\n".join([*lines, f"INS_GYR1_CALTEMP,{reference:.9g}"]) + "\n"

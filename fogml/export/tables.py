@@ -1,0 +1,201 @@
+"""Tables and cubics over one temperature, of up to three axes: what autopilots and small firmware hold."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml import __version__
+from fogml.errors import InputError, quoted
+from fogml.export import autopilot, segment_files
+from fogml.export.card import export_card
+from fogml.export.loss import averaged_loss, training_rows
+from fogml.export.plan import Plan
+from fogml.export.segments import Segments, segments
+from fogml.export.static_curve import StaticCurve
+from fogml.models.base import DriftModel
+from fogml.runs.run import Run
+from fogml.yaml_text import read_yaml
+
+FloatArray = NDArray[np.float64]
+SCHEMA = "fogml.export/1"
+AXES = ("x", "y", "z")
+TOLERANCE_SHARE = 0.05
+"""Error of a table allowed unless stated, as a share of the model's 90 % half-width: 0.1 % more rms."""
+
+
+@dataclass(frozen=True)
+class TableSettings:
+    """What is wanted.
+
+    Attributes
+    ----------
+    to
+        ``segments``, ``px4`` or ``ardupilot``.
+    dtype
+        Number format of generated C: ``float32`` or ``float64``.
+    breakpoints
+        Of segments; None: as few as the tolerance allows.
+    tolerance
+        Largest error of a table from the model at rest [deg/h]; None: a share of the model's interval.
+    matrix
+        File with a 3 x 3 matrix that takes compensated outputs to the body's axes; None for none.
+    """
+
+    to: str
+    dtype: str | None = None
+    breakpoints: int | None = None
+    tolerance: float | None = None
+    matrix: Path | None = None
+
+
+def export_tables(
+    models: Sequence[DriftModel], folder: Path, settings: TableSettings, train: Sequence[Run] = ()
+) -> dict[str, Any]:
+    """Write the models' tables or polynomials over temperature into a folder.
+
+    Parameters
+    ----------
+    models
+        One model, or those of two or three axes of one unit.
+    folder
+        An existing folder.
+    settings
+        What is wanted.
+    train
+        Training runs of the models, for what a table loses on them; may be left out.
+
+    Returns
+    -------
+    dict
+        The content of ``export.json``.
+
+    Raises
+    ------
+    InputError
+        If the models are not of different axes, or a form can't hold one within the tolerance.
+    """
+    if settings.dtype not in (None, "float32", "float64"):
+        raise InputError(f"--dtype {settings.dtype}: --to {settings.to} takes float32 and float64")
+    named = _by_axis(models)
+    matrix = None if settings.matrix is None else read_matrix(settings.matrix, len(named))
+    plans = {axis: Plan.of(model) for axis, model in named.items()}
+    curves = {axis: StaticCurve.of(plan) for axis, plan in plans.items()}
+    cards = {axis: export_card(named[axis], plan, None) for axis, plan in plans.items()}
+    found: dict[str, Any] = {}
+    dtype = settings.dtype or "float32"
+    if settings.to == "segments":
+        tables = {
+            axis: segments(
+                curve,
+                breakpoints=settings.breakpoints,
+                tolerance=_tolerance(settings, named[axis], share=TOLERANCE_SHARE),
+            )
+            for axis, curve in curves.items()
+        }
+        losses = {axis: _loss(named[axis], plans[axis], tables[axis], train) for axis in named}
+        found = segment_files.write(folder, tables, matrix, cards, losses, dtype)
+        errors = {axis: table.largest for axis, table in tables.items()}
+    else:
+        if matrix is not None:
+            raise InputError(f"--matrix: {settings.to} has parameters of its own for it; leave it out")
+        found, errors = autopilot.write(folder, settings.to, curves, cards)
+    for axis, error in errors.items():
+        allowed = _tolerance(settings, named[axis], share=np.inf)
+        if error > allowed:
+            raise InputError(
+                f"export: axis {axis}: what is written is off by {error:.3g} deg/h from the model at rest, "
+                f"more than the tolerance of {allowed:.3g} deg/h. Nothing was written"
+            )
+    return {
+        "schema": SCHEMA,
+        "to": settings.to,
+        "dtype": dtype if settings.to == "segments" else "float32",
+        "unit": "deg/h",
+        "axes": {
+            axis: {
+                "model": {"kind": plans[axis].kind, "features": list(plans[axis].names)},
+                "thermometer": curve.thermometer,
+                "range_degc": [float(curve.temperature[0]), float(curve.temperature[-1])],
+                "leaves_out": list(curve.leaves_out),
+                **found[axis],
+            }
+            for axis, curve in curves.items()
+        },
+        "files": sorted(path.name for path in folder.iterdir()),
+        "fogml_version": __version__,
+    }
+
+
+def read_matrix(path: Path, axes: int = 3) -> FloatArray:
+    """A 3 x 3 matrix of a YAML or JSON file: three rows, alone or under the key ``matrix``.
+
+    Raises
+    ------
+    InputError
+        If it is none, or the models are not of three axes.
+    """
+    held = read_yaml(path)
+    rows = held.get("matrix") if isinstance(held, Mapping) else held
+    numbers = (
+        isinstance(rows, list)
+        and len(rows) == 3
+        and all(isinstance(row, list) and len(row) == 3 for row in rows)
+        and all(
+            isinstance(value, int | float) and not isinstance(value, bool) for row in rows for value in row
+        )
+    )
+    if not numbers:
+        raise InputError(
+            f"{path.name}: a matrix of three rows of three numbers was expected, e.g. "
+            "matrix: [[1, 0.001, 0], [0, 1, 0], [0, 0, 1]]"
+        )
+    if axes != 3:
+        raise InputError(f"--matrix: it takes the models of three axes; {axes} were given")
+    return np.array(rows, dtype=np.float64)
+
+
+def _by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
+    if len(models) == 1:
+        return {models[0].card_.axis or "x": models[0]}
+    found: dict[str, DriftModel] = {}
+    for model in models:
+        axis = model.card_.axis
+        if axis not in AXES or axis in found:
+            raise InputError(
+                f"export: models of several axes are told apart by their axis, x, y or z; one states "
+                f"{quoted(axis)}{' again' if axis in found else ''}"
+            )
+        found[axis] = model
+    units = sorted({str(model.card_.unit) for model in models})
+    if len(units) > 1:
+        raise InputError(f"export: the models are of several units ({', '.join(units)}); one unit a file")
+    return {axis: found[axis] for axis in AXES if axis in found}
+
+
+def _tolerance(settings: TableSettings, model: DriftModel, share: float) -> float:
+    if settings.tolerance is not None:
+        return settings.tolerance
+    return share * float(model.intervals_.half_width(0.9)) if np.isfinite(share) else np.inf
+
+
+def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) -> dict[str, Any] | None:
+    """What table and model leave on the training runs of this axis; None where none was given."""
+    own = [run for run in train if run.hash in {known.sha256 for known in model.card_.runs}]
+    if not own or plan.form == "joint":
+        return None
+    rows = training_rows(model, plan, own)
+    bias = np.concatenate(
+        [
+            table.at(np.interp(rows.time[rows.run == i], run.time, run.columns[table.thermometer]))[0]
+            for i, run in enumerate(own)
+        ]
+    )
+    limited, _ = plan.limited(rows.atoms, np.ones(len(bias), dtype=np.bool_))
+    left = rows.target - plan.value(plan.compose(limited)), rows.target - bias
+    return averaged_loss(rows, left, model.intervals_.averaging_s)
