@@ -186,6 +186,7 @@ def write_results(
     folder: Path, settings: TrainSettings, model: DriftModel, judgement: Judgement, terminal: Terminal
 ) -> None:
     """Write model, report, pages, spreadsheet and settings into a folder."""
+    from fogml.export.documentation import documentation_or_none
     from fogml.models.saved import save_model
     from fogml.report import certificate, spreadsheet, train_page
 
@@ -193,7 +194,8 @@ def write_results(
         save_model(model, folder / "model")
         report = _report(settings, judgement)
         write_json(folder / "report.json", report)
-        (folder / "report.html").write_text(train_page(judgement, report.get("navigation")), encoding="utf-8")
+        page = train_page(judgement, report.get("navigation"), documentation_or_none(model))
+        (folder / "report.html").write_text(page, encoding="utf-8")
         spreadsheet(judgement, folder / "report.xlsx")
         if judgement.limits or judgement.design_index:
             (folder / "certificate.html").write_text(certificate(judgement), encoding="utf-8")

@@ -24,6 +24,7 @@ from fogml.export.check import (
     plan_error,
     value_difference,
 )
+from fogml.export.documentation import DOCUMENTATION_FILE, documentation
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
 from fogml.export.operations import operations_per_sample
 from fogml.export.plan import Plan
@@ -127,6 +128,7 @@ def export_model(
         pruning["largest_difference"] if pruning and settings.tolerance is not None else 0.0
     )
     _within(total, difference, tolerance, settings, dtype)
+    (folder / DOCUMENTATION_FILE).write_text(documentation(model, plan), encoding="ascii")
     return {
         "schema": SCHEMA,
         "to": settings.to,

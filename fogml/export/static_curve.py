@@ -86,7 +86,7 @@ class StaticCurve:
                 held[sensor] = temperature + apart
             else:
                 held[sensor] = np.full(count, 0.0 if ends is None else 0.5 * sum(ends))
-        atoms = np.column_stack([_at_rest(atom, held) for atom in plan.atoms])
+        atoms = np.column_stack([at_rest(atom, held) for atom in plan.atoms])
         columns = plan.compose(plan.limited(atoms, np.ones(count, dtype=np.bool_))[0])
         none = plan.value(columns, np.zeros(count))
         joint = plan.form == "joint"
@@ -118,8 +118,8 @@ def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
     return None
 
 
-def _at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
-    """An atom's values where nothing moves."""
+def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
+    """An atom's values (n,) where nothing moves, from those of the columns that it is of, each (n,)."""
     count = len(next(iter(held.values())))
     if atom.window is not None or atom.operator == "since_on":
         return np.zeros(count)

@@ -82,6 +82,26 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
         If the folder can't be written, the model is of no known kind, or holds what can't be saved
         without pickle.
     """
+    document, weights = _saved_document(model)
+    text = json_text(document, MODEL_FILE, indent=1)
+    with whole_folder(folder) as staging:
+        (staging / MODEL_FILE).write_text(text + "\n", encoding="utf-8")
+        (staging / WEIGHTS_FILE).write_bytes(weights)
+
+
+def model_hash(model: DriftModel) -> str:
+    """The hash that a fitted model is saved with: SHA-256 over its card and weights, in hexadecimal.
+
+    Raises
+    ------
+    InputError
+        If the model is of no known kind, or holds what can't be saved without pickle.
+    """
+    return str(_saved_document(model)[0]["sha256"])
+
+
+def _saved_document(model: DriftModel) -> tuple[dict[str, Any], bytes]:
+    """What `MODEL_FILE` and `WEIGHTS_FILE` hold of a model."""
     values, arrays = model_to_saved(model)
     model_of_form(values["form"], values["kind"])
     weights = arrays_to_bytes(arrays)
@@ -92,10 +112,7 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
         "bytes": sum(array.nbytes for array in arrays.values()),
     }
     document["sha256"] = content_hash(document, {WEIGHTS_FILE: weights})
-    text = json_text(document, MODEL_FILE, indent=1)
-    with whole_folder(folder) as staging:
-        (staging / MODEL_FILE).write_text(text + "\n", encoding="utf-8")
-        (staging / WEIGHTS_FILE).write_bytes(weights)
+    return document, weights
 
 
 def load_model(folder: str | Path) -> DriftModel:

@@ -38,13 +38,17 @@ class RunSection:
     left_out: str
 
 
-def train_page(judgement: Judgement, navigation: Mapping[str, Any] | None = None) -> str:
+def train_page(
+    judgement: Judgement, navigation: Mapping[str, Any] | None = None, documentation: str | None = None
+) -> str:
     """The self-contained HTML page of a judgement.
 
     Parameters
     ----------
     judgement
         As :func:`fogml.validation.judge.judge` gives it.
+    documentation
+        The block of text for a firmware file, where the model has a compact form.
     navigation
         What the drift costs a navigator, as :func:`fogml.lab.navigation_cost.navigation_costs` gives it.
 
@@ -77,6 +81,7 @@ def train_page(judgement: Judgement, navigation: Mapping[str, Any] | None = None
         notes=_notes(judgement),
         unit_of=unit_of,
         navigation=navigation_sections(navigation) if navigation else [],
+        documentation=documentation,
     )
 
 

@@ -1,4 +1,4 @@
-"""Tables and cubics over temperature: against brute force, constant temperatures, the autopilots' formulas."""
+"""Tables and cubics over temperature: against brute force, constant temperatures, autopilots' formulas."""
 
 from __future__ import annotations
 
