@@ -17,10 +17,11 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from fogml.errors import InputError
+from fogml.errors import InputError, printable
 from fogml.json_files import write_json
 from fogml.outputs import whole_file
 from fogml.signals.noise_model import NoiseModel
+from fogml.strict_json import read_bytes
 
 FloatArray = NDArray[np.float64]
 
@@ -260,14 +261,13 @@ def read_truth(path: Path) -> Truth:
     InputError
         If it is missing or breaks the schema; names the file and the key.
     """
+    held = read_bytes(path, "make the cases first (fogml blind make)")
     try:
-        return Truth.model_validate_json(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise InputError(f"{path}: no such truth; make the cases first (fogml blind make)") from None
+        return Truth.model_validate_json(held)
     except ValidationError as error:
         first = error.errors()[0]
-        place = ".".join(str(part) for part in first["loc"])
-        raise InputError(f"{path}: key '{place}': {first['msg']}; make the cases anew") from None
+        place = f"key '{'.'.join(str(part) for part in first['loc'])}': " if first["loc"] else ""
+        raise InputError(f"{path}: {place}{printable(first['msg'])}; make the cases anew") from None
 
 
 def read_contributions(path: Path) -> dict[tuple[str, int], FloatArray]:
