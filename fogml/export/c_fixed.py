@@ -127,10 +127,10 @@ def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
     return f"(int32_t)clipped(scaled({' + '.join(factors)}, {_SIGNAL_SHIFT}), INT64_C(1) << 29)"
 
 
-def _divide_bits(unit_ticks: float, step_bits: int = _HELD_BITS) -> int:
+def _divide_bits(unit_ticks: float) -> int:
     """Bits of a quotient with which rates up to 1024 degC per unit fit, and their product with the unit."""
     unit_bits = log2(unit_ticks)
-    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - step_bits)
+    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - _HELD_BITS)
 
 
 def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:
@@ -145,19 +145,17 @@ def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:
 def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
     found: dict[int, str] = {}
     bits = _operator_bits(windows, plan, scales)
-    for place, (i, operator) in enumerate(windows.of_method("block")):
+    for i, operator in windows.of_method("block"):
         unit = 0 if operator.unit_s is None else round(operator.unit_s / windows.tick_s)
-        divide = _divide_bits(unit) if unit else max(0, bits[i] - _HELD_BITS)
+        divide = _divide_bits(unit) if unit else 0
         shift = _HELD_BITS + divide - bits[i]
-        place_of = f"state, &state->block[{place}], {operator.held}"
-        found[i] = f"block_value({place_of}, INT64_C({unit}), {divide}, {shift})"
+        found[i] = f"block_value(&newest, &before, INT64_C({unit}), {divide}, {shift})"
     for place, (i, operator) in enumerate(windows.of_method("slope")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
-        unit = round(unit_s / (windows.tick_s * operator.tick_step))
-        step_bits = _HELD_BITS - round(log2(operator.x_step))
-        divide = _divide_bits(unit, step_bits)
-        arguments = f"state, &state->slope[{place}], &SLOPE[{place}], INT64_C({unit}), {divide}"
-        found[i] = f"slope_value({arguments}, {step_bits + divide - bits[i]})"
+        unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
+        divide = _divide_bits(unit)
+        arguments = f"state, &SLOPE[{place}], &sums, bins, INT64_C({unit}), {divide}"
+        found[i] = f"slope_value({arguments}, {_HELD_BITS + divide - bits[i]})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("lag")):

@@ -172,14 +172,13 @@ def input_units(plan: Plan) -> dict[str, str]:
 def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
     """For each operator the expression of its value once it is full."""
     found: dict[int, str] = {}
-    for place, (i, operator) in enumerate(windows.of_method("block")):
+    for i, operator in windows.of_method("block"):
         unit = number(0.0 if operator.unit_s is None else operator.unit_s / windows.tick_s)
-        found[i] = f"block_value(state, &state->block[{place}], {operator.held}, {unit})"
+        found[i] = f"block_value(&newest, &before, {unit})"
     for place, (i, operator) in enumerate(windows.of_method("slope")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
-        step = operator.x_step * 2.0**-windows.temperature_bits
-        unit = number(unit_s * step / (windows.tick_s * operator.tick_step))
-        found[i] = f"slope_value(state, &state->slope[{place}], &SLOPE[{place}], {unit})"
+        unit = number(unit_s / (windows.tick_s * operator.window_ticks))
+        found[i] = f"slope_value(state, &SLOPE[{place}], &sums, bins, {unit})"
     for place, (i, operator) in enumerate(windows.of_method("exp")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"
@@ -209,8 +208,7 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
         lines.append(
             f"#define TEMPERATURE_STEPS {number(2.0**bits)} /* held temperatures: steps of a degC */"
         )
-        if windows.of_method("block"):
-            lines.append(f"#define TEMPERATURE_STEP {number(2.0**-bits)} /* [degC] */")
+        lines.append(f"#define TEMPERATURE_STEP {number(2.0**-bits)} /* [degC] */")
     if any(atom.operator == "sign" for atom in plan.atoms):
         band = number(DEAD_BAND * (1.0 + 1e-9))
         lines.append(f"#define DEAD_BAND {band} /* rates up to this count as standing still [degC/min] */")

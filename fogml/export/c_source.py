@@ -15,7 +15,7 @@ from fogml.errors import InputError
 from fogml.escaping import CCode, c_text
 from fogml.export.c_fixed import fixed_context
 from fogml.export.c_float import float_context, input_units, sensor_identifier
-from fogml.export.layout import Layout, Number, layout
+from fogml.export.layout import MOST_IN_BIN, Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
 from fogml.runs.columns import is_temperature
@@ -102,7 +102,7 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     )
     numbers["card"] = list(card)
     test = test or make_self_test(plan, windows, dtype, numbers)
-    numbers["constants"] = [*_clock_constants(windows), *numbers["constants"]]
+    numbers["constants"] = [*_clock_constants(windows, plan.sample_s), *numbers["constants"]]
     context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
     render = templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
@@ -142,6 +142,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),
+        "bin_s": f"{windows.bin_samples * plan.sample_s:.6g}",
         "tick_us": windows.tick_us,
         "gap": {i: f"INT64_C({round(o.gap_s * 1e6)})" for i, o in enumerate(windows.operators)},
         "gyro_unit": plan.gyro_unit if plan.form == "joint" else "deg/h",
@@ -158,8 +159,8 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
     }
 
 
-def _clock_constants(windows: Layout) -> list[str]:
-    """Lines of the clock's constants: longest gap, tick, and where ticks begin."""
+def _clock_constants(windows: Layout, sample_s: float) -> list[str]:
+    """Lines of the clock's constants: longest gap, tick, where ticks begin, and length of bins."""
     if not windows.operators:
         return []
     longest = round(windows.longest_gap_s * 1e6)
@@ -173,6 +174,13 @@ def _clock_constants(windows: Layout) -> list[str]:
     ]
     if longest >= 1 << 31:
         lines += ["#ifdef FOGML_CLOCK_32", "#error a window spans more than a 32-bit clock tells", "#endif"]
+    if windows.binned:
+        ticks = (windows.bin_samples - 0.5) * sample_s / windows.tick_s
+        lines += [
+            f"#define BIN_SAMPLES {windows.bin_samples}",
+            f"#define BIN_TICKS {round(ticks)}U /* a sample so long after a bin's first begins the next */",
+            f"#define MOST_IN_BIN {MOST_IN_BIN}",
+        ]
     return [CCode(line) for line in lines]
 
 

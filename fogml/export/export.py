@@ -45,6 +45,8 @@ CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None
 """C code's clock: unsigned, of which only differences are taken, so that uptime is unlimited (None)."""
 TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
 """Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
+BINNED_SHARE = 5e-3
+"""The same where windows keep samples in bins: a bin that a window's edge parts is parted along a line."""
 LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
 """The same, at least [deg/h]."""
 _MOST_SCALE_PPM = 1.0
@@ -123,7 +125,9 @@ def export_model(
     tolerance = settings.tolerance
     if tolerance is None:
         half_width = float(model.intervals_.half_width(0.9))
-        tolerance = max(LEAST_TOLERANCE[dtype], TOLERANCE_SHARE[dtype] * half_width)
+        share = TOLERANCE_SHARE[dtype]
+        share = max(share, BINNED_SHARE) if report.get("bins") else share
+        tolerance = max(LEAST_TOLERANCE[dtype], share * half_width)
     total = difference.inside + (
         pruning["largest_difference"] if pruning and settings.tolerance is not None else 0.0
     )
@@ -237,6 +241,9 @@ def _write_c(
         (folder / name).write_text(text, encoding="ascii")
     fixed = source.numbers["fixed"]
     report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}
+    windows = source.layout
+    if windows.binned:
+        report["bins"] = {"held": windows.ring, "seconds": windows.bin_samples * plan.sample_s}
     if plan.centres:
         report["exp_error"] = source.numbers["exp_error"]
     if fixed:

@@ -1,8 +1,8 @@
-"""How C code keeps feature windows and memories: clock ticks, rings of held samples, running integer sums.
+"""How C code keeps feature windows and memories: clock ticks, rings of held samples or of bins of them.
 
-Times are kept in ticks and temperatures as whole multiples of a small step, so that running sums
-are exact however long the firmware runs, cost the same at every sample, and come out alike on
-every machine. The rules of gaps and fullness are those of `fogml.signals.windows`.
+Times are kept in ticks and temperatures as whole multiples of a small step. Sums over the ring are taken
+afresh at each sample, so that they are exact however long the firmware runs, take at most one ring, and come
+out alike on every machine. The rules of gaps and fullness are those of `fogml.signals.windows`.
 """
 
 from __future__ import annotations
@@ -33,9 +33,16 @@ RANGE_BITS = 9
 """Temperatures up to 2**9 degC either way are taken."""
 _SPAN_BITS = 30
 _NOISE_TICKS = 2
-_LONGEST_RING = 1 << 20
-_LONGEST_FIXED_RING = 1 << 15
 _HEADROOM = 8
+MOST_SINGLE = 132
+"""Samples up to which the windows keep each one; more are kept in bins."""
+BINS = 64
+"""Bins that the longest window, both of a block's, is parted into: 2 s for a block of 64 s."""
+_SHORTEST_BINS = 8
+# A window's edge parts a bin along its line; the shortest window must be long beside that.
+MOST_IN_BIN = 8191
+"""Samples that a bin holds at most: its sums then fit 63 bits."""
+_LONGEST_RING = 1 << 12
 
 
 @dataclass(frozen=True)
@@ -56,8 +63,6 @@ class Operator:
         Longest interval that does not restart it.
     window_ticks, both_ticks, needed_ticks
         Age at which a sample leaves the newest window, both windows; time until full.
-    tick_step, x_step
-        Of a slope: ticks and temperature steps are divided by these, so that sums fit 63 bits.
     lag
         Whether it is a first-order lag, with the window's length as its time constant.
     """
@@ -70,8 +75,6 @@ class Operator:
     window_ticks: int
     both_ticks: int
     needed_ticks: int
-    tick_step: int = 1
-    x_step: int = 1
     lag: bool = False
 
     @property
@@ -101,7 +104,9 @@ class Layout:
     held
         Places of the signals that have a ring.
     ring
-        Samples that each ring holds.
+        Samples, or bins of them, that each ring holds.
+    bin_samples
+        Samples that a bin holds at the nominal interval; 1 where each is kept by itself.
     longest_gap_s
         An interval longer than this restarts everything but plays, which know no time.
     plays
@@ -116,8 +121,14 @@ class Layout:
     signal_of_atom: tuple[int, ...]
     held: tuple[int, ...]
     ring: int
+    bin_samples: int
     longest_gap_s: float
     plays: tuple[Atom, ...] = ()
+
+    @property
+    def binned(self) -> bool:
+        """Whether samples are kept in bins."""
+        return self.bin_samples > 1
 
     @property
     def tick_s(self) -> float:
@@ -145,17 +156,7 @@ def layout(plan: Plan, number: Number) -> Layout:
     for _, window, _, lag in keys:
         _check(window, plan.sample_s, lag)
     held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in ("block", "slope")))
-    ring = max((_samples(window, plan.sample_s) for _, window, _, _ in keys), default=0)
-    if ring:
-        ring += ring // _HEADROOM + 4
-    most = _LONGEST_FIXED_RING if number == "fixed" else _LONGEST_RING
-    if ring > most:
-        longest = max((w for _, w, _, _ in keys if _samples(w, plan.sample_s)), key=lambda w: w.span_s)
-        raise InputError(
-            f"export: a window of {longest.length_s:g} s at a sample every {plan.sample_s:g} s holds "
-            f"{ring} samples, C code in {number} at most {most}; train with shorter windows or "
-            "[exp, ...], or run the model at a longer --sample-s"
-        )
+    ring, bin_samples = _ring([window for _, window, _, _ in keys], plan.sample_s)
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
     held_s = [w.span_s for _, w, _, _ in keys if w.method in ("block", "slope")]
     tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
@@ -163,7 +164,7 @@ def layout(plan: Plan, number: Number) -> Layout:
     operators = []
     for (signal, window, unit_s, lag), gap_s in zip(keys, gaps):
         place = signals.index(signal)
-        operator = _operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s, number)
+        operator = _operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s)
         operators.append(replace(operator, lag=lag))
     of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
     longest_gap = max(gaps, default=0.0)
@@ -176,6 +177,7 @@ def layout(plan: Plan, number: Number) -> Layout:
         tuple(signals.index(atom.signal) for atom in plan.atoms),
         held,
         ring,
+        bin_samples,
         longest_gap,
         tuple(dict.fromkeys(atom for atom in plan.atoms if atom.operator == "play")),
     )
@@ -224,6 +226,33 @@ def _samples(window: Window, sample_s: float) -> int:
     return math.ceil(window.span_s / sample_s - EDGE_TOLERANCE) + 1
 
 
+def _ring(windows: list[Window], sample_s: float) -> tuple[int, int]:
+    """Samples or bins that the rings hold, and samples to a bin.
+
+    Temperature has no content within a second: where the longest window holds more than `MOST_SINGLE`
+    samples, they are kept in bins, so that memory does not grow with the rate.
+    """
+    held = [window for window in windows if _samples(window, sample_s)]
+    if not held:
+        return 0, 1
+    most = max(_samples(window, sample_s) for window in held)
+    if most <= MOST_SINGLE:
+        return most + most // _HEADROOM + 4, 1
+    longest = max(window.span_s for window in held)
+    bin_s = min(longest / BINS, min(window.length_s for window in held) / _SHORTEST_BINS)
+    count = min(max(1, math.floor(bin_s / sample_s + EDGE_TOLERANCE)), MOST_IN_BIN)
+    if count == 1:
+        return most + most // _HEADROOM + 4, 1
+    ring = math.ceil(longest / ((count - 0.5) * sample_s)) + 2
+    if ring > _LONGEST_RING:
+        raise InputError(
+            f"export: windows of {min(w.length_s for w in held):g} s and {longest:g} s at a sample every "
+            f"{sample_s:g} s need {ring} bins, C code holds at most {_LONGEST_RING}; train with windows "
+            "nearer to each other or [exp, ...], or run the model at a longer --sample-s"
+        )
+    return ring, count
+
+
 def _gap_s(window: Window, sample_s: float) -> float:
     return GAP_INTERVALS * sample_s if window.method == "first" else longest_gap_s(window.length_s, sample_s)
 
@@ -249,7 +278,6 @@ def _operator(
     window: Window,
     unit_s: float | None,
     gap_s: float,
-    number: Number,
 ) -> Operator:
     span_s = {"block": 2.0, "slope": 1.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}[window.method]
     needed = needed_s(span_s * window.length_s, sample_s)
@@ -257,7 +285,6 @@ def _operator(
     def ticks(seconds: float) -> int:
         return max(1, round(seconds / tick_s) - _NOISE_TICKS)
 
-    steps = _slope_steps(_samples(window, sample_s), round(sample_s / tick_s), number)
     return Operator(
         window,
         signal,
@@ -267,26 +294,4 @@ def _operator(
         ticks(window.length_s),
         ticks(2.0 * window.length_s),
         max(0, ticks(needed)) if needed > 0 else 0,
-        *(steps if window.method == "slope" else (1, 1)),
     )
-
-
-def _slope_steps(samples: int, sample_ticks: int, number: Number) -> tuple[int, int]:
-    """Divisors of ticks and of temperature steps with which a slope's sums stay below 2**62."""
-    count = math.log2(max(2, samples + samples // _HEADROOM + 4))
-    x_bits = TEMPERATURE_BITS[number] + RANGE_BITS + 1
-    tick_bits = math.ceil(math.log2(max(2, sample_ticks)))
-    # Sums of age times temperature: n^2/2 ages; in fixed point they are multiplied by n again.
-    room = 61.0 - (3.0 if number == "fixed" else 2.0) * count
-    square_room = math.floor((61.0 - 4.0 * count) / 2.0)
-    keep_ticks = min(tick_bits, 14, square_room)
-    x_keep = min(x_bits, math.floor(room - keep_ticks))
-    if x_keep < RANGE_BITS + 8:
-        x_keep = RANGE_BITS + 8
-        keep_ticks = min(keep_ticks, math.floor(room - x_keep))
-    if keep_ticks < 1:
-        raise InputError(
-            f"export: a slope over {samples} samples has sums too large for C; use [block, ...] or a "
-            "shorter window"
-        )
-    return 1 << (tick_bits - keep_ticks), 1 << (x_bits - x_keep)

@@ -21,6 +21,7 @@ from fogml.signals.clock import EXPONENTIAL_SPAN
 FloatArray = NDArray[np.float64]
 POINTS = 4096
 _BEYOND = 0.2
+_LEAST_SPANS = 5.0
 _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
 _GYRO_DEG_H = 20.0
 """Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
@@ -80,7 +81,8 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     spans += [EXPONENTIAL_SPAN * atom.memory for atom in plan.atoms if atom.operator == "lag"]
     longest = max(spans, default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
-    count = max(count, least)
+    # So long in any case that windows fill, and go on after a gap.
+    count = max(count, least, round(_LEAST_SPANS * longest / plan.sample_s))
     step = plan.sample_s
     time = step * np.arange(count)
     ranges = [sensor_range(plan, sensor) for sensor in plan.sensors]

@@ -270,6 +270,40 @@ def test_compiles_for_a_cortex_m4(model_of, tmp_path, dtype):
     assert source.layout.ring * 8 < size["ram_bytes"] < source.layout.ring * 32 + 600
 
 
+def fast_run(sample_s: float) -> Run:
+    """Ten minutes of a thermometer that shows steps of 1/256 degC with noise, at a high rate, with a gap."""
+    time = sample_s * np.arange(round(600.0 / sample_s))
+    T = 20.0 + 15.0 * np.sin(time / 400.0) + 2.0 * np.sin(time / 37.0)
+    T = np.round(256.0 * (T + 0.01 * np.random.default_rng(0).standard_normal(len(time)))) / 256.0
+    keep = (time < 200.0) | (time > 210.0)
+    columns = {"time": time, "gyro": np.zeros(len(time)), "T_in": T, "T_out": T - 1.5 * np.cos(time / 500.0)}
+    return Run("fast", {name: values[keep] for name, values in columns.items()})
+
+
+@pytest.mark.parametrize(
+    ("name", "dtype", "rate_hz"),
+    [("polynomial", "float64", 100.0), ("polynomial", "q15", 500.0), ("rich", "q31", 20.0)],
+)
+def test_bins_of_samples_are_the_windows_at_any_rate(model_of, tmp_path, name, dtype, rate_hz):
+    run = fast_run(1.0 / rate_hz)
+    source = c_source(Plan.of(model_of(name), run.sample_s), dtype, [])
+    out, flag = outputs(CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW), source, run)
+    expected = model_of(name).compensate(run)
+    good = expected.flag == 0
+    bound = 1e-4 if dtype.startswith("float") else 1e-3
+    assert np.abs(out - expected.compensated)[good].max() < bound
+    assert np.count_nonzero(flag != expected.flag) <= 4 and good.sum() > 100
+
+
+@pytest.mark.parametrize("dtype", ["float64", "float32", "q15"])
+def test_one_thermometer_takes_less_than_two_kilobytes_at_any_rate(model_of, tmp_path, dtype):
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("arm-none-eabi-gcc is not installed")
+    for rate_hz in (1.0, 3.0, 100.0, 2000.0):
+        source = c_source(Plan.of(model_of("polynomial"), 1.0 / rate_hz), dtype, [])
+        assert cortex_m4_size(source, tmp_path)["ram_bytes"] < 2000
+
+
 def test_nothing_of_the_c_library_is_called(model_of, tmp_path):
     source = c_source(Plan.of(model_of("rbf")), "float64", [])
     CProgram(source, tmp_path)
