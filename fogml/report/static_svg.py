@@ -43,6 +43,9 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     power = 10.0 ** np.floor(np.log10(raw))
     step = float(power * next(m for m in (1, 2, 5, 10) if m * power >= raw * (1 - 1e-9)))
     first = np.ceil(low / step - 1e-9)
+    if first + 1 > np.floor(high / step + 1e-9):
+        # A single one tells no size.
+        return ticks(low, high, 2 * about)
     return [float(round(k * step, 12)) + 0.0 for k in np.arange(first, np.floor(high / step + 1e-9) + 1)]
 
 

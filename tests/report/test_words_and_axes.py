@@ -92,4 +92,6 @@ def test_time_units(span: float, unit: str) -> None:
 
 def test_ticks_are_round_and_within() -> None:
     assert ticks(-0.4, 0.6) == [-0.4, -0.2, 0.0, 0.2, 0.4, 0.6]
+    # One alone would tell no size.
+    assert ticks(-0.00403, 0.00403, 4) == [-0.004, -0.002, 0.0, 0.002, 0.004]
     assert all(f"{tick:g}" != "-0" for tick in ticks(-0.37, 0.21))

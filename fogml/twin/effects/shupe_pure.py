@@ -16,8 +16,8 @@ class ShupePure(BiasEffect):
         b = S_g d(T_out - T_in)/dt
 
     The radial form of Shupe's integral over the fibre (`fogml.twin.coil`), with S_g in deg/h per
-    degC/min. Zero in soaks and on the plateau of a long ramp. S_g is 0.05 to 2 for a quadrupole winding, 3
-    to 4 for a dipole and more for a simple one.
+    degC/min. Zero in soaks and on the plateau of a long ramp. S_g is 0.05 to 2 for a quadrupole winding,
+    about 4 for a dipole and 90 for a simple cylinder.
 
     Source: Shupe, Applied Optics 19 (1980) 654; Frigo, SPIE 412 (1983) 268; Lefevre (literature).
     Form and size derived with a layer model; ranges are engineering ones.
