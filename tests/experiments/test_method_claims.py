@@ -70,7 +70,7 @@ def test_knee_in_sample_and_loss_at_another_rate(multipoint_values):
 
     one, two, four = (f"{n} point{'s' if n > 1 else ''} 5/3" for n in (1, 2, 4))
     assert left(two, "in sample") < 0.55 * left(one, "in sample")
-    assert left(four, "in sample") > 0.95 * left(two, "in sample")
+    assert left(four, "in sample") > 0.9 * left(two, "in sample")
     assert left(four, "2 degC/min") > 3.0 * left("4 points 2/1", "2 degC/min")
     assert forms[four]["coefficients"] == 33 and forms["4 points 2/1"]["coefficients"] == 13
     assert left("T in pieces", "in sample") > 2.0 * left("M2", "in sample")
