@@ -14,6 +14,6 @@ def needs(*packages: str) -> Callable[[], str | None]:
         if not absent:
             return None
         verb = "is" if len(absent) == 1 else "are"
-        return f"{', '.join(absent)} {verb} not installed (pip install 'fogml[benchmarks]')"
+        return f"{', '.join(absent)} {verb} not installed (pip install -e '.[benchmarks]')"
 
     return missing

@@ -97,7 +97,7 @@ def fuzz(
                     )
         except Exception as error:  # a fault of the examination itself loses no count
             notes = [f"The examination itself ended early: {error!r}."]
-    return tally.values(time.monotonic() - began) | {"notes": notes}
+    return tally.values(time.monotonic() - began) | {"notes": notes, "only": [*only]}
 
 
 def _one(

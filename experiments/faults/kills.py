@@ -60,6 +60,10 @@ class Count:
         return {**self.__dict__, "reasons": dict(self.reasons)}
 
 
+OTHERS = "others"
+"""Name in `only` for single workers that are ended and a database that restarts."""
+
+
 def kill_jobs(
     each: int,
     seed: int,
@@ -78,7 +82,7 @@ def kill_jobs(
     seed
         Of the moments.
     only
-        Names of `JOBS`; all by default.
+        Names of `JOBS`, and `OTHERS`; all by default.
     kept
         Folder for what was found wrong.
     progress
@@ -94,7 +98,9 @@ def kill_jobs(
         home.chmod(0o755)
         files = sound_files(home, names)
         rows = {job: Killer(home, job, files, seed, kept, progress).kill(each) for job in names}
-        notes = _others(home, files, max(1, each // 10), seed) if others and not only else []
+        notes = (
+            _others(home, files, max(1, each // 10), seed) if others and (not only or OTHERS in only) else []
+        )
     finally:
         shutil.rmtree(home, ignore_errors=True)
     return {

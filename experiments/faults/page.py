@@ -21,6 +21,16 @@ def write_part(folder: Path, part: str, found: Any) -> None:
         found = {**found, "jobs": {**known[part]["jobs"], **found["jobs"]}}
         found["notes"] = found["notes"] or known[part]["notes"]
         found["seconds"] += known[part]["seconds"]
+    if part == "fuzz" and part in known and found["only"]:
+        # Kinds whose faults were mended are spoiled again alone, with other draws.
+        found = {
+            **known[part],
+            "kinds": known[part]["kinds"] | found["kinds"],
+            "alone": {
+                **known[part].get("alone", {}),
+                **{kind: {"inputs": found["inputs"], "seed": found["seed"]} for kind in found["kinds"]},
+            },
+        }
     known |= {part: {**found, "version": __version__}}
     folder.mkdir(parents=True, exist_ok=True)
     write_results(folder, known, page(known))
@@ -56,6 +66,11 @@ def _fuzz(found: dict[str, Any]) -> list[str]:
         f"{total['compared']:,} of them the values read were compared with an independent reader's.",
         "",
         *found.get("notes", ()),
+        *[
+            f"{name}: again after what had failed in them was mended, {told['inputs']:,} inputs of seed "
+            f"{told['seed']} with `--only`."
+            for name, told in found.get("alone", {}).items()
+        ],
         "",
         "| kind | inputs | exit 0 | exit 1 | exit 2 | compared | failed |",
         "|---|---:|---:|---:|---:|---:|---|",

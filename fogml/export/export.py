@@ -297,7 +297,9 @@ def _write_onnx(
     try:
         from onnxruntime import InferenceSession
     except ImportError:
-        raise InputError("export: onnxruntime is not installed; pip install 'fogml[export]'") from None
+        raise InputError(
+            "export: onnxruntime is not installed; pip install -e '.[export]' in fogml's source"
+        ) from None
     model = onnx_model(plan, stored, dtype, settings.pipeline, "\n".join(card_lines(card, plan, dtype)))
     data = model.SerializeToString()
     session = InferenceSession(data, providers=["CPUExecutionProvider"])

@@ -48,7 +48,9 @@ def onnx_model(
     try:
         from onnx import TensorProto, checker, helper
     except ImportError:
-        raise InputError("export: onnx is not installed; pip install 'fogml[export]'") from None
+        raise InputError(
+            "export: onnx is not installed; pip install -e '.[export]' in fogml's source"
+        ) from None
     if plan.form == "constant":
         raise InputError(
             f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"

@@ -121,7 +121,7 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
         from distributed import as_completed as completed_on
         from distributed.scheduler import KilledWorker
     except ImportError:
-        raise InputError("a cluster needs Dask: pip install 'fogml[cluster]'") from None
+        raise InputError("a cluster needs Dask: pip install -e '.[cluster]' in fogml's source") from None
     try:
         client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from importlib import import_module
 from typing import Any, ClassVar
 
-import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import BaseEstimator, RegressorMixin, clone
 from sklearn.compose import TransformedTargetRegressor
@@ -108,9 +107,10 @@ class SklearnModel(FeatureModel):
             warnings.simplefilter("always", ConvergenceWarning)
             try:
                 fitted = regressor.fit(table.X, table.y)
-            except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-                # What only the rows tell: more neighbours than rows, a target of the wrong sign.
-                reason = str(error).strip().split("\n")[0]
+            except Exception as error:
+                # What only the rows tell, and values that the estimator's own check lets pass: others' code
+                # raises whatever they lead to.
+                reason = next(iter(str(error).strip().splitlines()), type(error).__name__)
                 raise InputError(f"{self.name}: can't be fitted to these runs: {reason}") from None
         told = {str(warning.message).strip().split("\n")[0] for warning in caught}
         self._convergence = [f"{self.name}: {message}" for message in sorted(told)]

@@ -43,7 +43,7 @@ def h5py_module() -> Any:
         import h5py
     except ImportError:
         raise InputError(
-            "HDF5 and MATLAB 7.3 files need the package h5py; install it with pip install 'fogml[hdf5]'"
+            "HDF5 and MATLAB 7.3 files need the package h5py: pip install -e '.[hdf5]' in fogml's source"
         ) from None
     return h5py
 

@@ -70,7 +70,7 @@ def import_optuna() -> Any:
     try:
         import optuna
     except ImportError:
-        raise InputError("a sweep needs Optuna: pip install 'fogml[sweep]'") from None
+        raise InputError("a sweep needs Optuna: pip install -e '.[sweep]' in fogml's source") from None
     optuna.logging.set_verbosity(optuna.logging.ERROR)
     return optuna
 
@@ -168,7 +168,8 @@ def _database(url: str) -> BaseStorage:
             return _closing(RDBStorage(text, engine_kwargs=engine))
     except (ImportError, NoSuchModuleError) as error:
         raise InputError(
-            f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: pip install 'fogml[sweep]'"
+            f"--storage {shown(url)}: no driver for it ({error}); for PostgreSQL: pip install -e '.[sweep]' "
+            "in fogml's source"
         ) from None
     except (SQLAlchemyError, OSError, RuntimeError) as error:
         told = str(getattr(error, "orig", None) or error).strip().split("\n")[0]

@@ -151,7 +151,7 @@ def test_a_training_whose_files_may_not_grow(run_files, refused, tmp_path, most)
 @pytest.mark.parametrize(("form", "most"), [("json", 60), ("onnx", 300)])
 def test_an_export_whose_files_may_not_grow(model, refused, tmp_path, form, most):
     if form == "onnx":
-        pytest.importorskip("onnxruntime", reason="ONNX is not installed: pip install 'fogml[export]'")
+        pytest.importorskip("onnxruntime", reason="ONNX is not installed: pip install -e '.[export]'")
     arguments = ("export", model, "--to", form, "-o", tmp_path / "firmware", "--quiet")
     refused("File too large", *arguments, most=most)
     assert not (tmp_path / "firmware").exists()

@@ -10,7 +10,7 @@ import yaml
 
 from tests.fleet.units import write_fleet, write_run
 
-pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
+pytest.importorskip("optuna", reason="Optuna is not installed: pip install -e '.[sweep]'")
 
 SPACE = {
     "features": {"static": ["T", "T^1..2"], "rate": ["", "dT[block, {window} s]"]},

@@ -71,7 +71,7 @@ def test_a_full_disk_stops_the_fleet_with_one_message_and_keeps_what_is_done(tmp
 @pytest.fixture
 def cluster(tmp_path):
     """A scheduler and two worker processes; its address and the workers."""
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'fogml[cluster]'")
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
     started = []
 
     def start(*words: str) -> subprocess.Popen:
@@ -144,7 +144,7 @@ def test_a_cluster_does_every_unit_once_though_a_worker_is_killed(tmp_path, clus
 
 
 def test_a_cluster_that_does_not_answer(tmp_path, monkeypatch):
-    pytest.importorskip("distributed", reason="Dask is not installed: pip install 'fogml[cluster]'")
+    pytest.importorskip("distributed", reason="Dask is not installed: pip install -e '.[cluster]'")
     monkeypatch.setattr("fogml.fleet.engines._ANSWER_S", 1)
     with pytest.raises(InputError, match="does not answer"):
         run_tasks(tasks(tmp_path, 2, quick), cluster="tcp://127.0.0.1:9")

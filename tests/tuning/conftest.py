@@ -16,7 +16,7 @@ def database() -> Iterator[str]:
     """URL of a PostgreSQL server of the tests' own."""
     if program("initdb") is None:
         pytest.skip("PostgreSQL is not installed (.ci/run installs it): no initdb found")
-    pytest.importorskip("psycopg", reason="psycopg is not installed: pip install 'fogml[sweep]'")
+    pytest.importorskip("psycopg", reason="psycopg is not installed: pip install -e '.[sweep]'")
     # Not pytest's own folder: its parents are closed to the user that the server runs as.
     with tempfile.TemporaryDirectory(prefix="fogml-postgres-") as name:
         folder = Path(name)

@@ -26,7 +26,7 @@ from fogml.tuning.sweep import run_sweep
 from fogml.tuning.winner import against_references, complete, figure, pareto, train_settings, winner
 from tests.tuning.world import SPACE, plan, runs
 
-optuna = pytest.importorskip("optuna", reason="Optuna is not installed: pip install 'fogml[sweep]'")
+optuna = pytest.importorskip("optuna", reason="Optuna is not installed: pip install -e '.[sweep]'")
 
 
 def tried(study):
