@@ -18,13 +18,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
+from experiments.gap_blind.by_reality import answered_marks
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.blind.methods import FAMILIES
-from fogml.blind.score import marks_of
 from fogml.blind.scoring.by_reality import ALL, by_reality
 from fogml.blind.scoring.marks import Mark
-from fogml.blind.truth import read_truth
 from fogml.gap.families.priors import Priors
 from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING
@@ -40,20 +39,12 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
     parser.add_argument("--calibrate", action="store_true", help="print trust and doubt; no page")
     given = parser.parse_args()
-    alone: dict[str, list[Mark]] = {method: [] for method in METHODS}
-    both: dict[str, list[Mark]] = {method: [] for method in METHODS}
-    seeds: set[int] = set()
-    for suite in given.suites:
-        folder = BlindFolder(suite)
-        answered = {m: _answered(folder, m) for m in METHODS}
-        shared = answered[DIAGNOSIS] & answered[FAMILIES]
-        for method in METHODS:
-            names = sorted(answered[method])
-            truths = [read_truth(folder.truth / f"{name}.json") for name in names]
-            seeds |= {truth.seed for truth in truths}
-            marks = marks_of(folder, [method], truths, workers=given.workers)[method] if truths else []
-            alone[method] += marks
-            both[method] += [m for m in marks if m.truth.case in shared]
+    suites = [BlindFolder(path) for path in given.suites]
+    alone = {m: [x for s in suites for x in answered_marks(s, m, given.workers)] for m in METHODS}
+    answered = {m: {_case(x) for x in marks} for m, marks in alone.items()}
+    shared = answered[DIAGNOSIS] & answered[FAMILIES]
+    both = {m: [x for x in marks if _case(x) in shared] for m, marks in alone.items()}
+    seeds = {x.truth.seed for marks in alone.values() for x in marks}
     if given.calibrate:
         trust, doubt, count = fitted_map(alone[FAMILIES], Priors())
         print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {sorted(seeds)}")
@@ -85,9 +76,9 @@ def fitted_map(marks: Sequence[Mark], priors: Priors) -> tuple[float, float, int
     return float(np.exp(found[0])), float(found[1]), len(items)
 
 
-def _answered(folder: BlindFolder, method: str) -> set[str]:
-    answers = folder.answers(method)
-    return {name for name in folder.names() if (answers / name / "gap.json").is_file()}
+def _case(mark: Mark) -> tuple[Any, ...]:
+    truth = mark.truth
+    return truth.reality, truth.seed, truth.sample_s, truth.kind, truth.d_prime, truth.case
 
 
 def page(values: Mapping[str, Any]) -> str:

@@ -2,7 +2,8 @@
 
 ``python -m experiments.gap_blind.by_reality DIR`` makes, answers and scores the parts of ``by_reality.yaml``
 in DIR and writes ``by_reality.json`` and ``by_reality.md`` of all that are there; an interrupted call goes on
-where it was. Each reality alone: ``--reality NAME``; the others then stand as they were found before.
+where it was. Each reality alone: ``--reality NAME``; the others then stand as they were found before. With
+``--answered`` the page is of those cases alone that have an answer by now.
 """
 
 from __future__ import annotations
@@ -15,14 +16,15 @@ from pathlib import Path
 from typing import Any
 
 from experiments.gap_blind.per_case import write_page
-from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
 from fogml.blind.realities import SAME_TWIN
-from fogml.blind.score import gather
+from fogml.blind.score import gather, marks_of
 from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.marks_file import MARKS, read_marks, write_marks
 from fogml.blind.scoring.statistics import proportion
 from fogml.blind.seeds import record_use
+from fogml.blind.truth import read_truth
 from fogml.cli.blind_job import MakeSettings, RunSettings, make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.report.blind_words import figure_text, value_text, wanted_text
@@ -42,6 +44,7 @@ def main() -> None:
     parser.add_argument("--method", default=DIAGNOSIS, help="what answers (diagnosis)")
     parser.add_argument("--share", type=float, default=1.0, help="how much of each part, to try it (1)")
     parser.add_argument("--page", action="store_true", help="the page of what is there alone")
+    parser.add_argument("--answered", action="store_true", help="the page of the cases answered by now alone")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     parser.add_argument("--final", action="store_true", help="the seed and numbers kept for final figures")
     given = parser.parse_args()
@@ -49,11 +52,14 @@ def main() -> None:
     if given.final:
         config |= config["final"]
         given.share = config["share"]
-    for reality in () if given.page else given.reality or choices:
+    for reality in () if given.page or given.answered else given.reality or choices:
         for part in _parts(config, reality):
             _do(given, config, reality, part, ledger)
     found = [read_marks(path) for path in sorted(given.directory.glob(f"*/*/{given.method}-{MARKS}"))]
     marks = [mark for one in found for mark in one.methods[given.method]]
+    if given.answered:
+        suites = [BlindFolder(path.parent) for path in sorted(given.directory.glob("*/*/cases"))]
+        marks = [mark for suite in suites for mark in answered_marks(suite, given.method, given.workers)]
     values = told(marks, choices, config["seed"], given.method, given.final)
     if ledger is not None:
         hashes = "\n".join(one.truth for one in found)
@@ -64,6 +70,14 @@ def main() -> None:
     with (HERE / "by_reality.json").open("w", encoding="utf-8") as file:
         json.dump(values, file, indent=1)
         file.write("\n")
+
+
+def answered_marks(folder: BlindFolder, method: str, workers: int = 1) -> list[Mark]:
+    """Marks of the cases of a suite that a method has answered by now, failures among them."""
+    answers = folder.answers(method)
+    names = [name for name in folder.names() if (answers / name / OUTCOME).is_file()]
+    truths = [read_truth(folder.truth / f"{name}.json") for name in names]
+    return marks_of(folder, [method], truths, workers=workers)[method] if truths else []
 
 
 def told(

@@ -77,13 +77,6 @@ class Inference:
         """At the noise that fits best."""
         return self.search.field
 
-    @property
-    def probabilities(self) -> np.ndarray:
-        """Of each explanation, shape (n,)."""
-        scores = np.array([e.score for e in self.explanations])
-        weights = np.exp(scores - scores.max())
-        return np.asarray(weights / weights.sum())
-
 
 def infer(
     model: TwinModel,
@@ -118,21 +111,25 @@ def infer(
         search = Search(Field(setting, columns, points.noises[best]))
         found = search.explanations()
         found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members][:RESCORED]
-        only = sorted({n for e in found for n, _ in e.nodes})
         # What fast causes make looks like noise until they are known.
         whites = [points.with_white(factor) for factor in WHITE_FACTORS]
-        beside = [Field(setting, columns, p.noises[best], only) for p in whites]
+        beside = [Field(setting, columns, p.noises[best], _nodes(found[:SURE])) for p in whites]
         likeliest = over_noises(found[:SURE], beside, [0.0] * len(beside))
         scores = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in likeliest])
         settled = WHITE_FACTORS[int(np.argmax(scores))] == 1.0
         points = whites[int(np.argmax(scores))]
-        fields = [Field(setting, columns, m, only) for m in points.noises]
+        fields = [Field(setting, columns, m, _nodes(found)) for m in points.noises]
         rescored = over_noises(found, fields, points.log_priors)
         by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in rescored])
         points = points.judged(by_noise)
         if settled and points.best == best:
             break
+        points = points.within(priors.hopeless)
     return Inference(model, setting, columns, points, search, tuple(rescored), (*unusable, *more))
+
+
+def _nodes(explanations: Sequence[Explanation]) -> list[int]:
+    return sorted({n for e in explanations for n, _ in e.nodes})
 
 
 def _rows(runs: Sequence[Run], model: TwinModel, most: int) -> tuple[list[Rows], list[tuple[str, str]]]:

@@ -43,6 +43,16 @@ class NoisePoints:
         """With another posterior."""
         return replace(self, log_posteriors=log_posteriors)
 
+    def within(self, behind: float) -> NoisePoints:
+        """Those that are no further behind the likeliest [nats]."""
+        kept = np.flatnonzero(self.log_posteriors > self.log_posteriors.max() - behind)
+        return replace(
+            self,
+            noises=tuple(self.noises[i] for i in kept),
+            log_priors=tuple(self.log_priors[i] for i in kept),
+            log_posteriors=self.log_posteriors[kept],
+        )
+
     def with_white(self, factor: float) -> NoisePoints:
         """With white noise so many times as strong."""
         return replace(self, noises=tuple(replace(n, N=factor * n.N) for n in self.noises))

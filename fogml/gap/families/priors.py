@@ -74,7 +74,7 @@ class Priors:
     slow_noise: tuple[float, ...] = (-1.0, 0.0, 0.6, 1.2, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
-    most_of_all: int = 4500
+    most_of_all: int = 3000
     least_detectable: float = 3.0
 
     @property
