@@ -184,8 +184,7 @@ def fixed_columns(
     hidden = {n: v - rows.even.temperatures[n] for n, v in rows.readings.items()}
     if coarse:
         columns[0] = columns[0] + _through_each(rows, constants, hidden) * sd
-    # Within a sample nothing tells when a reading was taken.
-    lag_s = math.hypot(priors.missed_lag, twin.sensors.common.lag, rows.run.sample_s / math.sqrt(12.0))
+    lag_s = math.hypot(priors.missed_lag, twin.sensors.common.lag)
     for names in (("T", "T_in"), ("T_out",)):
         own = [n for n in names if n in rows.readings]
         late = {n: lag_s / 60.0 * rate(time, rows.even.temperatures[n]) for n in own}

@@ -69,8 +69,8 @@ class Priors:
     beam: int = 6
     hopeless: float = 12.0
     exchange: float = 3.0
-    trust: float = 0.5
-    doubt: float = 3.3
+    trust: float = 0.6
+    doubt: float = 3.6
     slow_noise: tuple[float, ...] = (-1.0, 0.0, 0.6, 1.2, 2.0)
     missed_lag: float = 0.7
     most_rows: int = 1200
