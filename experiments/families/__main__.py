@@ -11,6 +11,7 @@ listed asks for: the one monotone map between evidence and probability, fitted b
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -18,15 +19,16 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from experiments.gap_blind.by_reality import answered_marks
+from experiments.gap_blind.by_reality import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.blind.methods import FAMILIES
+from fogml.blind.realities import SAME_TWIN
 from fogml.blind.scoring.by_reality import ALL, by_reality
 from fogml.blind.scoring.marks import Mark
 from fogml.gap.families.priors import Priors
 from fogml.report.blind_words import figure_text, wanted_text
-from fogml.report.words import MISSING
+from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
 METHODS = (DIAGNOSIS, FAMILIES)
@@ -50,9 +52,12 @@ def main() -> None:
         print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {sorted(seeds)}")
         return
     values: dict[str, Any] = {"seeds": sorted(seeds)}
+    values["same_twin"] = list(same_twin(alone[FAMILIES]))
+    alone, both = ({m: _drawn(marks) for m, marks in held.items()} for held in (alone, both))
     values["shared"] = {m: by_reality(both[m]) for m in METHODS if both[m]}
     values["cases"] = {m: len(alone[m]) for m in METHODS} | {"shared": len(both[FAMILIES])}
     values["families"] = by_reality(alone[FAMILIES])
+    values["fit_runs"] = {"shared": _fit_runs(both[FAMILIES]), FAMILIES: _fit_runs(alone[FAMILIES])}
     write_results(HERE, values, page(values))
 
 
@@ -76,6 +81,20 @@ def fitted_map(marks: Sequence[Mark], priors: Priors) -> tuple[float, float, int
     return float(np.exp(found[0])), float(found[1]), len(items)
 
 
+def _drawn(marks: Sequence[Mark]) -> list[Mark]:
+    return [x for x in marks if x.truth.reality != SAME_TWIN]
+
+
+def _fit_runs(marks: Sequence[Mark]) -> dict[str, int]:
+    """How many cases have so many fit runs."""
+    counts = Counter(len(x.truth.runs.fit) for x in marks)
+    return {str(runs): count for runs, count in sorted(counts.items())}
+
+
+def _runs_told(counts: Mapping[str, int]) -> str:
+    return "Fit runs: " + ", ".join(f"{n} in {plural(count, 'case')}" for n, count in counts.items()) + "."
+
+
 def _case(mark: Mark) -> tuple[Any, ...]:
     truth = mark.truth
     return truth.reality, truth.seed, truth.sample_s, truth.kind, truth.d_prime, truth.case
@@ -88,13 +107,15 @@ def page(values: Mapping[str, Any]) -> str:
         "",
         f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no final "
         "figures, and families were widened with failures among these cases in view. Each figure with its "
-        "95 % interval (Wilson's for shares) and what it rests on. Times are what was recorded with the "
-        "answers, on a machine that others used: families' of the processor, the diagnosis's of the clock.",
+        "95 % interval (Wilson's for shares) and what it rests on. Times are of the clock, on a machine that "
+        "many others used.",
         "",
     ]
     if values["shared"]:
         lines += [
             f"## Cases that both answered ({values['cases']['shared']})",
+            "",
+            _runs_told(values["fit_runs"]["shared"]),
             "",
             *_table({f"{m}, {ALL}": parts[ALL] for m, parts in values["shared"].items()}),
             "",
@@ -102,8 +123,11 @@ def page(values: Mapping[str, Any]) -> str:
     lines += [
         f"## Families on all cases that they answered ({values['cases'][FAMILIES]}), by reality",
         "",
+        _runs_told(values["fit_runs"][FAMILIES]),
+        "",
         *_table(values["families"]),
         "",
+        *twin_lines(values["same_twin"]),
     ]
     return "\n".join(lines)
 

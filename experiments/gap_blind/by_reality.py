@@ -91,7 +91,7 @@ def told(
         "method": method,
         "by_reality": by_reality(drawn),
         "by_form": by_form(drawn),
-        "same_twin": list(_same_twin([m for m in marks if m.truth.reality == SAME_TWIN])),
+        "same_twin": list(same_twin(marks)),
         "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
     }
 
@@ -131,10 +131,11 @@ def _do(
     )
 
 
-def _same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
-    """By interval: how many were answered 'no gap', and what was named instead."""
-    for sample_s in sorted({m.truth.sample_s for m in marks}):
-        here = [m for m in marks if m.truth.sample_s == sample_s]
+def same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
+    """Of a shipped twin's own runs, by interval: how many answers 'no gap', and what was named instead."""
+    own = [m for m in marks if m.truth.reality == SAME_TWIN]
+    for sample_s in sorted({m.truth.sample_s for m in own}):
+        here = [m for m in own if m.truth.sample_s == sample_s]
         right = proportion([m.verdict == "no_gap" for m in here])
         yield {
             "sample_s": sample_s,
@@ -177,14 +178,7 @@ def page(values: Mapping[str, Any]) -> str:
             "|---|---|---|---:|---:|---:|---:|",
             *(_form_line(cell) for cell in values["by_form"]),
             "",
-            "## A shipped twin's own runs, diagnosed against it",
-            "",
-            "Thermometers as shipped, nothing missing: wanted is 'no gap' at every interval.",
-            "",
-            "| interval | cases | 'no gap' | named instead | other verdicts |",
-            "|---|---:|---:|---|---|",
-            *(_twin_line(row) for row in values["same_twin"]),
-            "",
+            *twin_lines(values["same_twin"]),
         ]
     )
 
@@ -202,6 +196,20 @@ def _form_line(cell: Mapping[str, Any]) -> str:
     window = f"{low:g}–{high:g}"
     rest = f"{window} | {cell['right']['n']} | {' | '.join(told)}"
     return f"| {cell['reality']} | {cell['form'] or MISSING} | {rest} |"
+
+
+def twin_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The section on a shipped twin's own runs."""
+    return [
+        "## A shipped twin's own runs, diagnosed against it",
+        "",
+        "Thermometers as shipped, nothing missing: wanted is 'no gap' at every interval.",
+        "",
+        "| interval | cases | 'no gap' | named instead | other verdicts |",
+        "|---|---:|---:|---|---|",
+        *map(_twin_line, rows),
+        "",
+    ]
 
 
 def _twin_line(row: Mapping[str, Any]) -> str:
