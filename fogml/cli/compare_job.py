@@ -118,7 +118,7 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
 
 def _print(comparison: Comparison, terminal: Terminal) -> None:
     from fogml.report.compare_page import ranked
-    from fogml.report.verdict import own_noise, worst_run
+    from fogml.report.verdict import own_noise_by, worst_run
 
     several = len(next(iter(comparison.judgements.values())).test) > 1
     rows = []
@@ -134,6 +134,6 @@ def _print(comparison: Comparison, terminal: Terminal) -> None:
         rows,
     )
     best = ranked(comparison.judgements)[0]
-    terminal.say(f"{best} leaves least. {own_noise(worst_run(comparison.judgements[best].test))}")
+    terminal.say(f"{best} leaves least. {own_noise_by(worst_run(comparison.judgements[best].test))}")
     for name, reason in comparison.failed.items():
         terminal.say(f"{name}: not fitted: {reason}")

@@ -78,6 +78,7 @@ def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
         "value": [floor.value for floor in found],
         "ci": [[floor.lower, floor.upper] for floor in found],
         "unit": "deg/h",
+        "source": found[0].source,
     }
 
 
@@ -113,7 +114,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         low, high = floor["ci"][0]
         terminal.say(
             f"noise floor of averages over {floor['averaging_s'][0]:g} s: {number(floor['value'][0])} deg/h "
-            f"({level} from {number(low)} to {number(high)})"
+            f"({level} from {number(low)} to {number(high)}), from {floor['source']}"
         )
     minimum = values["minimum"]
     terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s")

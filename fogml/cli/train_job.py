@@ -223,7 +223,7 @@ def floor_words(run: RunJudgement, number: Callable[[float], str]) -> str:
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
-    from fogml.report.verdict import own_noise, worst_run
+    from fogml.report.verdict import own_noise_by, worst_run
     from fogml.report.words import label, unit_of
 
     rows = []
@@ -237,7 +237,7 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
     averaging += "; synthetic data" if synthetic else ""
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
-    terminal.say(own_noise(worst_run(judgement.test)))
+    terminal.say(own_noise_by(worst_run(judgement.test)))
     for run in judgement.test:
         for name in _TOLD_BY_SOME:
             before, after = getattr(run.before, name), getattr(run.after, name)

@@ -76,6 +76,8 @@ def _tiles(noise: Mapping[str, Any]) -> list[Tile]:
     if floor:
         low, high = floor["ci"][0]
         told = f"{number(low)} … {number(high)}, averages over {number(floor['averaging_s'][0])} s"
+        if floor.get("source"):
+            told += f", from {floor['source']}"
         tiles.append(Tile("Noise floor", number(floor["value"][0]), "deg/h", told))
     minimum = noise.get("minimum") or {}
     if minimum.get("adev"):

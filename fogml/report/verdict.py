@@ -69,6 +69,11 @@ def floor_told(run: RunJudgement) -> str:
     return f"{told} ({number(low)} to {number(high)}, from {run.floor_source})"
 
 
+def own_noise_by(run: RunJudgement) -> str:
+    """Whether what is left is the gyro's own noise, and where its floor comes from, as sentences."""
+    return f"{own_noise(run)} The noise floor is from {run.floor_source}."
+
+
 def own_noise(run: RunJudgement) -> str:
     """Whether what is left is the gyro's own noise, as a sentence."""
     if left_is_noise(run):

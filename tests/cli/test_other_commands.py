@@ -71,6 +71,7 @@ def test_noise_keys_and_files(invoke_json, tmp_path):
     floor = floor_of_run(run, np.ones(len(run), dtype=bool), run.error_deg_h, 100.0)
     told = (values["floor"]["value"][0], *values["floor"]["ci"][0])
     assert told == pytest.approx((floor.value, floor.lower, floor.upper))
+    assert values["floor"]["source"] == floor.source and floor.source.endswith("that is loud")
     assert "noise floor" in (out / "noise.html").read_text(encoding="utf-8")
     for (low, high), deviation in zip(values["ci"], values["adev"], strict=True):
         assert low <= deviation <= high
