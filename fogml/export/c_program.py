@@ -18,7 +18,17 @@ from fogml.limited import Finished, LimitExceededError, ProgramLimits, run_limit
 
 FloatArray = NDArray[np.float64]
 COMPILERS = ("cc", "gcc", "clang")
-FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion")
+FLAGS = (
+    "-std=c99",
+    "-O2",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+    "-Wpedantic",
+    "-Werror",
+    "-Wconversion",
+    "-Wdouble-promotion",
+)
 CORTEX_M4 = ("-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard")
 COMPILING = ProgramLimits(cpu_s=120, wall_s=300.0, memory_bytes=4 << 30, output_bytes=256 << 20)
 """What a compiler may take: a hundred times what the largest network needs."""
@@ -86,24 +96,27 @@ class CProgram:
         }
         self.places = max(1, len(source.plan.sensors))
 
-    def _run(self, mode: str, data: bytes) -> bytes:
-        done = self._done(mode, data)
+    def _run(self, mode: str, data: bytes, *more: str) -> bytes:
+        done = self._done(mode, data, *more)
         if done.status != 0:
             raise InputError(f"export: the generated C failed ({done.status}): {_told(done)}")
         return done.output
 
-    def _done(self, mode: str, data: bytes = b"") -> Finished:
-        return _limited([*self._words, mode], self._running, "the generated C", data)
+    def _done(self, mode: str, data: bytes = b"", *more: str) -> Finished:
+        return _limited([*self._words, mode, *more], self._running, "the generated C", data)
 
     def self_test(self) -> int:
         """What ``fogml_self_test`` returns."""
         return self._done("self-test").status
 
-    def steps(self, time: Any, temperatures: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
+    def steps(
+        self, time: Any, temperatures: Any, gyro: Any, power_cycle: tuple[int, int] | None = None
+    ) -> tuple[NDArray[Any], NDArray[np.int32]]:
         """Outputs and flags of `fogml_step`, all in the numbers that the code takes.
 
         Times are in seconds, or whole microseconds where they are integers; those may be negative, as clocks
-        wrap.
+        wrap. With a `power_cycle` the state is saved before the sample of that number and restored on a new
+        clock, after so many microseconds off.
         """
         time = np.asarray(time)
         if time.dtype.kind == "f":
@@ -120,7 +133,7 @@ class CProgram:
             if kind.kind == "i":
                 temperatures = np.clip(temperatures, np.iinfo(kind).min, np.iinfo(kind).max)
             records["temperatures"] = temperatures
-        return self._outputs(self._run("steps", records.tobytes()))
+        return self._outputs(self._run("steps", records.tobytes(), *map(str, power_cycle or ())))
 
     def atoms(self, atoms: Any, gyro: Any) -> tuple[NDArray[Any], NDArray[np.int32]]:
         """Outputs and flags from values of the atoms, windows full, in the numbers of the code."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from hashlib import sha256
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,8 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     numbers["card"] = list(card)
     test = test or make_self_test(plan, windows, dtype, numbers)
     numbers["constants"] = [*_clock_constants(windows, plan.sample_s), *numbers["constants"]]
+    told = "\n".join(map(str, (dtype, plan.names, windows, numbers["constants"])))
+    numbers["model_id"] = int(sha256(told.encode()).hexdigest()[:8], 16)
     context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
     render = templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}

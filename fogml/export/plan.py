@@ -160,6 +160,11 @@ class Plan:
         return cls(**shared, **_regression(model, features))
 
     @property
+    def gives_rate(self) -> bool:
+        """Whether its value is a rate made of the output, scale factor and all, and not a drift."""
+        return self.form == "joint"
+
+    @property
     def dimensions(self) -> int:
         """Number of inputs of the network."""
         return len(self.columns)

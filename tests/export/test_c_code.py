@@ -234,6 +234,44 @@ def test_how_long_a_unit_has_run_does_not_matter(model_of, tmp_path, dtype, cloc
         np.testing.assert_array_equal(flag, answers[0][1])
 
 
+@pytest.mark.parametrize("dtype", ["float32", "q31"])
+def test_a_saved_state_goes_on_after_a_power_cycle(model_of, tmp_path, dtype):
+    source = c_source(Plan.of(model_of("memory"), 0.5), dtype, [])
+    program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
+    count, cut, off_us = 4000, 3000, 60_000_000
+    time = 500_000 * np.arange(count, dtype=np.int64)
+    time[cut:] += off_us - 500_000
+    T = 20.0 + 25.0 * np.sin(np.arange(count) / 600.0)
+    temperatures = np.column_stack([T, T - 1.0])
+    if source.numbers["fixed"]:
+        temperatures = np.round(temperatures / source.numbers["fixed"]["temperature_value"])
+    without, flag = program.steps(time, temperatures, np.zeros(count))
+    through, flag_through = program.steps(time, temperatures, np.zeros(count), (cut, off_us))
+    np.testing.assert_array_equal(through, without)
+    np.testing.assert_array_equal(flag_through, flag)
+    # Off for an unknown time: lags settle anew, plays go on.
+    unknown, flag_unknown = program.steps(time, temperatures, np.zeros(count), (cut, 0))
+    assert flag_unknown[cut] == 2
+    np.testing.assert_array_equal(unknown[:cut], without[:cut])
+
+
+def test_float32_code_computes_in_float32(model_of, tmp_path):
+    if shutil.which("arm-none-eabi-gcc") is None:
+        pytest.skip("arm-none-eabi-gcc is not installed")
+    source = c_source(Plan.of(model_of("memory")), "float32", [])
+    cortex_m4_size(source, tmp_path)
+    words = ["arm-none-eabi-nm", "-u", str(tmp_path / "whole.o")]
+    undefined = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    # The Cortex-M4 has no double: conversions to it and arithmetic would be calls.
+    assert not [
+        name
+        for name in undefined.split()
+        if name.startswith("__aeabi_")
+        and "d" in name[8:10]
+        and name not in ("__aeabi_ldivmod", "__aeabi_uldivmod")
+    ], undefined
+
+
 def test_a_lag_of_hours_holds_in_fixed_point(tmp_path):
     # Ten samples a second of a sensor that steps by a sixteenth of a degree: 2250 degC in a time constant.
     model = make_model("polynomial", features="T_in, lag(T_in, 3600 s)").fit(training_run())
