@@ -43,8 +43,9 @@ class Priors:
         Members of a class cost less than this to be exchanged [nats]: one in twenty.
     trust, doubt
         Logarithms of a name's odds are multiplied by the first, then less the second, for what no family
-        describes: a monotone map, the same for all, fitted on development cases of two realities by
-        ``python -m experiments.families --calibrate``.
+        describes: a monotone map, the same for all. A half lies at 6 nats, under which most names of
+        development cases of two realities were false; ``python -m experiments.families --calibrate`` prints
+        what answered suites ask for.
     slow_noise
         Prior standard deviations from the median at which random walk is integrated over; flicker at all but
         the last. Far above, since a short static run shows little of a walk.
