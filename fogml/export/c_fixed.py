@@ -67,7 +67,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     }
     gyro = (
         f"[{plan.gyro_unit}]"
-        if plan.form == "joint" and plan.gyro_unit == "count"
+        if plan.gives_rate and plan.gyro_unit == "count"
         else f"output as rate, whole steps of 2^-{OUTPUT_BITS} deg/h"
     )
     compensated = f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below."
@@ -263,7 +263,7 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
             ),
             *array("LINEAR_SHIFT", shift, "int", "[COLUMNS]", "int"),
         ]
-    if plan.form == "joint":
+    if plan.gives_rate:
         lines += _scale_constants(plan, scales)
     if plan.centres:
         lines += _network_constants(plan, scales, stored)

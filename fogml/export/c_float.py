@@ -68,7 +68,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
 
     plain = all(is_temperature(name) for name in plan.sensors)
     temperature = "[degC], in the order of the places below" if plain else "in the order and units below"
-    gyro = f"[{plan.gyro_unit}]" if plan.form == "joint" else "output as rate [deg/h]"
+    gyro = f"[{plan.gyro_unit}]" if plan.gives_rate else "output as rate [deg/h]"
     return {
         "fixed": None,
         "real": real,

@@ -148,7 +148,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "bin_s": f"{windows.bin_samples * plan.sample_s:.6g}",
         "tick_us": windows.tick_us,
         "gap": {i: f"INT64_C({round(o.gap_s * 1e6)})" for i, o in enumerate(windows.operators)},
-        "gyro_unit": plan.gyro_unit if plan.form == "joint" else "deg/h",
+        "gyro_unit": plan.gyro_unit if plan.gives_rate else "deg/h",
         "blocks": windows.of_method("block"),
         "slopes": windows.of_method("slope"),
         "exponentials": windows.of_method("exp"),

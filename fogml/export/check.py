@@ -100,7 +100,7 @@ def c_difference(plan: Plan, source: CSource, program: CProgram, seed: int) -> D
     near = _atoms_off(plan, source, program, box_points(plan, seed), gyro[0])
     far = _atoms_off(plan, source, program, box_points(plan, seed, _BEYOND), gyro[0])
     ppm = None
-    if plan.form == "joint":
+    if plan.gives_rate:
         turn = float(_TURN_DEG_H / plan.arrays["scale"][0])
         turn = float(np.round(turn / gyro_step) * gyro_step) if fixed else turn
         ppm = 1e6 * _largest(_atoms_off(plan, source, program, box_points(plan, seed), turn)) / _TURN_DEG_H
@@ -130,7 +130,7 @@ def value_difference(
     for beyond in (0.0, _BEYOND):
         atoms = box_points(plan, seed, beyond)
         columns = plan.compose(plan.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
-        gyro = np.full(len(atoms), 10.0 / (plan.arrays["scale"][0] if plan.form == "joint" else 1.0))
+        gyro = np.full(len(atoms), 10.0 / (plan.arrays["scale"][0] if plan.gives_rate else 1.0))
         sizes.append(_largest(np.abs(value(columns, gyro) - plan.value(columns, gyro))))
     return Difference(sizes[0], sizes[1], POINTS)
 

@@ -53,7 +53,7 @@ def documentation(model: DriftModel, plan: Plan | None = None) -> str:
         f"fogml        {card['fogml_version']}",
         "",
         f"formula      {FORMULAS[plan.form]}",
-        *([] if plan.form == "joint" else ["             compensated = gyro - drift, all in deg/h"]),
+        *([] if plan.gives_rate else ["             compensated = gyro - drift, all in deg/h"]),
         "",
         "coefficients",
         *_coefficients(plan),
@@ -88,7 +88,7 @@ def documentation_or_none(model: DriftModel) -> str | None:
 def _coefficients(plan: Plan) -> list[str]:
     arrays = plan.arrays
     rows = [("constant", float(arrays["constant"][0]), "deg/h", "")]
-    if plan.form == "joint":
+    if plan.gives_rate:
         unit = f"deg/h per {plan.gyro_unit}"
         powers = ("", "/degC", "/degC^2")
         rows += [(f"scale[{i}]", float(v), unit + powers[i], "") for i, v in enumerate(arrays["scale"])]
@@ -157,8 +157,8 @@ def _vectors(plan: Plan) -> list[str]:
     lines = []
     for row, value in zip(atoms.tolist(), values.tolist(), strict=True):
         given = [f"{name} = {number!r}" for name, number in zip(names, row, strict=True)]
-        if plan.form == "joint":
+        if plan.gives_rate:
             given.insert(0, f"gyro = {_GYRO!r} {plan.gyro_unit}")
-        result = "compensated" if plan.form == "joint" else "drift"
+        result = "compensated" if plan.gives_rate else "drift"
         lines.append(f"  {', '.join(given) or 'always'}: {result} = {value!r} deg/h")
     return lines if names else lines[:1]

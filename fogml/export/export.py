@@ -189,7 +189,7 @@ def _pruned(
     points = box_points(whole, settings.seed) if rows is None else rows.atoms
     full = np.ones(len(points), dtype=np.bool_)
     columns = whole.compose(whole.limited(points, full)[0])
-    target = whole.value(columns) if rows is None or whole.form == "joint" else rows.target
+    target = whole.value(columns) if rows is None or whole.gives_rate else rows.target
     plan = pruned(whole, settings.budget, dtype, settings.to == "c", columns, target)
     if plan is whole:
         return whole, None
@@ -307,10 +307,10 @@ def _write_onnx(
 
     def run(inputs: FloatArray, gyro: FloatArray) -> FloatArray:
         feed = {"temperatures" if settings.pipeline else "features": inputs.astype(real)}
-        if plan.form == "joint":
+        if plan.gives_rate:
             feed["gyro"] = gyro.astype(real)
         drift = np.asarray(session.run(["drift"], feed)[0], dtype=np.float64)
-        return gyro - drift if plan.form == "joint" and not settings.pipeline else drift
+        return gyro - drift if plan.gives_rate and not settings.pipeline else drift
 
     if settings.pipeline:
         difference = pipeline_difference(plan, run, len(window_weights(plan)), settings.seed)

@@ -38,7 +38,7 @@ class Scales:
         self.most = np.array([max(abs(a), abs(b)) for a, b in ranges])
         self.columns = np.array([fitting_bits(value) for value in self.most], dtype=np.int64)
         self.temperature_bits = 22 if dtype == "q31" else sixteen_bits(plan)
-        self.gyro_bits = 0 if plan.form == "joint" and plan.gyro_unit == "count" else OUTPUT_BITS
+        self.gyro_bits = 0 if plan.gives_rate and plan.gyro_unit == "count" else OUTPUT_BITS
         arrays = plan.arrays
         linear = arrays.get("linear", np.empty(0))
         self.linear, self.linear_bits = mantissas(linear, self.stored_bits)
@@ -53,7 +53,7 @@ class Scales:
             total += float(np.abs(arrays["weights"]).sum()) * min(slope, 64.0)
             self.weight_bits = common_bits(arrays["weights"], self.stored_bits)
             drift.append(self.weight_bits + 30 - self.stored_bits)
-        if plan.form == "joint":
+        if plan.gives_rate:
             self.scale_bits = common_bits(arrays["scale"][:1] * 1.25, VALUE_BITS)
             drift.append(self.scale_bits + self.gyro_bits)
             total += float(abs(arrays["scale"][0])) * 2.0**31 / 2.0**self.gyro_bits

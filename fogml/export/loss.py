@@ -83,7 +83,7 @@ def accuracy_loss(
     With training rows: of what each leaves in averages over `averaging_s`, on five folds of
     blocks of time. Without: of the difference over the trained box.
     """
-    if rows is None or whole.form == "joint":
+    if rows is None or whole.gives_rate:
         atoms = box_points(whole, seed)
         own = atoms[:, [whole.atoms.index(atom) for atom in exported.atoms]]
         gyro = np.zeros(len(atoms))

@@ -55,7 +55,7 @@ def onnx_model(
         raise InputError(
             f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
         )
-    if plan.form == "joint" and plan.gyro_unit != "deg/h":
+    if plan.gives_rate and plan.gyro_unit != "deg/h":
         raise InputError(
             f"export: this joint model takes the output in {plan.gyro_unit} and gives a rate, which ONNX's "
             "output 'drift' can't hold; export it --to c"
@@ -71,7 +71,7 @@ def onnx_model(
         inputs.append(helper.make_tensor_value_info("features", kind, ["n", len(plan.names)]))
         columns = "features"
     drift = _value(graph, plan, stored, columns)
-    if plan.form == "joint":
+    if plan.gives_rate:
         inputs.append(helper.make_tensor_value_info("gyro", kind, ["n"]))
     graph.add("Identity", [drift], "drift")
     outputs = [helper.make_tensor_value_info("drift", kind, ["n"])]
@@ -228,7 +228,7 @@ def _value(graph: _Graph, plan: Plan, stored: Mapping[str, Stored], columns: str
     constant = graph.stored(stored["constant"])
     linear = graph.sum(graph.add("Mul", [columns, graph.stored(stored["linear"])]), 1)
     value = graph.add("Add", [linear, constant])
-    if plan.form == "joint":
+    if plan.gives_rate:
         temperature = graph.sum(graph.gather(columns, [0]), 1)
         scale = graph.stored(stored["scale"])
         s0, s1, s2 = (graph.add("Gather", [scale, graph.whole([i])], axis=0) for i in range(3))

@@ -20,7 +20,7 @@ def operations_per_sample(plan: Plan) -> int:
     count += 4 * len(plan.atoms)
     count += sum(len(step.atoms) - (step.column is None) for step in plan.steps)
     count += 2 * len(plan.names) + 1
-    if plan.form == "joint":
+    if plan.gives_rate:
         count += 6
     if plan.centres:
         along = 4 * plan.dimensions + 2 if plan.edge_columns else 0

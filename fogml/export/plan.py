@@ -203,7 +203,7 @@ class Plan:
         limited, outside = self.limited(values, full)
         value = self.value(self.compose(limited), gyro)
         flag = np.where(full & settled, outside.astype(np.int8), np.int8(2))
-        return (value if self.form == "joint" else gyro - value), flag
+        return (value if self.gives_rate else gyro - value), flag
 
     def value(self, columns: FloatArray, gyro: FloatArray | None = None) -> FloatArray:
         """Drift [deg/h] of feature columns (n, k), shape (n,); of a joint model the rate."""
@@ -212,7 +212,7 @@ class Plan:
         value = np.full(len(columns), float(self.arrays["constant"][0]))
         if "linear" in self.arrays:
             value = value + columns @ self.arrays["linear"]
-        if self.form == "joint":
+        if self.gives_rate:
             assert gyro is not None
             s0, s1, s2 = self.arrays["scale"]
             value = value + (s0 + columns[:, 0] * (s1 + columns[:, 0] * s2)) * gyro

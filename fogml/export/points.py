@@ -101,7 +101,7 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
         apart = 0.5 * (first_low + first_high - low - high), 0.02 * span
         middle, width = _offset(plan, plan.sensors[i]) or apart
         paths[:, i] = paths[:, 0] - middle - width * np.sin(2.0 * np.pi * (1.5 + i) * time / time[-1])
-    size = _GYRO_DEG_H / (abs(plan.arrays["scale"][0]) if plan.form == "joint" else 1.0)
+    size = _GYRO_DEG_H / (abs(plan.arrays["scale"][0]) if plan.gives_rate else 1.0)
     gyro = size * rng.uniform(-1.0, 1.0, count)
     keep = np.ones(count, dtype=np.bool_)
     for length_s in (2 * step, 3 * step, 0.2 * longest, 0.3 * longest, 2.0 * longest):

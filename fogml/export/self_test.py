@@ -102,7 +102,7 @@ def make_self_test(plan: Plan, windows: Layout, dtype: str, numbers: dict[str, A
         rise[i] = min(0.65 * (high - low) / period, 0.5 * fastest * interval_s / 60.0)
         jump[i] = 0.9 * (high - low) + 3.0
     checks = (0, *np.unique(np.linspace(full_at, full_at + _PERIOD, _CHECKS - 2).astype(int)).tolist())
-    gyro = 1000.0 / abs(plan.arrays["scale"][0]) if plan.form == "joint" else 7.5
+    gyro = 1000.0 / abs(plan.arrays["scale"][0]) if plan.gives_rate else 7.5
     fixed = numbers["fixed"]
     if fixed is None:
         return SelfTest(

@@ -89,7 +89,7 @@ class StaticCurve:
         atoms = np.column_stack([at_rest(atom, held) for atom in plan.atoms])
         columns = plan.compose(plan.limited(atoms, np.ones(count, dtype=np.bool_))[0])
         none = plan.value(columns, np.zeros(count))
-        joint = plan.form == "joint"
+        joint = plan.gives_rate
         scale = plan.value(columns, np.ones(count)) - none if joint else np.ones(count)
         moving = [
             name

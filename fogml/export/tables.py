@@ -187,7 +187,7 @@ def _tolerance(settings: TableSettings, model: DriftModel, share: float) -> floa
 def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) -> dict[str, Any] | None:
     """What table and model leave on the training runs of this axis; None where none was given."""
     own = [run for run in train if run.hash in {known.sha256 for known in model.card_.runs}]
-    if not own or plan.form == "joint":
+    if not own or plan.gives_rate:
         return None
     rows = training_rows(model, plan, own)
     bias = np.concatenate(
