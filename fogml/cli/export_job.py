@@ -143,6 +143,8 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         rows.append([f"rms of {accuracy['averaging_s']:g} s averages on training folds", text])
     if size := report.get("cortex_m4"):
         rows.append(["Cortex-M4", f"{size['flash_bytes']} bytes of flash, {size['ram_bytes']} of RAM"])
+        if size.get("instructions_per_sample"):
+            rows.append(["Cortex-M4, a sample", f"{size['instructions_per_sample']} instructions"])
     elif report["to"] == "c":
         rows.append(["Cortex-M4", "not measured: arm-none-eabi-gcc is not installed"])
     if beyond := report.get("beyond_the_box"):

@@ -37,6 +37,8 @@ class CSource:
         Text of header and source.
     driver
         Text of a program that feeds the source from its standard input, for checks.
+    probe
+        Text of a program for the target whose instructions are counted.
     dtype
         Number format.
     plan, layout
@@ -49,6 +51,7 @@ class CSource:
 
     files: dict[str, str]
     driver: str
+    probe: str
     dtype: str
     plan: Plan
     layout: Layout
@@ -110,7 +113,8 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     render = templates().get_template
     files = {name: render(f"{name[6:]}.j2").render(context) for name in (HEADER, SOURCE)}
     driver = render("driver.c.j2").render(context)
-    return CSource(files, driver, dtype, plan, windows, numbers, test)
+    probe = render("probe.c.j2").render(context)
+    return CSource(files, driver, probe, dtype, plan, windows, numbers, test)
 
 
 @cache
@@ -145,6 +149,9 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),
+        "bin_ticks": round(windows.bin_samples * plan.sample_s / windows.tick_s),
+        "sample_us": round(plan.sample_s * 1e6),
+        "counted": 4,
         "bin_s": f"{windows.bin_samples * plan.sample_s:.6g}",
         "tick_us": windows.tick_us,
         "gap": {i: f"INT64_C({round(o.gap_s * 1e6)})" for i, o in enumerate(windows.operators)},

@@ -25,6 +25,7 @@ from fogml.export.check import (
     value_difference,
 )
 from fogml.export.documentation import DOCUMENTATION_FILE, documentation
+from fogml.export.instructions import instructions_per_sample
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
 from fogml.export.operations import operations_per_sample
 from fogml.export.plan import Plan
@@ -237,6 +238,8 @@ def _write_c(
             raise InputError("export: the generated C fails its own self-test on this machine")
         difference = c_difference(plan, source, program, seed)
         size = cortex_m4_size(source, Path(scratch))
+        if size is not None:
+            size["instructions_per_sample"] = instructions_per_sample(source, Path(scratch))
     for name, text in source.files.items():
         (folder / name).write_text(text, encoding="ascii")
     fixed = source.numbers["fixed"]

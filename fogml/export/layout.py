@@ -156,7 +156,7 @@ def layout(plan: Plan, number: Number) -> Layout:
     for _, window, _, lag in keys:
         _check(window, plan.sample_s, lag)
     held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in ("block", "slope")))
-    ring, bin_samples = _ring([window for _, window, _, _ in keys], plan.sample_s)
+    ring, bin_samples = ring_of([window for _, window, _, _ in keys], plan.sample_s)
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
     held_s = [w.span_s for _, w, _, _ in keys if w.method in ("block", "slope")]
     tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
@@ -226,7 +226,7 @@ def _samples(window: Window, sample_s: float) -> int:
     return math.ceil(window.span_s / sample_s - EDGE_TOLERANCE) + 1
 
 
-def _ring(windows: list[Window], sample_s: float) -> tuple[int, int]:
+def ring_of(windows: list[Window], sample_s: float) -> tuple[int, int]:
     """Samples or bins that the rings hold, and samples to a bin.
 
     Temperature has no content within a second: where the longest window holds more than `MOST_SINGLE`

@@ -29,7 +29,7 @@ def test_c_with_figures(invoke_json, model, tmp_path):
     assert 0.0 <= values["largest_difference"] <= values["tolerance"]
     assert values["operations_per_sample"] > 20
     header = (out / "fogml_model.h").read_text()
-    assert "int fogml_step(fogml_state *state, float time_s, const float *temperatures" in header
+    assert "int fogml_step(fogml_state *state, fogml_time time_us, const float *temperatures" in header
     assert "int fogml_self_test(void);" in header
     assert "FOG-1, axis x" in header
 
