@@ -299,6 +299,8 @@ def _check_finite(folder: Path, new: list[str], stdout: str, faults: dict[str, s
     for name in new:
         path = folder / name
         try:
+            if path.is_dir():
+                continue
             if name.endswith(".json"):
                 json.loads(path.read_text(encoding="utf-8"), parse_constant=refuse)
             elif name.endswith(".csv"):

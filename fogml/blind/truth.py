@@ -187,7 +187,7 @@ class Truth(_Part):
     """
 
     schema_: Literal["fogml.blind_truth/1"] = Field(default="fogml.blind_truth/1", alias="schema")
-    case: str
+    case: str = Field(pattern=r"^[0-9]+$")
     seed: int
     kind: Kind
     reality: str = "first"

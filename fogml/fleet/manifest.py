@@ -15,6 +15,8 @@ from fogml.errors import InputError, quoted
 from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
+_LONGEST_FOLDER = 100
+"""Characters of a unit's folder: names of files may have 255 bytes, and some stand beside it."""
 COLUMNS = ("unit", "job", "train", "test", "axis")
 JOBS = ("train", "compare", "diagnose")
 SHIPPED = "shipped:"
@@ -128,7 +130,7 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
     where = f"{path.name}: {place}"
     if None in row:
         raise InputError(f"{where}: has more cells than the header; separate runs by ';'")
-    name, job, axis = (_text(row.get(key)) for key in ("unit", "job", "axis"))
+    name, job, axis = (_text(row.get(key), f"{where}: column '{key}'") for key in ("unit", "job", "axis"))
     job = job or "train"
     if not name:
         raise InputError(f"{where}: column 'unit' is empty; a serial number was expected")
@@ -136,7 +138,10 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
         raise InputError(f"{where}: column 'job': {quoted(job)}; {', '.join(JOBS)} were expected")
     faults: list[str] = []
     train, test = (
-        tuple(_found(run, f"{where}: column '{key}'", path.parent, faults) for run in _listed(row.get(key)))
+        tuple(
+            _found(run, f"{where}: column '{key}'", path.parent, faults)
+            for run in _listed(row.get(key), f"{where}: column '{key}'")
+        )
         for key in ("train", "test")
     )
     if not train:
@@ -146,13 +151,15 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
     return Unit(name, job, train, test, axis, "", "; ".join(faults))
 
 
-def _text(value: Any) -> str:
+def _text(value: Any, place: str) -> str:
+    if isinstance(value, list | dict):
+        raise InputError(f"{place}: {quoted(value)}; one name was expected")
     return "" if value is None else str(value).strip()
 
 
-def _listed(value: Any) -> list[str]:
-    items = value if isinstance(value, list) else _text(value).split(";")
-    return [text for item in items if (text := _text(item))]
+def _listed(value: Any, place: str) -> list[str]:
+    items = value if isinstance(value, list) else _text(value, place).split(";")
+    return [text for item in items if (text := _text(item, place))]
 
 
 def _found(run: str, place: str, folder: Path, faults: list[str]) -> str:
@@ -185,6 +192,7 @@ def _with_folders(units: list[Unit], path: Path) -> list[Unit]:
     for unit in units:
         parts = [unit.name, unit.axis, unit.job if jobs else ""]
         wanted = _UNSAFE.sub("_", "-".join(part for part in parts if part)).strip(".") or "unit"
+        wanted = wanted[:_LONGEST_FOLDER]
         folder, number = wanted, 1
         # Names that differ only in case are one folder on some systems.
         while folder.lower() in taken:

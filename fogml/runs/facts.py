@@ -186,7 +186,8 @@ def facts_from(values: Any, source: str) -> Facts:
 
 def side_file(run_path: Path) -> Path | None:
     """The side file beside a run: same stem, ``.yaml`` or else ``.yml``; None if there is none."""
-    sides = (run_path.with_suffix(suffix) for suffix in SIDE_SUFFIXES)
+    # A root has no name and so no side file.
+    sides = (run_path.with_suffix(suffix) for suffix in SIDE_SUFFIXES if run_path.name)
     # A folder that can't be looked into holds none; reading the run says what is wrong.
     return next((side for side in sides if os.path.isfile(side)), None)
 

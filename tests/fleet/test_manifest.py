@@ -42,11 +42,18 @@ def test_csv_and_yaml_say_the_same(folder):
 
 
 def test_folders_are_safe_and_unlike_each_other(folder):
-    lines = "".join(f'"{name}",train,a.csv,b.csv,\n' for name in ("a/b", "a:b", "..", "A_B", "../../etc"))
+    given = ("a/b", "a:b", "..", "A_B", "../../etc", "x" * 300, "x" * 301)
+    lines = "".join(f'"{name}",train,a.csv,b.csv,\n' for name in given)
     units = read_manifest(manifest(folder, HEAD + lines))
     names = [unit.folder.lower() for unit in units]
     assert len(set(names)) == len(names)
-    assert not any("/" in name or name.startswith(".") for name in names)
+    assert not any("/" in name or name.startswith(".") or len(name) > 110 for name in names)
+
+
+def test_a_list_is_no_name(folder):
+    rows = [{"unit": "F-1", "train": "a.csv", "test": "b.csv", "axis": ["x", "y"]}]
+    with pytest.raises(InputError, match=r"column 'axis': .*one name was expected"):
+        read_manifest(manifest(folder, yaml.safe_dump(rows), "m.yaml"))
 
 
 @pytest.mark.parametrize(
