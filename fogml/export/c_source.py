@@ -99,7 +99,7 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
         raise InputError(
             "export: two columns of the model differ in upper and lower case alone, which places in C do not"
         )
-    number: Number = "fixed" if dtype in ("q15", "q31") else dtype  # type: ignore[assignment]
+    number = number_of(dtype)
     windows = layout(plan, number)
     numbers = (
         fixed_context(plan, windows, dtype) if number == "fixed" else float_context(plan, windows, dtype)
@@ -115,6 +115,11 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     driver = render("driver.c.j2").render(context)
     probe = render("probe.c.j2").render(context)
     return CSource(files, driver, probe, dtype, plan, windows, numbers, test)
+
+
+def number_of(dtype: str) -> Number:
+    """What C code of a number format computes with."""
+    return "fixed" if dtype in ("q15", "q31") else dtype  # type: ignore[return-value]
 
 
 @cache

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.c_program import CProgram, cortex_m4_size
-from fogml.export.c_source import C_DTYPES, c_source
+from fogml.export.c_source import C_DTYPES, c_source, number_of
 from fogml.export.card import card_lines, export_card
 from fogml.export.check import (
     Difference,
@@ -26,6 +26,7 @@ from fogml.export.check import (
 )
 from fogml.export.documentation import DOCUMENTATION_FILE, documentation
 from fogml.export.instructions import instructions_per_sample
+from fogml.export.layout import layout
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
 from fogml.export.operations import operations_per_sample
 from fogml.export.plan import Plan
@@ -114,6 +115,9 @@ def export_model(
     dtype = settings.dtype or ("float32" if settings.to == "c" else "float64")
     _check(settings, dtype)
     whole = Plan.of(model, settings.sample_s)
+    if settings.to == "c":
+        # What C can't hold is refused before anything is computed: its histories may be endless.
+        layout(whole, number_of(dtype))
     _agreeing(whole, model, settings.seed)
     rows = training_rows(model, whole, train) if train else None
     plan, pruning = _pruned(whole, settings, dtype, rows)

@@ -20,6 +20,8 @@ from fogml.runs.dropouts import RULE, DropoutRule
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+_ROWS = 1 << 16
+"""Rows of a network at a time, so that long histories take bounded memory."""
 Form = Literal["constant", "linear", "network", "joint"]
 
 
@@ -208,7 +210,8 @@ class Plan:
     def value(self, columns: FloatArray, gyro: FloatArray | None = None) -> FloatArray:
         """Drift [deg/h] of feature columns (n, k), shape (n,); of a joint model the rate."""
         if self.form == "network":
-            return self._network(columns)
+            parts = [self._network(columns[i : i + _ROWS]) for i in range(0, len(columns), _ROWS)]
+            return np.concatenate(parts) if parts else np.empty(0)
         value = np.full(len(columns), float(self.arrays["constant"][0]))
         if "linear" in self.arrays:
             value = value + columns @ self.arrays["linear"]

@@ -23,6 +23,8 @@ POINTS = 4096
 _BEYOND = 0.2
 _LEAST_SPANS = 5.0
 _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
+_MOST_FILLING = 4_000_000
+"""Samples that a history is made longer by at most, so that its windows fill: 2000 s at 2 kHz."""
 _GYRO_DEG_H = 20.0
 """Outputs up to this size are compared; a joint model's scale factor by a point at 10 deg/s."""
 
@@ -82,7 +84,7 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     longest = max(spans, default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
     # So long in any case that windows fill, and go on after a gap.
-    count = max(count, least, round(_LEAST_SPANS * longest / plan.sample_s))
+    count = max(count, least, min(round(_LEAST_SPANS * longest / plan.sample_s), _MOST_FILLING))
     step = plan.sample_s
     time = step * np.arange(count)
     ranges = [sensor_range(plan, sensor) for sensor in plan.sensors]
