@@ -11,6 +11,7 @@ from typing import Any
 
 from fogml.errors import InputError
 from fogml.fleet.tasks import Task, finished, lost, run_task
+from fogml.folders import nearest_folder
 from fogml.outputs import settle
 from fogml.processes import worker_pool
 
@@ -108,8 +109,10 @@ def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Out
                 del left[task.unit.folder]
                 keep(task, lost(task, "ended its process: out of memory, or killed"))
     finally:
-        # What workers that were ended had begun to write.
-        for place in {Path(task.home) for task in tasks} | {task.folder for task in tasks}:
+        # What workers that were ended had begun to write: above the home, too, where it was not there yet.
+        homes = {Path(task.home) for task in tasks}
+        above = {nearest_folder(home.parent) for home in homes}
+        for place in homes | above | {task.folder for task in tasks}:
             settle(place)
 
 

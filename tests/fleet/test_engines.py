@@ -16,7 +16,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.tasks import OUTCOME
-from tests.fleet.units import noted, one_bad, one_deadly, quick, slow, tasks
+from tests.fleet.units import deadly_while_writing, noted, one_bad, one_deadly, quick, slow, tasks
 
 ROOT = Path(__file__).parents[2]
 
@@ -51,6 +51,12 @@ def test_a_unit_that_ends_its_process_is_found(tmp_path):
     assert [outcome["status"] for outcome in outcomes] == ["done", "done", "failed", "done"]
     assert "killed" in outcomes[2]["reason"]
     assert Counter(noted(tmp_path / "out")) == Counter(f"done FOG-00{n}" for n in (0, 1, 3))
+
+
+def test_what_an_ended_worker_had_half_written_is_removed(tmp_path):
+    (outcome,) = run_tasks(tasks(tmp_path, 1, deadly_while_writing), workers=2)
+    assert "killed" in outcome["reason"]
+    assert not list(tmp_path.rglob(".partial-*"))
 
 
 def test_a_full_disk_stops_the_fleet_with_one_message_and_keeps_what_is_done(tmp_path, monkeypatch):

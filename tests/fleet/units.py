@@ -13,6 +13,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.tasks import Task
+from fogml.outputs import whole_folder
 
 SLOPE, SPREAD = 0.05, 0.01
 
@@ -91,3 +92,10 @@ def one_deadly(unit: Unit, folder: Path) -> Mapping[str, Any]:
     if unit.name.endswith("2"):
         os._exit(9)
     return quick(unit, folder)
+
+
+def deadly_while_writing(unit: Unit, folder: Path) -> Mapping[str, Any]:
+    """Ends its process while its results are half-written."""
+    with whole_folder(folder) as staging:
+        (staging / "half").write_text("half")
+        os._exit(9)
