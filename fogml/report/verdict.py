@@ -75,7 +75,13 @@ def own_noise_by(run: RunJudgement) -> str:
 
 
 def own_noise(run: RunJudgement) -> str:
-    """Whether what is left is the gyro's own noise, as a sentence."""
+    """Whether what is left is the gyro's own noise, as a sentence.
+
+    A bias that the floor of one average could not hide is told apart: noise has no mean.
+    """
+    if left_is_noise(run) and abs(run.after.bias) > run.floor:
+        bias = f"Beside a bias of {number(run.after.bias)} deg/h,"
+        return f"{bias} what is left is the gyro's own noise, as far as these averages tell."
     if left_is_noise(run):
         return "What is left is the gyro's own noise, as far as these averages tell."
     return "What is left is not the gyro's own noise alone."

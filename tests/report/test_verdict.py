@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fogml.report.verdict import model_card, stated_limits, subject, verdict, worst_run
+from fogml.report.verdict import model_card, own_noise, stated_limits, subject, verdict, worst_run
 from fogml.report.words import number
 from fogml.runs.findings import Finding
-from tests.report.judgements import judgement
+from tests.report.judgements import judged_run, judgement
 
 
 def test_the_lead_states_what_is_left_of_what_the_averaging_and_the_floor() -> None:
@@ -99,3 +99,11 @@ def test_the_model_card_tells_size_box_and_band() -> None:
     assert "T −20.0 to 60.0 °C; dT −0.670 to 0.670 °C/min" in card["trained within"]
     assert "± 0.0163 deg/h for 100 s averages" in card["90 % band"]
     assert np.all([isinstance(value, str) for value in card.values()])
+
+
+def test_a_bias_is_no_noise() -> None:
+    words = "what is left is the gyro's own noise"
+    assert words in own_noise(judged_run(left=0.0)).lower()
+    assert "bias" not in own_noise(judged_run(left=0.0))
+    biased = own_noise(judged_run(left=0.0, offset=0.05))
+    assert biased.startswith("Beside a bias of 0.0498 deg/h,") and words in biased
