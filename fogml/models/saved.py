@@ -83,6 +83,7 @@ def save_model(model: DriftModel, folder: str | Path) -> None:
         without pickle.
     """
     document, weights = _saved_document(model)
+    model_of_form(document["form"], document["kind"])
     text = json_text(document, MODEL_FILE, indent=1)
     with whole_folder(folder) as staging:
         (staging / MODEL_FILE).write_text(text + "\n", encoding="utf-8")
@@ -95,7 +96,7 @@ def model_hash(model: DriftModel) -> str:
     Raises
     ------
     InputError
-        If the model is of no known kind, or holds what can't be saved without pickle.
+        If the model holds what can't be saved without pickle.
     """
     return str(_saved_document(model)[0]["sha256"])
 
@@ -103,7 +104,6 @@ def model_hash(model: DriftModel) -> str:
 def _saved_document(model: DriftModel) -> tuple[dict[str, Any], bytes]:
     """What `MODEL_FILE` and `WEIGHTS_FILE` hold of a model."""
     values, arrays = model_to_saved(model)
-    model_of_form(values["form"], values["kind"])
     weights = arrays_to_bytes(arrays)
     document = {
         "schema": SCHEMA,
