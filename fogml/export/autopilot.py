@@ -21,7 +21,9 @@ from fogml.export.static_curve import StaticCurve
 FloatArray = NDArray[np.float64]
 PX4_FILE, ARDUPILOT_FILE = "fogml_px4.params", "fogml_ardupilot.param"
 ARDUPILOT_REFERENCE_DEGC = 35.0
+"""TEMP_REFERENCE of ArduPilot: where its polynomials have their zero."""
 ARDUPILOT_SHARE = 1e-6
+"""What ArduPilot multiplies the coefficients of its parameters by (INV_SCALE_FACTOR)."""
 RAD_S_PER_DEG_H = np.pi / 180.0 / 3600.0
 _MAV_FLOAT, _MAV_INT = 9, 6
 _NUMBERS = {"x": 0, "y": 1, "z": 2}
@@ -57,7 +59,10 @@ def write(
     high = min(float(curve.temperature[-1]) for curve in curves.values())
     if not low < high:
         raise InputError("export: the axes were trained at different temperatures; they share no range")
-    reference = ARDUPILOT_REFERENCE_DEGC if to == "ardupilot" else 0.5 * (low + high)
+    reference, share = 0.5 * (low + high), np.ones(4)
+    if to == "ardupilot":
+        reference = ARDUPILOT_REFERENCE_DEGC
+        share[1:] = ARDUPILOT_SHARE
     told: dict[str, dict[str, Any]] = {}
     coefficients: dict[int, FloatArray] = {}
     for axis, curve in curves.items():
@@ -68,13 +73,11 @@ def write(
         within = (curve.temperature >= low) & (curve.temperature <= high)
         temperature, bias = curve.temperature[within], curve.bias[within] * RAD_S_PER_DEG_H
         fit = Polynomial.fit(temperature - reference, bias, 3).convert()
-        cubic = np.asarray(fit.coef, dtype=np.float64)
-        held = np.zeros(4, dtype=np.float32)
-        held[: len(cubic)] = cubic
-        if to == "ardupilot":
-            held[1:] = np.asarray(cubic[1:] / ARDUPILOT_SHARE, dtype=np.float32)
+        # Of a curve that is constant the higher powers are left out.
+        cubic = np.zeros(4)
+        cubic[: len(fit.coef)] = fit.coef
+        held = (cubic / share).astype(np.float32)
         coefficients[_NUMBERS[axis]] = held.astype(np.float64)
-        share = np.array([1.0, *[ARDUPILOT_SHARE if to == "ardupilot" else 1.0] * 3])
         value = np.polynomial.polynomial.polyval(temperature - reference, share * held)
         off = (value - bias) / RAD_S_PER_DEG_H
         told[axis] = {

@@ -156,6 +156,15 @@ def test_parameters_subtract_the_drift(axes, tmp_path, to):
         assert offset / DEG_H == pytest.approx(wanted, abs=1e-4)
 
 
+@pytest.mark.parametrize("to", ["px4", "ardupilot"])
+def test_a_drift_that_is_constant_has_parameters(tmp_path, to):
+    time = np.arange(0.0, 3600.0, 4.0)
+    columns = {"time": time, "gyro": np.zeros(len(time)), "T": 20.0 + 10.0 * np.sin(time / 500.0)}
+    model = make_model("polynomial", features="T").fit(Run.from_columns("a", Facts(axis="z"), **columns))
+    told = export_tables([model], tmp_path, TableSettings(to))["axes"]["z"]
+    assert told["coefficients"] == pytest.approx([0.0] * 4, abs=1e-12)
+
+
 def test_what_does_not_go_together_is_told(axes, tmp_path, model_of):
     x = axes["x"][0]
     for models, settings, told in [
