@@ -14,8 +14,6 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
-TABLE_TARGETS = ("segments", "px4", "ardupilot")
-
 
 class ExportJobSettings(Settings):
     """Settings of ``fogml export``."""
@@ -51,7 +49,7 @@ class ExportJobSettings(Settings):
 
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:
     """Export a model into ``settings.out``, whole or not at all, and print what came of it."""
-    from fogml.export.export import ExportSettings, export_model
+    from fogml.export.export import TABLE_TARGETS, ExportSettings, export_model
     from fogml.export.tables import TableSettings, export_tables
     from fogml.models.saved import load_model
 
@@ -88,6 +86,8 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
 
 def _check_form(settings: ExportJobSettings) -> None:
     """Hold that what is asked for is of the form asked for."""
+    from fogml.export.export import TABLE_TARGETS
+
     of_tables = settings.to in TABLE_TARGETS
     if not of_tables and len(settings.model) > 1:
         raise InputError(f"--to {settings.to} takes one model; several axes go to {', '.join(TABLE_TARGETS)}")

@@ -83,11 +83,7 @@ class CProgram:
         running: ProgramLimits = RUNNING,
     ) -> None:
         self._running = running
-        for name, text in {**source.files, DRIVER: source.driver}.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        program = folder / "driver"
-        words = [compiler or host_compiler(), *flags, str(folder / DRIVER), "-o", str(program)]
-        _compile(words)
+        program = _built({**source.files, DRIVER: source.driver}, DRIVER, folder, compiler, flags)
         self._words = [*runner, str(program)]
         types = {"double": "f8", "float": "f4", "int64_t": "i8", "int32_t": "i4", "int16_t": "i2"}
         self._types = {
@@ -97,10 +93,7 @@ class CProgram:
         self.places = max(1, len(source.plan.sensors))
 
     def _run(self, mode: str, data: bytes, *more: str) -> bytes:
-        done = self._done(mode, data, *more)
-        if done.status != 0:
-            raise InputError(f"export: the generated C failed ({done.status}): {_told(done)}")
-        return done.output
+        return _output(self._done(mode, data, *more))
 
     def _done(self, mode: str, data: bytes = b"", *more: str) -> Finished:
         return _limited([*self._words, mode, *more], self._running, "the generated C", data)
@@ -160,11 +153,31 @@ def compiled_output(files: Mapping[str, str], main: str, folder: Path, data: byt
     InputError
         If the compiler refuses them, or the program fails.
     """
+    return _output(_limited([str(_built(files, main, folder))], RUNNING, "the generated C", data))
+
+
+def write_files(files: Mapping[str, str], folder: Path) -> None:
+    """Write generated files into a folder, by their names."""
     for name, text in files.items():
         (folder / name).write_text(text, encoding="utf-8")
+
+
+def _built(
+    files: Mapping[str, str],
+    main: str,
+    folder: Path,
+    compiler: str | None = None,
+    flags: Sequence[str] = FLAGS,
+) -> Path:
+    """The program of generated files, compiled in a folder."""
+    write_files(files, folder)
     program = folder / "program"
-    _compile([host_compiler(), *FLAGS, str(folder / main), "-o", str(program)])
-    done = _limited([str(program)], RUNNING, "the generated C", data)
+    _compile([compiler or host_compiler(), *flags, str(folder / main), "-o", str(program)])
+    return program
+
+
+def _output(done: Finished) -> bytes:
+    """What a program of generated C wrote, if it did not fail."""
     if done.status != 0:
         raise InputError(f"export: the generated C failed ({done.status}): {_told(done)}")
     return done.output
@@ -179,8 +192,7 @@ def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
     compiler, size = shutil.which("arm-none-eabi-gcc"), shutil.which("arm-none-eabi-size")
     if compiler is None or size is None:
         return None
-    for name, text in source.files.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    write_files(source.files, folder)
     figures = {}
     for label, more in (("lean", ["-DFOGML_NO_SELF_TEST"]), ("whole", [])):
         target = folder / f"{label}.o"

@@ -27,6 +27,10 @@ HEADER, SOURCE, DRIVER = "fogml_model.h", "fogml_model.c", "driver.c"
 _MOST_INPUTS = 64
 
 
+COUNTED = 4
+"""Samples whose instructions are counted; the figure is their mean."""
+
+
 @dataclass(frozen=True)
 class CSource:
     """The generated files, by name, and what they were made with.
@@ -156,7 +160,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "spare": _spare(plan, windows),
         "bin_ticks": round(windows.bin_samples * plan.sample_s / windows.tick_s),
         "sample_us": round(plan.sample_s * 1e6),
-        "counted": 4,
+        "counted": COUNTED,
         "bin_s": f"{windows.bin_samples * plan.sample_s:.6g}",
         "tick_us": windows.tick_us,
         "gap": {i: f"INT64_C({round(o.gap_s * 1e6)})" for i, o in enumerate(windows.operators)},

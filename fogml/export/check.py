@@ -129,7 +129,7 @@ def value_difference(
     sizes = []
     for beyond in (0.0, _BEYOND):
         atoms = box_points(plan, seed, beyond)
-        columns = plan.compose(plan.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
+        columns = plan.full_columns(atoms)
         gyro = np.full(len(atoms), 10.0 / (plan.arrays["scale"][0] if plan.gives_rate else 1.0))
         sizes.append(_largest(np.abs(value(columns, gyro) - plan.value(columns, gyro))))
     return Difference(sizes[0], sizes[1], POINTS)

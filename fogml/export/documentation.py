@@ -152,7 +152,7 @@ def _vectors(plan: Plan) -> list[str]:
             atoms[:, i] = low + shares * (high - low)
         if atom.operator == "sign":
             atoms[:, i] = np.sign(atoms[:, i])
-    columns = plan.compose(plan.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
+    columns = plan.full_columns(atoms)
     gyro = np.full(len(atoms), _GYRO)
     values = plan.value(columns, gyro)
     lines = []

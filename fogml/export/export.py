@@ -40,6 +40,8 @@ FloatArray = NDArray[np.float64]
 SCHEMA = "fogml.export/1"
 Target = Literal["c", "onnx", "json", "mat"]
 TARGETS: tuple[str, ...] = get_args(Target)
+TABLE_TARGETS = ("segments", "px4", "ardupilot")
+"""What `fogml.export.tables` writes."""
 DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
 ONNX_FILE = "fogml_model.onnx"
 
@@ -160,7 +162,9 @@ def export_model(
 
 def _check(settings: ExportSettings, dtype: str) -> None:
     if settings.to not in TARGETS:
-        raise InputError(f"--to '{settings.to}' is not known; known are {', '.join(TARGETS)}")
+        raise InputError(
+            f"--to '{settings.to}' is not known; known are {', '.join((*TARGETS, *TABLE_TARGETS))}"
+        )
     if dtype not in DTYPES:
         raise InputError(f"--dtype '{dtype}' is not known; known are {', '.join(DTYPES)}")
     allowed = C_DTYPES if settings.to == "c" else FILE_DTYPES
@@ -192,14 +196,13 @@ def _pruned(
     if settings.budget is None:
         return whole, None
     points = box_points(whole, settings.seed) if rows is None else rows.atoms
-    full = np.ones(len(points), dtype=np.bool_)
-    columns = whole.compose(whole.limited(points, full)[0])
+    columns = whole.full_columns(points)
     target = whole.value(columns) if rows is None or whole.gives_rate else rows.target
     plan = pruned(whole, settings.budget, dtype, settings.to == "c", columns, target)
     if plan is whole:
         return whole, None
     atoms = points[:, [whole.atoms.index(atom) for atom in plan.atoms]]
-    off = plan.value(plan.compose(plan.limited(atoms, full)[0])) - whole.value(columns)
+    off = plan.value(plan.full_columns(atoms)) - whole.value(columns)
     return plan, {
         "bytes_asked": settings.budget,
         "bytes_whole": weight_bytes(whole, dtype, settings.to == "c"),
@@ -274,7 +277,7 @@ def _write_numbers(
     from fogml.export.onnx_graph import BEYOND
 
     inputs = _own_atoms(plan, settings.seed, rows)
-    columns = plan.compose(plan.limited(inputs, np.ones(len(inputs), dtype=np.bool_))[0])
+    columns = plan.full_columns(inputs)
     stored, exported = stored_plan(plan, dtype, columns)
     seed = settings.seed
     if settings.to == "onnx":

@@ -7,12 +7,10 @@ import shutil
 from collections.abc import Sequence
 from pathlib import Path
 
-from fogml.export.c_program import COMPILING, CORTEX_M4, FLAGS
-from fogml.export.c_source import CSource
+from fogml.export.c_program import COMPILING, CORTEX_M4, FLAGS, write_files
+from fogml.export.c_source import COUNTED, CSource
 from fogml.limited import run_limited
 
-COUNTED = 4
-"""Samples that are counted; the figure is their mean."""
 _EMULATED_CPU = "cortex-a15"
 # It knows all that a Cortex-M4's code is made of, and programs of Linux besides.
 
@@ -25,8 +23,7 @@ def instructions_per_sample(source: CSource, folder: Path) -> int | None:
     compiler, emulator = shutil.which("arm-none-eabi-gcc"), shutil.which("qemu-arm")
     if compiler is None or emulator is None:
         return None
-    for name, text in {**source.files, "probe.c": source.probe}.items():
-        (folder / name).write_text(text, encoding="utf-8")
+    write_files({**source.files, "probe.c": source.probe}, folder)
     program = folder / "probe.elf"
     flags = [flag for flag in FLAGS if flag not in ("-O2", "-Wpedantic", "-Werror")]
     if not _done(

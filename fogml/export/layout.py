@@ -39,10 +39,11 @@ MOST_SINGLE = 132
 BINS = 64
 """Bins that the longest window, both of a block's, is parted into: 2 s for a block of 64 s."""
 _SHORTEST_BINS = 8
-# A window's edge parts a bin along its line; the shortest window must be long beside that.
+"""Bins in the shortest window at least: its edge parts one along a line, beside which it must be long."""
 MOST_IN_BIN = 8191
 """Samples that a bin holds at most: its sums then fit 63 bits."""
 _LONGEST_RING = 1 << 12
+"""Bins at most; windows whose lengths are further apart are refused."""
 
 
 @dataclass(frozen=True)
@@ -236,13 +237,14 @@ def ring_of(windows: list[Window], sample_s: float) -> tuple[int, int]:
     if not held:
         return 0, 1
     most = max(_samples(window, sample_s) for window in held)
+    single = most + most // _HEADROOM + 4, 1
     if most <= MOST_SINGLE:
-        return most + most // _HEADROOM + 4, 1
+        return single
     longest = max(window.span_s for window in held)
     bin_s = min(longest / BINS, min(window.length_s for window in held) / _SHORTEST_BINS)
     count = min(max(1, math.floor(bin_s / sample_s + EDGE_TOLERANCE)), MOST_IN_BIN)
     if count == 1:
-        return most + most // _HEADROOM + 4, 1
+        return single
     ring = math.ceil(longest / ((count - 0.5) * sample_s)) + 2
     if ring > _LONGEST_RING:
         raise InputError(

@@ -87,12 +87,9 @@ def accuracy_loss(
         atoms = box_points(whole, seed)
         own = atoms[:, [whole.atoms.index(atom) for atom in exported.atoms]]
         gyro = np.zeros(len(atoms))
-        off = _value(exported, own, gyro) - _value(whole, atoms, gyro)
+        off = exported.value(exported.full_columns(own), gyro) - whole.value(whole.full_columns(atoms), gyro)
         return {"on": "points in the trained box", "rms_difference": float(np.sqrt(np.mean(off**2)))}
-    left = [
-        rows.target - _value(plan, rows.atoms_of(plan), np.zeros(len(rows.target)))
-        for plan in (whole, exported)
-    ]
+    left = [rows.target - plan.value(plan.full_columns(rows.atoms_of(plan))) for plan in (whole, exported)]
     return averaged_loss(rows, left, averaging_s)
 
 
@@ -128,8 +125,3 @@ def averaged_loss(rows: TrainingRows, left: Sequence[FloatArray], averaging_s: f
             for fold in np.unique(folds)
         ],
     }
-
-
-def _value(plan: Plan, atoms: FloatArray, gyro: FloatArray) -> FloatArray:
-    limited, _ = plan.limited(atoms, np.ones(len(atoms), dtype=np.bool_))
-    return plan.value(plan.compose(limited), gyro)

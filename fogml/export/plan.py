@@ -199,6 +199,10 @@ class Plan:
         """Limited atoms (n, a), and which rows lie outside the trained box (n,)."""
         return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :] | (atoms != 0.0))
 
+    def full_columns(self, atoms: FloatArray) -> FloatArray:
+        """Feature columns (n, k) of atoms (n, a) where all windows are full."""
+        return self.compose(self.limited(atoms, np.ones(len(atoms), dtype=np.bool_))[0])
+
     def compensated(self, atoms: AtomValues, gyro: FloatArray) -> tuple[FloatArray, NDArray[np.int8]]:
         """Compensated output [deg/h] and flags, each (n,), from atoms (n, a) and the output (n,)."""
         values, full, settled = atoms

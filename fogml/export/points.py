@@ -22,6 +22,7 @@ FloatArray = NDArray[np.float64]
 POINTS = 4096
 _BEYOND = 0.2
 _LEAST_SPANS = 5.0
+"""Longest windows that a history holds at least: it fills one, and another after each of its gaps."""
 _LEAST_SAMPLES, _MOST_SAMPLES = 4000, 40_000
 _MOST_FILLING = 4_000_000
 """Samples that a history is made longer by at most, so that its windows fill: 2000 s at 2 kHz."""

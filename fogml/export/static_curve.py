@@ -87,7 +87,7 @@ class StaticCurve:
             else:
                 held[sensor] = np.full(count, 0.0 if ends is None else 0.5 * sum(ends))
         atoms = np.column_stack([at_rest(atom, held) for atom in plan.atoms])
-        columns = plan.compose(plan.limited(atoms, np.ones(count, dtype=np.bool_))[0])
+        columns = plan.full_columns(atoms)
         none = plan.value(columns, np.zeros(count))
         joint = plan.gives_rate
         scale = plan.value(columns, np.ones(count)) - none if joint else np.ones(count)

@@ -87,14 +87,13 @@ def export_tables(
     plans = {axis: Plan.of(model) for axis, model in named.items()}
     curves = {axis: StaticCurve.of(plan) for axis, plan in plans.items()}
     cards = {axis: export_card(named[axis], plan, None) for axis, plan in plans.items()}
-    found: dict[str, Any] = {}
     dtype = settings.dtype or "float32"
     if settings.to == "segments":
         tables = {
             axis: segments(
                 curve,
                 breakpoints=settings.breakpoints,
-                tolerance=_tolerance(settings, named[axis], share=TOLERANCE_SHARE),
+                tolerance=_tolerance(settings, named[axis]),
             )
             for axis, curve in curves.items()
         }
@@ -106,11 +105,10 @@ def export_tables(
             raise InputError(f"--matrix: {settings.to} has parameters of its own for it; leave it out")
         found, errors = autopilot.write(folder, settings.to, curves, cards)
     for axis, error in errors.items():
-        allowed = _tolerance(settings, named[axis], share=np.inf)
-        if error > allowed:
+        if settings.tolerance is not None and error > settings.tolerance:
             raise InputError(
                 f"export: axis {axis}: what is written is off by {error:.3g} deg/h from the model at rest, "
-                f"more than the tolerance of {allowed:.3g} deg/h. Nothing was written"
+                f"more than the tolerance of {settings.tolerance:.3g} deg/h. Nothing was written"
             )
     return {
         "schema": SCHEMA,
@@ -178,10 +176,10 @@ def _by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
     return {axis: found[axis] for axis in AXES if axis in found}
 
 
-def _tolerance(settings: TableSettings, model: DriftModel, share: float) -> float:
+def _tolerance(settings: TableSettings, model: DriftModel) -> float:
     if settings.tolerance is not None:
         return settings.tolerance
-    return share * float(model.intervals_.half_width(0.9)) if np.isfinite(share) else np.inf
+    return TOLERANCE_SHARE * float(model.intervals_.half_width(0.9))
 
 
 def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) -> dict[str, Any] | None:
@@ -196,6 +194,5 @@ def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) 
             for i, run in enumerate(own)
         ]
     )
-    limited, _ = plan.limited(rows.atoms, np.ones(len(bias), dtype=np.bool_))
-    left = rows.target - plan.value(plan.compose(limited)), rows.target - bias
+    left = rows.target - plan.value(plan.full_columns(rows.atoms)), rows.target - bias
     return averaged_loss(rows, left, model.intervals_.averaging_s)
