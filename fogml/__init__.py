@@ -9,17 +9,19 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fogml.errors import FogmlError, InputError
-    from fogml.features.parse import parse_features
-    from fogml.models.names import make_model
-    from fogml.models.saved import load_model, save_model
-    from fogml.runs.facts import Facts
-    from fogml.runs.profiles import import_recording
-    from fogml.runs.reading import read_run
-    from fogml.runs.run import Run
-    from fogml.runs.shipped import shipped_run
-    from fogml.runs.writing import write_run
-    from fogml.validation.judge import judge
+    from fogml.errors import FogmlError as FogmlError
+    from fogml.errors import InputError as InputError
+    from fogml.features.parse import parse_features as parse_features
+    from fogml.models.names import make_model as make_model
+    from fogml.models.saved import load_model as load_model
+    from fogml.models.saved import save_model as save_model
+    from fogml.runs.facts import Facts as Facts
+    from fogml.runs.profiles import import_recording as import_recording
+    from fogml.runs.reading import read_run as read_run
+    from fogml.runs.run import Run as Run
+    from fogml.runs.shipped import shipped_run as shipped_run
+    from fogml.runs.writing import write_run as write_run
+    from fogml.validation.judge import judge as judge
 
 __version__ = "0.1.0"
 
@@ -44,22 +46,7 @@ _PACKAGES = (
     "tuning", "twin", "validation",
 )  # fmt: skip
 
-__all__ = [
-    "Facts",
-    "FogmlError",
-    "InputError",
-    "Run",
-    "__version__",
-    "import_recording",
-    "judge",
-    "load_model",
-    "make_model",
-    "parse_features",
-    "read_run",
-    "save_model",
-    "shipped_run",
-    "write_run",
-]
+__all__ = ["__version__", *_HOMES]
 
 
 def __getattr__(name: str) -> Any:

@@ -40,6 +40,11 @@ def printable(text: str, longest: int = LONGEST_QUOTED) -> str:
     return _UNPRINTABLE.sub("\N{REPLACEMENT CHARACTER}", text)
 
 
+def first_line(error: BaseException) -> str:
+    """The reason that an exception gives, in one line; its kind where it gives none."""
+    return (str(error).strip() or type(error).__name__).splitlines()[0]
+
+
 def quoted(value: object) -> str:
     """A value that was found, for a message: text in quotation marks, any other as Python writes it, cut."""
     if isinstance(value, str):

@@ -9,7 +9,7 @@ from pathlib import Path
 from secrets import token_hex
 from typing import Any
 
-from fogml.errors import InputError
+from fogml.errors import InputError, first_line
 from fogml.fleet.tasks import Task, finished, lost, run_task
 from fogml.folders import nearest_folder
 from fogml.outputs import settle
@@ -129,7 +129,7 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
         client = Client(address, timeout=_ANSWER_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise InputError(
-            f"--cluster {address}: does not answer ({_first_line(error)}); start it with 'dask scheduler' "
+            f"--cluster {address}: does not answer ({first_line(error)}); start it with 'dask scheduler' "
             "and 'dask worker', or leave --cluster out"
         ) from None
     with client:
@@ -148,16 +148,12 @@ def _on_cluster(tasks: Sequence[Task], address: str, keep: Callable[[Task, Outco
                 outcome = lost(task, "ended several workers: out of memory, or killed")
             except Exception as error:
                 raise InputError(
-                    f"--cluster {address}: stopped answering ({_first_line(error)}); finished units are "
+                    f"--cluster {address}: stopped answering ({first_line(error)}); finished units are "
                     "kept, run the command again"
                 ) from error
             keep(task, outcome)
             # The outcome is on disk: a worker that dies later takes nothing along.
             future.release()
-
-
-def _first_line(error: BaseException) -> str:
-    return (str(error).strip() or type(error).__name__).split("\n")[0]
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from sklearn.compose import TransformedTargetRegressor
 from sklearn.pipeline import make_pipeline
 from sklearn.preprocessing import StandardScaler
 
-from fogml.errors import InputError
+from fogml.errors import InputError, first_line
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard
 from fogml.models.feature_model import FeatureModel, SavedFeatures
@@ -110,8 +110,7 @@ class SklearnModel(FeatureModel):
             except Exception as error:
                 # What only the rows tell, and values that the estimator's own check lets pass: others' code
                 # raises whatever they lead to.
-                reason = next(iter(str(error).strip().splitlines()), type(error).__name__)
-                raise InputError(f"{self.name}: can't be fitted to these runs: {reason}") from None
+                raise InputError(f"{self.name}: can't be fitted to these runs: {first_line(error)}") from None
         told = {str(warning.message).strip().split("\n")[0] for warning in caught}
         self._convergence = [f"{self.name}: {message}" for message in sorted(told)]
         return fitted

@@ -17,13 +17,12 @@ from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import floor_told, model_card, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import averages, listed, number, percent, unit_of
+from fogml.signals.floor import Z90
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 _POINTS = 700
 _NOT_STATED, _NOT_TOLD = "not stated", "not told"
-_Z90 = 1.6449
-"""Standard errors to either side of a 90 % interval."""
 _TERMS = {"N": "Angle random walk", "B": "Bias instability", "K": "Rate random walk"}
 _MOST_RUNS = 8
 
@@ -186,7 +185,7 @@ def _figures(run: RunJudgement) -> Table:
     add(
         "Scale factor error",
         _NOT_TOLD if error is None else f"{number(error)} ppm",
-        "" if error is None or se is None else f"{number(error - _Z90 * se)} to {number(error + _Z90 * se)}",
+        "" if error is None or se is None else f"{number(error - Z90 * se)} to {number(error + Z90 * se)}",
         "the table does not turn" if error is None else "all turns, by their scatter",
     )
     for name, term in (run.noise or {}).get("terms", {}).items():

@@ -79,12 +79,11 @@ def own_noise(run: RunJudgement) -> str:
 
     A bias that the floor of one average could not hide is told apart: noise has no mean.
     """
-    if left_is_noise(run) and abs(run.after.bias) > run.floor:
-        bias = f"Beside a bias of {number(run.after.bias)} deg/h,"
-        return f"{bias} what is left is the gyro's own noise, as far as these averages tell."
-    if left_is_noise(run):
-        return "What is left is the gyro's own noise, as far as these averages tell."
-    return "What is left is not the gyro's own noise alone."
+    if not left_is_noise(run):
+        return "What is left is not the gyro's own noise alone."
+    biased = abs(run.after.bias) > run.floor
+    lead = f"Beside a bias of {number(run.after.bias)} deg/h, what" if biased else "What"
+    return f"{lead} is left is the gyro's own noise, as far as these averages tell."
 
 
 def _what_is_left(judgement: Judgement, worst: RunJudgement) -> list[str]:

@@ -83,11 +83,6 @@ def wanted_cells(cells: Iterable[str], names: Collection[str] | None) -> list[st
     return [cell for cell in cells if parse_header(cell)[0] in wanted]
 
 
-def first_line(error: BaseException) -> str:
-    """The reason that an exception gives, in one line."""
-    return next(iter(str(error).splitlines()), type(error).__name__)
-
-
 def choose_vectors(
     file: str, arrays: Sequence[tuple[str, StoredArray]]
 ) -> tuple[list[tuple[str, StoredArray]], tuple[Finding, ...]]:

@@ -168,11 +168,10 @@ class Parquet:
             page_checksum_verification=True,
         )
         schema = self.file.schema_arrow
-        names = schema.names
-        self.arrays = [ParquetColumn(self.file, i) for i in range(len(names))]
+        self.arrays = [ParquetColumn(self.file, i) for i in range(len(schema.names))]
         metadata = {text_of(key): text_of(value) for key, value in (schema.metadata or {}).items()}
         self.told = {
-            "arrays": [described(name, array) for name, array in zip(names, self.arrays, strict=True)],
+            "arrays": [array.told for array in self.arrays],
             "facts": {key: metadata[key] for key in keys if key in metadata},
         }
 
@@ -189,12 +188,14 @@ class ParquetColumn:
     def __init__(self, file: Any, index: int) -> None:
         import pyarrow.types as types
 
-        names, self.dtype = file.schema_arrow.names, ParquetType(file.schema_arrow.types[index])
+        names, held = file.schema_arrow.names, file.schema_arrow.types[index]
         self.file, self.name = file, names[index]
         self.same = names[:index].count(self.name)
         self.shape = (file.metadata.num_rows,)
         kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
-        self.dtype.kind = "f" if any(is_kind(self.dtype.type) for is_kind in kinds) else "O"
+        kind = "f" if any(is_kind(held) for is_kind in kinds) else "O"
+        self.told = {"name": self.name[:1000], "unit": None, "fault": None, "kind": kind}
+        self.told |= {"type": str(held)[:60], "shape": list(self.shape)}
         self.at, self.ahead, self.batches = 0, None, iter(())
 
     def parts(self, start: int, stop: int) -> Iterator[Any]:
@@ -235,18 +236,6 @@ class ParquetColumn:
             if len(found) > _MOST_NAMES:
                 raise Refused(f"more than {_MOST_NAMES} different marks")
         return list(found), codes
-
-
-class ParquetType:
-    """A column's type as `described` tells it."""
-
-    kind = "O"
-
-    def __init__(self, held: Any) -> None:
-        self.type = held
-
-    def __str__(self) -> str:
-        return str(self.type)
 
 
 def is_dataset(value: Any) -> bool:

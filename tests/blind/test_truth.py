@@ -80,6 +80,9 @@ def test_a_broken_truth_names_its_key(tmp_path: Path) -> None:
     (tmp_path / "0001.json").write_text(json.dumps(values | {"kind": "some"}))
     with pytest.raises(InputError, match="'kind'"):
         read_truth(tmp_path / "0001.json")
+    (tmp_path / "0001.json").write_text(json.dumps(values | {"case": "\u00bd"}))
+    with pytest.raises(InputError, match="'case'"):
+        read_truth(tmp_path / "0001.json")
     (tmp_path / "0001.json").write_bytes(b'{"a": "\x9b"}')
     with pytest.raises(InputError, match=r"0001\.json: .*make the cases anew"):
         read_truth(tmp_path / "0001.json")

@@ -88,3 +88,11 @@ def test_warnings_of_convergence_go_to_the_card(train):
     )
     model.fit(train)
     assert any("iteration" in note.lower() for note in model.card_.notes)
+
+
+def test_whatever_an_estimator_raises_is_told(train):
+    # Its own check takes any container for the sizes of layers; fitting then compares text with a number.
+    options = {"hidden_layer_sizes": {"a": 1}, "max_iter": 2}
+    model = SklearnModel("sklearn.neural_network.MLPRegressor", options=options, max_rows=60)
+    with pytest.raises(InputError, match=r"MLPRegressor: can't be fitted to these runs: ufunc"):
+        model.fit(train)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
@@ -10,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.facts import side_file
 from fogml.runs.reading import read_blocks, read_run
 
 HEADER = "time [s],gyro [deg/h],T [degC]"
@@ -223,8 +225,10 @@ def test_text_in_parquet(tmp_path):
 def test_no_file_and_a_folder(tmp_path):
     with pytest.raises(InputError, match=r"none\.csv: no such file"):
         read_run(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="folder"):
-        read_run(tmp_path)
+    for folder in (tmp_path, "/"):
+        with pytest.raises(InputError, match="folder"):
+            read_run(folder)
+    assert side_file(Path("/")) is None
 
 
 def test_no_permission(tmp_path):

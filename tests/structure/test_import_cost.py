@@ -24,6 +24,12 @@ def test_every_public_name_resolves() -> None:
         assert getattr(fogml, name) is not None
 
 
+def test_packages_are_there_without_an_import_of_their_own() -> None:
+    code = "import fogml; print(fogml.gap.__name__, callable(fogml.gap.diagnose))"
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.split() == ["fogml.gap", "True"]
+
+
 def test_an_unknown_name_is_an_attribute_error() -> None:
     import fogml
 
