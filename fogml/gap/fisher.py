@@ -17,11 +17,11 @@ from fogml.errors import InputError
 from fogml.gap.model import Candidate, EffectValue
 from fogml.gap.rehearsal import Rehearsed, Stage
 from fogml.gap.shapes import usual_shape
+from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
 Criterion = Literal["D", "A"]
-_Z90 = 1.6448536269514722
 _SHAPE_STEP = 0.01
 _FLAT = 1e-12
 """Precision of an amplitude's prior in usual sizes: it may be anything."""
@@ -202,4 +202,4 @@ def _moved(value: EffectValue, scales: Mapping[str, float]) -> list[Mapping[str,
 
 def _shape_sd(quantity: Quantity, low: float, high: float) -> float:
     """Standard deviation of a shape parameter's prior, as the fit of a diagnosis has it."""
-    return max(0.5 * (high - low) / _Z90, 1e-12)
+    return max(0.5 * (high - low) / Z90, 1e-12)

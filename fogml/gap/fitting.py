@@ -17,6 +17,7 @@ from fogml.gap.model import Candidate, Constant, EffectValue, Foreseeable
 from fogml.gap.observation import Observation
 from fogml.gap.run_whitener import RunWhitener
 from fogml.gap.shapes import WHOLE, is_line
+from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.twin.quantities import Quantity
 
@@ -24,7 +25,6 @@ MOST_STEPS = 12
 _SHAPE_STEP = 0.01
 _LINE_STEP_CYCLES = 0.02
 """Step along a line's period or frequency, in cycles over the runs: of more the response is no line."""
-_Z90 = 1.6448536269514722
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,7 @@ class _Problem:
                 self.shapes.append((i, quantity))
                 names.append(f"{effect.id}.{quantity.name}")
                 low, high = quantity.range(grade)  # type: ignore[arg-type]
-                scale.append(max(0.5 * (high - low) / _Z90, 1e-12))
+                scale.append(max(0.5 * (high - low) / Z90, 1e-12))
                 self.limits.append(usable_range(quantity, low, high))
         self.names, self.scale = tuple(names), np.array(scale)
         self._steps = self._steps_of(self.first)

@@ -14,6 +14,7 @@ from fogml.gap.how_far_result import HowFar
 from fogml.gap.model import Constant, EffectValue
 from fogml.gap.noise import Noise
 from fogml.gap.observation import Observation
+from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square, floor_square, mean_square_draws
 
@@ -27,7 +28,6 @@ FORM_LEFT = 0.02
 With twice as much, 0.93 of 635 intervals of spent blind cases held what the true form closes, where nine in
 ten should.
 """
-_Z90 = 1.6448536269514722
 
 
 class InRows(Protocol):
@@ -116,7 +116,7 @@ def how_far(
     denominator = squares["rec"] - floor
     # The gap keeps its mean, which noise alone moves too.
     alone = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
-    if squares["rec"] - alone <= _Z90 * np.std(noises):
+    if squares["rec"] - alone <= Z90 * np.std(noises):
         note = "the recalibrated twin is at the floor within its noise: nothing left to close"
     else:
         closed = (squares["rec"] - squares["after"]) / denominator

@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 from fogml.gap.how_far import Averages, InRows, averages
 from fogml.gap.noise import Noise
 from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
+from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_expectation import expected_mean_square
 
 SHORTEST_SEGMENT_S = 600.0
 BIN_DEGC = 10.0
-_Z90 = 1.6448536269514722
 _Z_SIGNIFICANT = 2.6
 
 
@@ -150,7 +150,7 @@ def _regimes(held: Sequence[_Averaged]) -> tuple[Share, ...]:
     total = sum(max(e, 0.0) * n for _, n, e, _ in rows)
     shares = []
     for name, count, excess, deviation in rows:
-        low, high = excess - _Z90 * deviation, excess + _Z90 * deviation
+        low, high = excess - Z90 * deviation, excess + Z90 * deviation
         part = lambda e, n=count: float(np.clip(max(e, 0.0) * n / total, 0.0, 1.0)) if total > 0.0 else 0.0  # noqa: E731
         shares.append(
             Share(
@@ -209,7 +209,7 @@ def _timescales(gaps: Sequence[GapOnRun], noise: Noise) -> tuple[TimescaleExcess
             counts += len(values)
         ratio = float(np.average(ratios, weights=weights))
         spread = float(np.sqrt(2.0 / max(0.5 * counts, 1.0)))
-        interval = (max(ratio * (1.0 - _Z90 * spread), 0.0) ** 0.5, (ratio * (1.0 + _Z90 * spread)) ** 0.5)
+        interval = (max(ratio * (1.0 - Z90 * spread), 0.0) ** 0.5, (ratio * (1.0 + Z90 * spread)) ** 0.5)
         found.append(TimescaleExcess(tau, ratio**0.5, interval, ratio - 1.0 > _Z_SIGNIFICANT * spread))
     return tuple(found)
 

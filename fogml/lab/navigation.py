@@ -32,7 +32,6 @@ EARTH_RADIUS_M = 6_371_000.0
 GRAVITY_M_S2 = 9.80665
 AXES = ("north", "east", "down")
 """Where the input axis of the drifting gyro points; up is down with the sign reversed."""
-NAUTICAL_MILE_M = 1852.0
 _POLE_DEG = 89.0
 _DRIFT_RAD_S = np.radians(1.0) / 3600.0
 

@@ -172,10 +172,6 @@ def simulated_north_json(
     }
 
 
-def _stated(drift: Drift) -> dict[str, Any]:
-    return {"linear_deg_h_per_h": drift.linear_deg_h_h, "transients": [list(t) for t in drift.transients]}
-
-
 def _told(
     way: Way, azimuth_deg: float, latitude_deg: float, drift: Drift, random_walk: float
 ) -> dict[str, Any]:

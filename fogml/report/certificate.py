@@ -9,6 +9,7 @@ from datetime import date as Date
 import numpy as np
 from markupsafe import Markup
 
+from fogml.intervals import Z90
 from fogml.report import style
 from fogml.report.axes import time_unit
 from fogml.report.page import render
@@ -17,7 +18,6 @@ from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import floor_told, model_card, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import averages, listed, number, percent, unit_of
-from fogml.signals.floor import Z90
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 

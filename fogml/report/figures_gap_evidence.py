@@ -10,6 +10,7 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport
+from fogml.intervals import Z90, Z95
 from fogml.report import style
 from fogml.report.axes import log_axis
 from fogml.report.gap_words import STATUS_WORDS, title_of, unit_words, with_error
@@ -21,7 +22,6 @@ SHOWN = 16
 LEAST_LENGTH = 3.0
 """Length under which the runs could not show an effect."""
 _LEAST_DRAWN = 0.1
-_Z95, _Z90 = 1.96, 1.645
 _LOOKS = {
     "named": (style.MODEL, ""),
     "possible": (style.ORANGE, "x"),
@@ -130,7 +130,7 @@ def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
     figure = go.Figure()
     value, se = found.amplitude.value, found.amplitude.se
     figure.add_vrect(
-        x0=value - _Z90 * se, x1=value + _Z90 * se, fillcolor="rgba(0, 158, 115, 0.18)", line_width=0
+        x0=value - Z90 * se, x1=value + Z90 * se, fillcolor="rgba(0, 158, 115, 0.18)", line_width=0
     )
     figure.add_vline(x=value, line={"color": style.AFTER, "width": 1.6})
     figure.add_trace(
@@ -141,7 +141,7 @@ def amplitude_by_run(found: Found, names: dict[str, str]) -> Drawing:
             name="one run alone",
             showlegend=False,
             marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-            error_x={"type": "data", "array": [_Z90 * item.se for item in found.by_run], "width": 5},
+            error_x={"type": "data", "array": [Z90 * item.se for item in found.by_run], "width": 5},
         )
     )
     figure.add_vline(x=0.0, line={"color": style.BLACK, "width": 1, "dash": "dot"})
@@ -177,7 +177,7 @@ def constants_moved(constants: Sequence[ConstantFit]) -> Drawing:
             name="fitted",
             showlegend=False,
             marker={"symbol": "circle", "size": 9, "color": style.BEFORE},
-            error_x={"type": "data", "array": [_Z90 * c.se / c.prior_sd for c in shown], "width": 5},
+            error_x={"type": "data", "array": [Z90 * c.se / c.prior_sd for c in shown], "width": 5},
         )
     )
     figure.update_xaxes(title_text="fitted less prior mean [prior standard deviations]")
@@ -200,7 +200,7 @@ def variance_ratios(noise: NoiseReport) -> Drawing:
     """Variance of block means of the innovations over what the noise model expects."""
     scales, ratios = np.asarray(noise.scales_s), np.asarray(noise.variance_ratio)
     blocks = np.maximum(noise.samples * scales[0] / scales, 1.0)
-    reach = _Z95 * np.sqrt(2.0 / blocks)
+    reach = Z95 * np.sqrt(2.0 / blocks)
     figure = go.Figure(
         [
             _band(scales, np.maximum(1.0 - reach, 0.02), 1.0 + reach),
@@ -232,7 +232,7 @@ def variance_ratios(noise: NoiseReport) -> Drawing:
 def autocorrelations(noise: NoiseReport) -> Drawing:
     """Autocorrelation of the innovations on held-out data."""
     lags = np.asarray(noise.lags_s)
-    reach = np.full(len(lags), _Z95 / math.sqrt(max(noise.samples, 1)))
+    reach = np.full(len(lags), Z95 / math.sqrt(max(noise.samples, 1)))
     figure = go.Figure(
         [
             _band(lags, -reach, reach),

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from fogml.gap.how_far_result import HowFar
 from fogml.gap.result import Diagnosis, Estimate, Found
-from fogml.report.words import MISSING, averages, listed, number, percent, plural
+from fogml.report.words import MISSING, averages, listed, number, plural
 from fogml.twin.registry import effects
 
 _UNITS = (("sqrt(h)", "√h"), ("degC2", "°C²"), ("degC", "°C"))
@@ -219,11 +219,6 @@ def hardest(items: Sequence[HowFar]) -> HowFar:
     if rated:
         return min(rated, key=lambda item: item.closed if item.closed is not None else 1.0)
     return max(items, key=lambda item: item.after / item.floor if item.floor > 0.0 else item.after)
-
-
-def share_words(share: float) -> str:
-    """A share of the structural gap's energy."""
-    return "none" if share <= 0.0 else percent(share)
 
 
 STATUS_WORDS = {

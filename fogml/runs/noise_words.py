@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from fogml.intervals import Z90
 from fogml.runs.noise_series import NoiseSeries
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_terms import NoiseTerms
@@ -17,7 +18,6 @@ DOUBT = 1e-3
 """Chance of a warning that a right model, or a steady run, gets."""
 MOST_LINES = 5
 """Sinusoids that are listed."""
-_Z90 = 1.6448536269514722
 
 
 def gaps_of(runs: Sequence[Run]) -> dict[str, Any]:
@@ -142,7 +142,7 @@ def doubts_of(
 
         told = [term for one in alone if (term := one.terms["N"]).lower > 0.0]
         logarithms = np.array([np.log(term.fitted) for term in told])
-        errors = np.array([np.log(term.upper / term.lower) for term in told]) / (2.0 * _Z90)
+        errors = np.array([np.log(term.upper / term.lower) for term in told]) / (2.0 * Z90)
         if len(told) > 1:
             mean = np.average(logarithms, weights=errors**-2)
             p_value = float(chi2.sf(float(np.sum(((logarithms - mean) / errors) ** 2)), len(told) - 1))

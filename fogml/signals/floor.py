@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.intervals import Z90
 from fogml.signals.allan import Segments, segment_bounds
 from fogml.signals.averages import block_averages
 from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
@@ -33,7 +34,6 @@ Columns = Callable[[NDArray[np.int64]], FloatArray]
 
 LEVEL = 0.9
 """Coverage of a floor's interval."""
-Z90 = 1.6448536269514722
 PER_WINDOW = 20
 """Half periods in an averaging time of the fastest noise that is looked at: a faster one, an output filter, a
 dither or repeated values do not matter to the averages, and do not enter."""

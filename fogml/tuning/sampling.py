@@ -12,7 +12,6 @@ from optuna.distributions import BaseDistribution
 from optuna.samplers import BaseSampler, RandomSampler, TPESampler
 from optuna.trial import FrozenTrial
 
-SAMPLERS = ("tpe", "random")
 PLACE = "place"
 """Attribute of a trial: which of the trials asked for it is, from 0; a trial tried again keeps it."""
 

@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.intervals import Z90
 
 Grade = Literal["tactical", "navigation"]
 GRADES: tuple[Grade, ...] = ("tactical", "navigation")
 # A grade's range is read as the central 90 % of a log-normal or normal law.
-_Z90 = 1.6448536269514722
 
 
 @dataclass(frozen=True)
@@ -79,10 +79,10 @@ class Quantity:
         z = float(rng.standard_normal())
         sign = float(rng.choice((-1.0, 1.0))) if self.signed else 1.0
         if low > 0.0:
-            middle, spread = 0.5 * math.log(low * high), 0.5 * math.log(high / low) / _Z90
+            middle, spread = 0.5 * math.log(low * high), 0.5 * math.log(high / low) / Z90
             value = math.exp(middle + spread * z)
         else:
-            value = 0.5 * (low + high) + 0.5 * (high - low) / _Z90 * z
+            value = 0.5 * (low + high) + 0.5 * (high - low) / Z90 * z
         return self.within(sign * value)
 
     def check(self, value: float, owner: str) -> float:

@@ -33,11 +33,6 @@ def line(inputs: Inputs, period_s: float, phase_deg: float) -> FloatArray:
     return sine(inputs.time / period_s + phase_deg / 360.0)
 
 
-def nominal_slope(inputs: Inputs, name: str = "T") -> FloatArray:
-    """Change of the nominal output with a temperature [deg/h/degC], shape (n,); 0 where not given."""
-    return inputs.slopes[name] if name in inputs.slopes else np.zeros(len(inputs))
-
-
 def unseen(inputs: Inputs, key: str, missed: Callable[[str], FloatArray]) -> FloatArray:
     """What the output owes to temperatures that the sensors miss [deg/h], shape (n,).
 

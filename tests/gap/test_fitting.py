@@ -10,12 +10,12 @@ from fogml.gap.fitting import fit_model
 from fogml.gap.model import EffectValue
 from fogml.gap.shapes import Node
 from fogml.gap.starting import starting_values
+from fogml.intervals import Z90
 from tests.gap.small_model import MEANS, SmallModel, dense, framed, noise_of, ramps, recorded
 
 MODEL = SmallModel()
 TRUE = {"offset": 1.0, "slope": -0.5}
 BEND = EffectValue("bend", 1.5, {"centre_temperature": 18.0, "width": 6.0})
-Z90 = 1.6448536269514722
 
 
 def ready(seed, effects=(BEND,), turns=2, count=120):

@@ -16,10 +16,10 @@ from fogml.blind.scoring.answers import Answer, Gap, Listed
 from fogml.blind.scoring.statistics import overlap
 from fogml.blind.truth import Truth
 from fogml.gap.confidence import Support
+from fogml.intervals import Z90
 
 Relative = Callable[[str], bool]
 """Whether an effect's best-fitted signature can't be told from an unknown one's contribution."""
-_Z90 = 1.6448536269514722
 LEAST_CLOSED = 0.05
 """Where the true effects close less, what an answer closes over that says nothing."""
 _RIGHT_VERDICTS = ("no_gap", "unknown")
@@ -248,5 +248,5 @@ def _amplitude_covered(truth: Truth, which: tuple[Listed, ...]) -> tuple[bool, .
             continue
         if fitted.unit == value.unit and np.isfinite(fitted.se):
             sign = -1.0 if item.effect in turning and fitted.value * value.value < 0.0 else 1.0
-            covered.append(abs(sign * fitted.value - value.value) <= _Z90 * fitted.se)
+            covered.append(abs(sign * fitted.value - value.value) <= Z90 * fitted.se)
     return tuple(covered)

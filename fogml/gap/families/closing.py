@@ -12,6 +12,7 @@ from fogml.gap.families.linear_gaussian import Posterior
 from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
 from fogml.gap.how_far_result import HowFar
+from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
@@ -20,7 +21,6 @@ AVERAGING_S = 100.0
 DRAWS, NOISES = 40, 200
 LEAST_GAP = 0.2
 """A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
-_Z90 = 1.6448536269514722
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,11 +112,11 @@ class HeldOut:
         models = found.points.fit.draw(self._rng, DRAWS)
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
         self._noises = self._drawn(model, None)
-        level = self._recalibrated - self._noises.mean() > _Z90 * float(np.std(self._noises))
+        level = self._recalibrated - self._noises.mean() > Z90 * float(np.std(self._noises))
         # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
         about = self._drawn(model, Fitted(np.ones((len(windows.time), 1)), ordinary=True))
         varied = float(np.var(windows.of(self.rows.gap - recalibrated.on(run))))
-        shape = varied - self._floor > _Z90 * float(np.std(about))
+        shape = varied - self._floor > Z90 * float(np.std(about))
         self._at_floor = not level and not shape
 
     def _drawn(self, model: NoiseModel, fitted: Fitted | None) -> FloatArray:

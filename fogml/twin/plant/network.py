@@ -257,11 +257,6 @@ class ThermalNetwork:
         """The plant with another dependence on fan and table rate."""
         return replace(self, airflow=Airflow(fan_gain, rotation_gain))
 
-    def with_link(self, a: str, b: str, conductance: float) -> ThermalNetwork:
-        """The plant with the conductance of a link set [W/K]; a new link where there was none."""
-        links = {pair: value for pair, value in self.links.items() if set(pair) != {a, b}}
-        return replace(self, links={**links, (a, b): conductance})
-
     def with_capacity(self, node: str, capacity: float) -> ThermalNetwork:
         """The plant with the heat capacity of a node set [J/K]."""
         return replace(self, capacities={**self.capacities, node: capacity})
