@@ -31,7 +31,8 @@ def _sessions(model: Any, folder: Path) -> dict[str, Side]:
         return {}
     import onnxruntime
 
-    from fogml.export.export import ExportSettings, export_model
+    from fogml.export.export import export_model
+    from fogml.export.settings import ExportSettings
 
     found: dict[str, Side] = {}
     options = onnxruntime.SessionOptions()

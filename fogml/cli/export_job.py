@@ -49,7 +49,8 @@ class ExportJobSettings(Settings):
 
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:
     """Export a model into ``settings.out``, whole or not at all, and print what came of it."""
-    from fogml.export.export import TABLE_TARGETS, ExportSettings, export_model
+    from fogml.export.export import export_model
+    from fogml.export.settings import TABLE_TARGETS, ExportSettings
     from fogml.export.tables import TableSettings, export_tables
     from fogml.models.saved import load_model
 
@@ -86,7 +87,7 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
 
 def _check_form(settings: ExportJobSettings) -> None:
     """Hold that what is asked for is of the form asked for."""
-    from fogml.export.export import TABLE_TARGETS
+    from fogml.export.settings import TABLE_TARGETS
 
     of_tables = settings.to in TABLE_TARGETS
     if not of_tables and len(settings.model) > 1:
@@ -130,13 +131,14 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         ["number format", report["dtype"]],
         ["weights", f"{report['bytes_weights']} bytes"],
         ["largest difference in the trained box", f"{difference:.2g} deg/h (allowed {tolerance:.2g})"],
-        ["operations per sample", str(report["operations_per_sample"])],
     ]
+    if report["operations_per_sample"] is not None:
+        rows.append(["operations per sample", str(report["operations_per_sample"])])
     if pruning := report.get("pruning"):
         text = f"{pruning['bytes_whole']} to {report['bytes_weights']} bytes, "
         text += f"rms {pruning['rms_difference']:.2g} deg/h"
         rows.append(["pruned", text])
-    accuracy = report["accuracy"]
+    accuracy = report.get("accuracy", {})
     if "rms_model" in accuracy:
         text = f"{accuracy['rms_model']:.4g} deg/h with the model, "
         text += f"{accuracy['rms_exported']:.4g} with the export"

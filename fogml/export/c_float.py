@@ -244,7 +244,7 @@ def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:
     lines += [
         "",
         f"#define CENTRES {plan.centres}",
-        f"#define INPUTS {plan.dimensions} /* of the Gaussians */",
+        f"#define INPUTS {len(plan.columns)} /* of the Gaussians */",
         *array("INPUT_COLUMN", plan.columns, "int", "[INPUTS]", "int"),
         *array("CENTRE", arrays["centres"], dtype, "[CENTRES][INPUTS]", real),
         *array("INVERSE_WIDTH", 1.0 / arrays["widths"], dtype, "[CENTRES][INPUTS]", real),

@@ -16,9 +16,10 @@ from fogml.errors import InputError
 from fogml.escaping import CCode, c_text
 from fogml.export.c_fixed import fixed_context
 from fogml.export.c_float import float_context, input_units, sensor_identifier
-from fogml.export.layout import MOST_IN_BIN, Layout, Number, layout
+from fogml.export.layout import Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
+from fogml.features.bins import MOST_IN_BIN
 from fogml.runs.columns import is_temperature
 
 C_DTYPES = ("float64", "float32", "q31", "q15")

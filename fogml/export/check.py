@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.export.c_program import CProgram
 from fogml.export.c_source import CSource
-from fogml.export.plan import Plan, chosen_model
+from fogml.export.plan import Plan
 from fogml.export.points import POINTS, box_points, history
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel
@@ -73,7 +73,7 @@ def plan_error(plan: Plan, model: DriftModel, seed: int) -> float:
     run = past.run(plan)
     atoms = past.atoms(plan)
     # First of all, as it tells numbers that are too large.
-    evaluation = chosen_model(model).evaluate_from(run, atoms)
+    evaluation = model.evaluate_from(run, atoms)
     value, _ = plan.compensated(atoms, past.gyro)
     return float(np.max(np.abs(value - (run.gyro_deg_h - evaluation.drift))))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.escaping import c_text
 from fogml.export.card import export_card
-from fogml.export.number_files import FORMULAS
+from fogml.export.number_files import formula_of
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.export.static_curve import at_rest
@@ -52,7 +52,7 @@ def documentation(model: DriftModel, plan: Plan | None = None) -> str:
         *(f"trained on   {run['name']}, SHA-256 {run['sha256']}" for run in card["training_runs"]),
         f"fogml        {card['fogml_version']}",
         "",
-        f"formula      {FORMULAS[plan.form]}",
+        f"formula      {formula_of(plan)[1]}",
         *([] if plan.gives_rate else ["             compensated = gyro - drift, all in deg/h"]),
         "",
         "coefficients",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.c_program import CProgram, cortex_m4_size
-from fogml.export.c_source import C_DTYPES, c_source, number_of
+from fogml.export.c_source import c_source, number_of
 from fogml.export.card import card_lines, export_card
 from fogml.export.check import (
     Difference,
@@ -28,64 +27,19 @@ from fogml.export.documentation import DOCUMENTATION_FILE, documentation
 from fogml.export.instructions import instructions_per_sample
 from fogml.export.layout import layout
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
-from fogml.export.operations import operations_per_sample
 from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.export.prune import pruned
-from fogml.export.storage import FILE_DTYPES, stored_plan, weight_bytes
+from fogml.export.settings import SCHEMA, ExportSettings, check_settings, hold_within, tolerance_of
+from fogml.export.sklearn_graph import export_graph, is_graph_alone
+from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
-SCHEMA = "fogml.export/1"
-Target = Literal["c", "onnx", "json", "mat"]
-TARGETS: tuple[str, ...] = get_args(Target)
-TABLE_TARGETS = ("segments", "px4", "ardupilot")
-"""What `fogml.export.tables` writes."""
-DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
-ONNX_FILE = "fogml_model.onnx"
-
 CLOCK = {"unit": "us", "bits": [64, 32], "wraps": True, "longest_uptime_s": None}
 """C code's clock: unsigned, of which only differences are taken, so that uptime is unlimited (None)."""
-TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
-"""Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
-BINNED_SHARE = 5e-3
-"""The same where windows keep samples in bins: a bin that a window's edge parts is parted along a line."""
-LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
-"""The same, at least [deg/h]."""
-_MOST_SCALE_PPM = 1.0
 _PLAN_NOISE = 1e-9
-
-
-@dataclass(frozen=True)
-class ExportSettings:
-    """What is wanted.
-
-    Attributes
-    ----------
-    to
-        ``c``, ``onnx``, ``json`` or ``mat``.
-    dtype
-        Number format; None: ``float32`` for C, else ``float64``.
-    budget
-        Most bytes that the numbers may take; None for all of them.
-    tolerance
-        Largest difference from the model allowed [deg/h]; None: a share of the model's interval.
-    pipeline
-        Of ONNX: from the temperatures' window instead of features.
-    sample_s
-        Sample interval to run at [s]; None: that of training.
-    seed
-        Seed of the points that are compared.
-    """
-
-    to: str = "c"
-    dtype: str | None = None
-    budget: int | None = None
-    tolerance: float | None = None
-    pipeline: bool = False
-    sample_s: float | None = None
-    seed: int = 0
 
 
 def export_model(
@@ -114,8 +68,11 @@ def export_model(
     InputError
         If the form can't hold the model, or differs from it by more than the tolerance.
     """
-    dtype = settings.dtype or ("float32" if settings.to == "c" else "float64")
-    _check(settings, dtype)
+    graph_alone = settings.to == "onnx" and is_graph_alone(model)
+    dtype = settings.dtype or ("float32" if settings.to == "c" or graph_alone else "float64")
+    check_settings(settings, dtype)
+    if graph_alone:
+        return export_graph(model, folder, dtype, settings)
     whole = Plan.of(model, settings.sample_s)
     if settings.to == "c":
         # What C can't hold is refused before anything is computed: its histories may be endless.
@@ -129,16 +86,11 @@ def export_model(
     else:
         report, exported = _write_numbers(plan, folder, dtype, settings, card, rows)
     difference: Difference = report.pop("difference")
-    tolerance = settings.tolerance
-    if tolerance is None:
-        half_width = float(model.intervals_.half_width(0.9))
-        share = TOLERANCE_SHARE[dtype]
-        share = max(share, BINNED_SHARE) if report.get("bins") else share
-        tolerance = max(LEAST_TOLERANCE[dtype], share * half_width)
+    tolerance = tolerance_of(model, settings, dtype, bool(report.get("bins")))
     total = difference.inside + (
         pruning["largest_difference"] if pruning and settings.tolerance is not None else 0.0
     )
-    _within(total, difference, tolerance, settings, dtype)
+    hold_within(total, difference, tolerance, settings, dtype)
     (folder / DOCUMENTATION_FILE).write_text(documentation(model, plan), encoding="ascii")
     return {
         "schema": SCHEMA,
@@ -148,7 +100,7 @@ def export_model(
         **difference.as_dict(),
         "tolerance": tolerance,
         "unit": "deg/h",
-        "operations_per_sample": operations_per_sample(plan),
+        "operations_per_sample": plan.operations,
         "model": {"kind": plan.kind, "features": list(plan.names), "centres": plan.centres},
         "sensors": list(plan.sensors),
         "sample_s": plan.sample_s,
@@ -160,29 +112,10 @@ def export_model(
     }
 
 
-def _check(settings: ExportSettings, dtype: str) -> None:
-    if settings.to not in TARGETS:
-        raise InputError(
-            f"--to '{settings.to}' is not known; known are {', '.join((*TARGETS, *TABLE_TARGETS))}"
-        )
-    if dtype not in DTYPES:
-        raise InputError(f"--dtype '{dtype}' is not known; known are {', '.join(DTYPES)}")
-    allowed = C_DTYPES if settings.to == "c" else FILE_DTYPES
-    if dtype not in allowed:
-        other = "for --to onnx, json and mat" if settings.to == "c" else "for --to c"
-        raise InputError(f"--dtype {dtype} is {other}; --to {settings.to} takes {', '.join(allowed)}")
-    if settings.pipeline and settings.to != "onnx":
-        raise InputError("--with-pipeline is for --to onnx; C code always takes raw temperatures")
-    if settings.budget is not None and settings.budget < 1:
-        raise InputError(f"--bytes {settings.budget}: a positive number was expected")
-    if settings.tolerance is not None and not 0.0 <= settings.tolerance < np.inf:
-        raise InputError(f"--tolerance {settings.tolerance}: a number of deg/h from 0 was expected")
-
-
 def _agreeing(plan: Plan, model: DriftModel, seed: int) -> None:
     """Hold that the plan is the model: otherwise every check against the plan would be void."""
     error = plan_error(plan, model, seed)
-    size = 1.0 + sum(float(np.abs(values).sum()) for name, values in plan.arrays.items() if name == "weights")
+    size = 1.0 + float(np.abs(plan.network.weights).sum())
     if not error <= _PLAN_NOISE * size:
         raise InputError(
             f"export: the model's plain form differs from the model by {error:.3g} deg/h; it is too badly "
@@ -212,26 +145,6 @@ def _pruned(
         "rms_difference": float(np.sqrt(np.mean(off**2))),
         "largest_difference": float(np.max(np.abs(off))),
     }
-
-
-def _within(
-    total: float, difference: Difference, tolerance: float, settings: ExportSettings, dtype: str
-) -> None:
-    if not total <= tolerance:
-        raise InputError(
-            f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, "
-            f"more than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or "
-            "state --tolerance if that is good enough. Nothing was written"
-        )
-    if (
-        difference.scale_ppm is not None
-        and settings.tolerance is None
-        and difference.scale_ppm > _MOST_SCALE_PPM
-    ):
-        raise InputError(
-            f"export: in {dtype} the scale factor differs by up to {difference.scale_ppm:.3g} ppm, more than "
-            f"{_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
-        )
 
 
 def _write_c(
@@ -302,17 +215,11 @@ def _own_atoms(plan: Plan, seed: int, rows: TrainingRows | None) -> FloatArray:
 def _write_onnx(
     plan: Plan, folder: Path, dtype: str, settings: ExportSettings, stored: Any, card: dict[str, Any]
 ) -> Difference:
-    from fogml.export.onnx_graph import onnx_model, window_weights
+    from fogml.export.onnx_graph import ONNX_FILE, onnx_model, session_of, window_weights
 
-    try:
-        from onnxruntime import InferenceSession
-    except ImportError:
-        raise InputError(
-            "export: onnxruntime is not installed; pip install -e '.[export]' in fogml's source"
-        ) from None
     model = onnx_model(plan, stored, dtype, settings.pipeline, "\n".join(card_lines(card, plan, dtype)))
     data = model.SerializeToString()
-    session = InferenceSession(data, providers=["CPUExecutionProvider"])
+    session = session_of(data)
     real = np.float64 if dtype == "float64" else np.float32
 
     def run(inputs: FloatArray, gyro: FloatArray) -> FloatArray:

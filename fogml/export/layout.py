@@ -7,17 +7,16 @@ out alike on every machine. The rules of gaps and fullness are those of `fogml.s
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from typing import Literal
 
 from fogml.errors import InputError
 from fogml.export.plan import Plan
 from fogml.features.atoms import RATE_UNIT_S, Atom, Window
+from fogml.features.bins import HELD_METHODS, ring_of
 from fogml.features.signal import Signal
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
-    EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
     GAP_INTERVALS,
     check_window,
@@ -33,17 +32,6 @@ RANGE_BITS = 9
 """Temperatures up to 2**9 degC either way are taken."""
 _SPAN_BITS = 30
 _NOISE_TICKS = 2
-_HEADROOM = 8
-MOST_SINGLE = 132
-"""Samples up to which the windows keep each one; more are kept in bins."""
-BINS = 64
-"""Bins that the longest window, both of a block's, is parted into: 2 s for a block of 64 s."""
-_SHORTEST_BINS = 8
-"""Bins in the shortest window at least: its edge parts one along a line, beside which it must be long."""
-MOST_IN_BIN = 8191
-"""Samples that a bin holds at most: its sums then fit 63 bits."""
-_LONGEST_RING = 1 << 12
-"""Bins at most; windows whose lengths are further apart are refused."""
 
 
 @dataclass(frozen=True)
@@ -156,10 +144,10 @@ def layout(plan: Plan, number: Number) -> Layout:
     keys = tuple(dict.fromkeys(key for atom in plan.atoms if (key := _key(atom)) is not None))
     for _, window, _, lag in keys:
         _check(window, plan.sample_s, lag)
-    held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in ("block", "slope")))
+    held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in HELD_METHODS))
     ring, bin_samples = ring_of([window for _, window, _, _ in keys], plan.sample_s)
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
-    held_s = [w.span_s for _, w, _, _ in keys if w.method in ("block", "slope")]
+    held_s = [w.span_s for _, w, _, _ in keys if w.method in HELD_METHODS]
     tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
     tick_s = tick_us * 1e-6
     operators = []
@@ -193,7 +181,7 @@ def _check_held(atom: Atom, number: Number) -> None:
             f"export: the model takes {atom.text}; C code in fixed point takes temperatures alone, whose "
             "range it knows; use --dtype float32 or float64"
         )
-    if atom.window is not None and atom.window.method in ("block", "slope"):
+    if atom.window is not None and atom.window.method in HELD_METHODS:
         raise InputError(
             f"export: the model takes {atom.text}; C code holds windows of temperatures alone, whose range "
             f"it knows; train with {atom.text.partition('[')[0]}[exp, {atom.window.length_s:g} s]"
@@ -218,41 +206,6 @@ def _check(window: Window, sample_s: float, lag: bool) -> None:
         check_window(window.length_s, sample_s, 2, "a slope's window")
     elif window.method == "exp":
         check_window(window.length_s, sample_s, 1, "a time constant")
-
-
-def _samples(window: Window, sample_s: float) -> int:
-    """Samples that a window holds at the nominal interval; 0 where none are kept."""
-    if window.method not in ("block", "slope"):
-        return 0
-    return math.ceil(window.span_s / sample_s - EDGE_TOLERANCE) + 1
-
-
-def ring_of(windows: list[Window], sample_s: float) -> tuple[int, int]:
-    """Samples or bins that the rings hold, and samples to a bin.
-
-    Temperature has no content within a second: where the longest window holds more than `MOST_SINGLE`
-    samples, they are kept in bins, so that memory does not grow with the rate.
-    """
-    held = [window for window in windows if _samples(window, sample_s)]
-    if not held:
-        return 0, 1
-    most = max(_samples(window, sample_s) for window in held)
-    single = most + most // _HEADROOM + 4, 1
-    if most <= MOST_SINGLE:
-        return single
-    longest = max(window.span_s for window in held)
-    bin_s = min(longest / BINS, min(window.length_s for window in held) / _SHORTEST_BINS)
-    count = min(max(1, math.floor(bin_s / sample_s + EDGE_TOLERANCE)), MOST_IN_BIN)
-    if count == 1:
-        return single
-    ring = math.ceil(longest / ((count - 0.5) * sample_s)) + 2
-    if ring > _LONGEST_RING:
-        raise InputError(
-            f"export: windows of {min(w.length_s for w in held):g} s and {longest:g} s at a sample every "
-            f"{sample_s:g} s need {ring} bins, C code holds at most {_LONGEST_RING}; train with windows "
-            "nearer to each other or [exp, ...], or run the model at a longer --sample-s"
-        )
-    return ring, count
 
 
 def _gap_s(window: Window, sample_s: float) -> float:
@@ -290,7 +243,7 @@ def _operator(
     return Operator(
         window,
         signal,
-        held.index(signal) if signal in held and window.method in ("block", "slope") else -1,
+        held.index(signal) if signal in held and window.method in HELD_METHODS else -1,
         unit_s,
         gap_s,
         ticks(window.length_s),

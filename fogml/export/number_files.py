@@ -119,8 +119,18 @@ def _decoded(arrays: Mapping[str, NDArray[Any]], plan: Plan) -> dict[str, NDArra
     return found
 
 
+def formula_of(plan: Plan) -> tuple[str, str]:
+    """What files call the form of a plan, and its formula."""
+    if plan.gives_rate:
+        form = "joint"
+    else:
+        form = "network" if plan.centres else "linear" if plan.names else "constant"
+    return form, FORMULAS[form]
+
+
 def _document(plan: Plan) -> dict[str, Any]:
     limits = plan.limits
+    form, formula = formula_of(plan)
     atoms = [
         {
             "text": atom.text,
@@ -147,8 +157,8 @@ def _document(plan: Plan) -> dict[str, Any]:
     return {
         "schema": SCHEMA,
         "kind": plan.kind,
-        "form": plan.form,
-        "formula": FORMULAS[plan.form],
+        "form": form,
+        "formula": formula,
         "limiting": LIMITING,
         "unit": "deg/h",
         "gyro_unit": plan.gyro_unit,

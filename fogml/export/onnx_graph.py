@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml import __version__
-from fogml.errors import InputError
+from fogml.errors import InputError, first_line
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
 from fogml.features.atoms import DEAD_BAND, MEMORIES, Atom, evaluate
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 OPSET, IR_VERSION = 17, 8
+ONNX_FILE = "fogml_model.onnx"
 BEYOND = {
     True: "levelled off, and flagged by the output 'flag'",
     False: "neither levelled off nor flagged: limit the features to the trained box first, as fogml's "
@@ -46,12 +47,12 @@ def onnx_model(
         If onnx is not installed, or the model does not fit the interface.
     """
     try:
-        from onnx import TensorProto, checker, helper
+        from onnx import TensorProto, helper
     except ImportError:
         raise InputError(
             "export: onnx is not installed; pip install -e '.[export]' in fogml's source"
         ) from None
-    if plan.form == "constant":
+    if not plan.names:
         raise InputError(
             f"export: a model of kind '{plan.kind}' has no features, so no graph; export it --to c or json"
         )
@@ -79,20 +80,61 @@ def onnx_model(
         graph.add("Identity", [outside], "flag")
         outputs.append(helper.make_tensor_value_info("flag", TensorProto.INT64, ["n"]))
     whole = helper.make_graph(graph.nodes, "fogml", inputs, outputs, graph.constants, doc_string=card)
+    return finished_model(whole, plan.sensors if pipeline else plan.names, plan.sample_s, plan.kind, pipeline)
+
+
+def finished_model(
+    graph: onnx.GraphProto,
+    inputs: Sequence[str],
+    sample_s: float,
+    kind: str,
+    pipeline: bool,
+    ml_opset: int | None = None,
+) -> onnx.ModelProto:
+    """A graph as a checked model that tells what goes in, and what it does beyond the trained box.
+
+    `ml_opset` is the version of the operators for trees and their like, where there are any.
+    """
+    from onnx import checker, helper
+
     opset = [helper.make_opsetid("", OPSET)]
+    if ml_opset is not None:
+        opset.append(helper.make_opsetid("ai.onnx.ml", ml_opset))
     model = helper.make_model(
-        whole, opset_imports=opset, ir_version=IR_VERSION, producer_name="fogml", producer_version=__version__
+        graph, opset_imports=opset, ir_version=IR_VERSION, producer_name="fogml", producer_version=__version__
     )
     facts = {
-        "inputs": ", ".join(plan.sensors if pipeline else plan.names),
-        "sample_s": repr(plan.sample_s),
+        "inputs": ", ".join(inputs),
+        "sample_s": repr(sample_s),
         "unit": "deg/h",
-        "model": plan.kind,
+        "model": kind,
         "beyond_the_box": BEYOND[pipeline],
     }
     helper.set_model_props(model, facts)
     checker.check_model(model, full_check=True)
     return model
+
+
+def session_of(data: bytes) -> Any:
+    """A graph ready to run on this machine.
+
+    Raises
+    ------
+    InputError
+        If onnxruntime is not installed, or can't run the graph.
+    """
+    try:
+        from onnxruntime import InferenceSession
+    except ImportError:
+        raise InputError(
+            "export: onnxruntime is not installed; pip install -e '.[export]' in fogml's source"
+        ) from None
+    try:
+        return InferenceSession(data, providers=["CPUExecutionProvider"])
+    except Exception as error:  # of its own kinds, which it does not tell apart
+        raise InputError(
+            f"export: onnxruntime can't run the graph: {first_line(error)}; use --dtype float32"
+        ) from None
 
 
 def window_weights(plan: Plan) -> FloatArray:

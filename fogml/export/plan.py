@@ -1,10 +1,9 @@
-"""What a fitted model computes, as plain numbers: the one thing that every export is made from."""
+"""A compact model with the features that it takes: the one thing that every export is made from."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Literal
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +15,13 @@ from fogml.features.features import Features
 from fogml.features.reach import reaching_box
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
+from fogml.models.compact import Compact, affine
+from fogml.models.operations import operations_of_compact, operations_of_features
+from fogml.models.rbf.network import Network
 from fogml.runs.dropouts import RULE, DropoutRule
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-_ROWS = 1 << 16
-"""Rows of a network at a time, so that long histories take bounded memory."""
-Form = Literal["constant", "linear", "network", "joint"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,46 +83,30 @@ class Plan:
 
     Attributes
     ----------
-    kind
-        Name of the model, e.g. ``rbf``.
-    form
-        ``constant``; ``linear``: constant + linear . f; ``network``: that and Gaussians;
-        ``joint``: rate = (scale0 + scale1 T + scale2 T^2) D + constant + linear . f.
+    compact
+        What it makes of the features: linear part, Gaussians, scale factor.
     sensors
         Temperatures and other columns needed, by their names in formulas.
     atoms, steps, names
         The features' atoms, how columns are made of them, and the columns' names.
     limits
         The trained box and what becomes of atoms beyond it.
-    arrays
-        ``constant`` (1,), ``linear`` (k,); of a network ``centres``, ``widths`` (j, d),
-        ``weights`` (j,); of a joint model ``scale`` (3,).
-    columns
-        Which of the k features the network sees, shape (d,).
-    edge_columns, edge
-        Features that hold a rate and their trained range, shapes (r,) and (2, r): beyond it a
-        network goes on along its slope.
     sample_s
-        Median sample interval of training [s].
+        Sample interval [s] to run at.
     gyro_unit
         Unit of the output that the model takes.
     thermometer
         What a thermometer can show; other readings are taken for none.
     """
 
-    kind: str
-    form: Form
+    compact: Compact
     sensors: tuple[str, ...]
     atoms: tuple[Atom, ...]
     steps: tuple[Step, ...]
     names: tuple[str, ...]
     limits: Limits
-    arrays: Mapping[str, FloatArray]
     sample_s: float
     gyro_unit: str = "deg/h"
-    columns: tuple[int, ...] = ()
-    edge_columns: tuple[int, ...] = ()
-    edge: FloatArray = field(default_factory=lambda: np.empty((2, 0)))
     thermometer: DropoutRule = RULE
 
     @classmethod
@@ -142,48 +125,102 @@ class Plan:
         InputError
             If the model is made of something that has no compact form.
         """
-        model = chosen_model(model)
         model._check_fitted()
-        interval = model.card_.sample_s if sample_s is None else sample_s
+        interval = float(model.card_.sample_s if sample_s is None else sample_s)
         if not (np.isfinite(interval) and interval > 0.0):
             raise InputError(f"export: a sample interval of {interval} s; state one with --sample-s")
-        features = model.features_
-        if features is None:
-            arrays = {"constant": np.array([float(getattr(model, "bias_", 0.0))])}
-            return cls(model.kind, "constant", (), (), (), (), Limits.none(), arrays, interval)
-        shared: dict[str, Any] = {
-            "kind": model.kind,
-            "sensors": features.sensors,
-            "atoms": features.atoms,
-            "steps": composition_plan(features.terms, features.atoms),
-            "names": tuple(features.names()),
-            "sample_s": float(interval),
+        compact = model.compact()
+        if model.features_ is None:
+            return cls(compact, (), (), (), (), Limits.none(), interval)
+        plan = cls.with_features(compact, model.features_, interval)
+        return replace(plan, gyro_unit=model.card_.gyro_unit) if plan.gives_rate else plan
+
+    @classmethod
+    def with_features(cls, compact: Compact, features: Features, sample_s: float) -> Plan:
+        """The plan of a compact form of features whose box is learned."""
+        return cls(
+            compact,
+            features.sensors,
+            features.atoms,
+            composition_plan(features.terms, features.atoms),
+            tuple(features.names()),
+            Limits.of(features, compact.linear_beyond),
+            sample_s,
+        )
+
+    @property
+    def kind(self) -> str:
+        """Name of the model, e.g. ``rbf``."""
+        return self.compact.kind
+
+    @property
+    def network(self) -> Network:
+        """Linear part and Gaussians."""
+        return self.compact.network
+
+    @property
+    def arrays(self) -> dict[str, FloatArray]:
+        """All numbers that are fitted, by name: ``constant`` and what else there is.
+
+        ``linear`` (k,); ``centres``, ``widths`` (j, d) and ``weights`` (j,); ``scale`` (3,).
+        """
+        network = self.network
+        held = {
+            "constant": np.array([network.constant]),
+            "linear": network.linear,
+            "centres": network.centres,
+            "widths": network.widths,
+            "weights": network.weights,
+            "scale": self.compact.scale,
         }
-        return cls(**shared, **_regression(model, features))
+        return {name: values for name, values in held.items() if values.size}
 
     @property
     def gives_rate(self) -> bool:
         """Whether its value is a rate made of the output, scale factor and all, and not a drift."""
-        return self.form == "joint"
-
-    @property
-    def dimensions(self) -> int:
-        """Number of inputs of the network."""
-        return len(self.columns)
+        return len(self.compact.scale) > 0
 
     @property
     def centres(self) -> int:
         """Number of Gaussians."""
-        return len(self.arrays["weights"]) if self.form == "network" else 0
+        return len(self.network.weights)
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """Which of the features the Gaussians see."""
+        return tuple(self.network.columns.tolist())
+
+    @property
+    def edge_columns(self) -> tuple[int, ...]:
+        """Features that hold a rate, beyond whose trained range Gaussians go on along their slope."""
+        return tuple(self.network.edge.columns.tolist())
+
+    @property
+    def edge(self) -> FloatArray:
+        """That range, shape (2, r)."""
+        return np.stack([self.network.edge.low, self.network.edge.high])
 
     @property
     def windowed(self) -> BoolArray:
         """Which atoms need a window, shape (a,)."""
         return np.array([atom.window is not None for atom in self.atoms], dtype=np.bool_)
 
+    @property
+    def operations(self) -> int:
+        """Additions, multiplications and divisions at a sample inside the trained box, windows full."""
+        features = operations_of_features(self.atoms, self.steps, self.sample_s)
+        return features + operations_of_compact(self.compact)
+
     def with_arrays(self, arrays: Mapping[str, FloatArray]) -> Plan:
-        """The same with other numbers."""
-        return replace(self, arrays=dict(arrays))
+        """The same with other numbers, by the names of `arrays`; without Gaussians where none are given."""
+        linear, constant = arrays.get("linear", np.empty(0)), float(arrays["constant"][0])
+        network = affine(linear, constant)
+        if len(arrays.get("weights", ())):
+            centres, widths, weights = (arrays[name] for name in ("centres", "widths", "weights"))
+            edge, columns = self.network.edge, self.network.columns
+            network = Network(columns, centres, widths, weights, linear, constant, edge)
+        scale = np.asarray(arrays.get("scale", np.empty(0)))
+        return replace(self, compact=replace(self.compact, network=network, scale=scale))
 
     def compose(self, limited: FloatArray) -> FloatArray:
         """Feature columns (n, k) of limited atoms (n, a)."""
@@ -213,84 +250,9 @@ class Plan:
 
     def value(self, columns: FloatArray, gyro: FloatArray | None = None) -> FloatArray:
         """Drift [deg/h] of feature columns (n, k), shape (n,); of a joint model the rate."""
-        if self.form == "network":
-            parts = [self._network(columns[i : i + _ROWS]) for i in range(0, len(columns), _ROWS)]
-            return np.concatenate(parts) if parts else np.empty(0)
-        value = np.full(len(columns), float(self.arrays["constant"][0]))
-        if "linear" in self.arrays:
-            value = value + columns @ self.arrays["linear"]
+        value = self.network(np.ascontiguousarray(columns))
         if self.gives_rate:
             assert gyro is not None
-            s0, s1, s2 = self.arrays["scale"]
+            s0, s1, s2 = self.compact.scale
             value = value + (s0 + columns[:, 0] * (s1 + columns[:, 0] * s2)) * gyro
         return value
-
-    def _network(self, columns: FloatArray) -> FloatArray:
-        drawn = self.drawn_in(columns)
-        centres, inverse = self.arrays["centres"], 1.0 / self.arrays["widths"]
-        seen, steps = list(self.columns), columns - drawn
-        z = (drawn[:, None, seen] - centres) * inverse
-        basis = np.exp(-np.sum(z * z, axis=2)) * self.arrays["weights"]
-        along = np.sum(z * steps[:, None, seen] * inverse, axis=2)
-        linear = columns @ self.arrays["linear"]
-        return linear + self.arrays["constant"][0] + np.sum(basis * (1.0 - 2.0 * along), axis=1)
-
-    def drawn_in(self, columns: FloatArray) -> FloatArray:
-        """Columns with all rates scaled down together into their trained range."""
-        if not self.edge_columns:
-            return columns
-        where = list(self.edge_columns)
-        rates = columns[:, where]
-        low, high = self.edge
-        beyond = (rates > high) | (rates < low)
-        bound = np.where(rates > 0.0, high, low)
-        share = np.where(beyond, bound / np.where(beyond, rates, 1.0), 1.0).min(axis=1, initial=1.0)
-        drawn = columns.copy()
-        drawn[:, where] = rates * share[:, None]
-        return drawn
-
-
-def chosen_model(model: DriftModel) -> DriftModel:
-    """The model itself, or the one that an automatic choice stands for."""
-    chosen = getattr(model, "chosen_", None)
-    return chosen if isinstance(chosen, DriftModel) else model
-
-
-def _regression(model: DriftModel, features: Features) -> dict[str, Any]:
-    """What a model with features maps their columns to drift by."""
-    from fogml.models.joint import JointModel
-    from fogml.models.linear import LinearRegressor
-    from fogml.models.rbf.fitted import NetworkRegressor
-    from fogml.models.regressors import goes_on_linearly
-
-    regressor: Any = getattr(model, "regressor_", None)
-    if isinstance(model, JointModel):
-        scale, linear = np.split(np.asarray(regressor.coef_, dtype=np.float64), [3])
-        arrays = {"scale": scale, "linear": linear, "constant": np.array([regressor.intercept_])}
-        unit = model.card_.gyro_unit
-        return {"form": "joint", "limits": Limits.of(features, True), "arrays": arrays, "gyro_unit": unit}
-    limits = Limits.of(features, goes_on_linearly(regressor))
-    if isinstance(regressor, LinearRegressor):
-        arrays = {"linear": np.asarray(regressor.coef_), "constant": np.array([regressor.intercept_])}
-        return {"form": "linear", "limits": limits, "arrays": arrays}
-    if isinstance(regressor, NetworkRegressor):
-        network = regressor.network_
-        arrays = {
-            "centres": network.centres,
-            "widths": network.widths,
-            "weights": network.weights,
-            "linear": network.linear,
-            "constant": np.array([network.constant]),
-        }
-        return {
-            "form": "network",
-            "limits": limits,
-            "arrays": arrays,
-            "columns": tuple(int(i) for i in network.columns),
-            "edge_columns": tuple(int(i) for i in network.edge.columns),
-            "edge": np.stack([network.edge.low, network.edge.high]),
-        }
-    raise InputError(
-        f"export: a model of kind '{model.kind}' has no compact form (it is {type(regressor).__name__}); "
-        "models that can be exported are none, mean, the polynomials, rbf, rbf-patent, joint and joint-patent"
-    )

@@ -45,9 +45,9 @@ def pruned(
     """
     if weight_bytes(plan, dtype, c_code) <= budget:
         return plan
-    if plan.form == "network":
+    if plan.centres:
         return _fewer_centres(plan, budget, dtype, c_code, columns, target)
-    if plan.form == "linear":
+    if plan.names and not plan.gives_rate:
         return _fewer_terms(plan, budget, dtype, c_code, columns, target)
     raise InputError(
         f"export: the model's numbers take {weight_bytes(plan, dtype, c_code)} bytes in {dtype}, and a model "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -72,7 +72,7 @@ def stored_plan(plan: Plan, dtype: str, points: FloatArray) -> tuple[dict[str, S
     yet take up the error by least squares at `points`, feature columns of shape (n, k).
     """
     arrays = dict(plan.arrays)
-    if dtype == "int8" and plan.form in ("linear", "network"):
+    if dtype == "int8" and plan.names and not plan.gives_rate:
         arrays = _rounded_in_turn(plan, points)
     stored = {name: stored_array(name, values, dtype) for name, values in arrays.items()}
     return stored, plan.with_arrays({name: array.decoded for name, array in stored.items()})
@@ -118,15 +118,19 @@ def _rounded_in_turn(plan: Plan, points: FloatArray) -> dict[str, FloatArray]:
 
 def design(plan: Plan, points: FloatArray) -> FloatArray:
     """Columns that the drift is linear in: Gaussians, features, and ones; shape (n, j + k + 1)."""
-    ones = np.ones((len(points), 1))
-    if plan.form != "network":
-        return np.hstack([points, ones])
-    each = []
-    for j in range(plan.centres):
-        single = {"weights": np.ones(1), "linear": np.zeros(points.shape[1]), "constant": np.zeros(1)}
-        alone = {name: plan.arrays[name][j : j + 1] for name in ("centres", "widths")}
-        each.append(plan.with_arrays({**alone, **single}).value(points))
-    return np.column_stack([*each, points, ones]) if each else np.hstack([points, ones])
+    network = plan.network
+    each = [
+        replace(
+            network,
+            centres=network.centres[[j]],
+            widths=network.widths[[j]],
+            weights=np.ones(1),
+            linear=np.zeros(points.shape[1]),
+            constant=0.0,
+        )(points)
+        for j in range(plan.centres)
+    ]
+    return np.column_stack([*each, points, np.ones(len(points))])
 
 
 def weight_bytes(plan: Plan, dtype: str, c_code: bool) -> int:

@@ -21,6 +21,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs
+from fogml.models.compact import Compact
 from fogml.models.directions import refusals
 from fogml.models.feature_model import resolve_features
 from fogml.models.intervals import Intervals
@@ -126,6 +127,11 @@ class AutoModel(DriftModel):
     def feature_names(self) -> list[str]:
         """The chosen model's features; none before a fit."""
         return self.chosen_.feature_names if hasattr(self, "chosen_") else []
+
+    def compact(self) -> Compact:
+        """The chosen model's numbers."""
+        self._check_fitted()
+        return self.chosen_.compact()
 
     def weights(self) -> dict[str, NDArray[Any]]:
         """The chosen model's arrays."""

@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
 from fogml.models.card import TrainingCard, check_unit_and_axis
+from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
 from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import BoolArray, FloatArray, Run
@@ -183,6 +184,16 @@ class DriftModel(BaseEstimator, ABC):
             Values of the atoms of ``features_`` at the n samples.
         """
         raise NotImplementedError(f"{type(self).__name__} does not evaluate atoms")
+
+    def compact(self) -> Compact:
+        """The fitted model as plain numbers: what every export writes.
+
+        Raises
+        ------
+        InputError
+            If the model is made of something that has no such form.
+        """
+        raise InputError(f"a model of kind '{self.kind}' has no compact form")
 
     @abstractmethod
     def weights(self) -> dict[str, NDArray[Any]]:

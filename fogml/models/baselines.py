@@ -13,6 +13,7 @@ from fogml.features.atoms import AtomValues
 from fogml.models.arrays import expect_arrays
 from fogml.models.base import DriftModel, Evaluation
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
+from fogml.models.compact import Compact, affine
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
 from fogml.models.table import RunRows, TrainingTable, row_count, usable_rows
 from fogml.runs.run import FloatArray, Run
@@ -51,6 +52,11 @@ class _ConstantModel(DriftModel):
         inside = np.zeros(count, dtype=np.bool_)
         drift = np.full(count, self.bias_)
         return Evaluation(drift, atoms.full, atoms.settled, inside, partial(np.zeros, count))
+
+    def compact(self) -> Compact:
+        """The constant."""
+        self._check_fitted()
+        return Compact(self.kind, affine((), self.bias_))
 
     def _bias(self, error: FloatArray) -> float:
         raise NotImplementedError

@@ -25,6 +25,7 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.coefficient_errors import noise_covariance
+from fogml.models.compact import Compact, compact_regressor
 from fogml.models.folds import dealt_folds
 from fogml.models.intervals import Intervals
 from fogml.models.linear import LinearRegressor
@@ -211,6 +212,11 @@ class FeatureModel(DriftModel):
         if self.features is None:
             return []
         return [self.features] if isinstance(self.features, str) else list(self.features.names())
+
+    def compact(self) -> Compact:
+        """The regressor as plain numbers."""
+        self._check_fitted()
+        return compact_regressor(self.kind, self.regressor_)
 
     def weights(self) -> dict[str, NDArray[Any]]:
         """The regressor's arrays."""

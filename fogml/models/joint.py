@@ -34,6 +34,7 @@ from fogml.models.base import DriftModel, Evaluation
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.coefficient_errors import noise_covariance
+from fogml.models.compact import Compact, affine
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
@@ -173,6 +174,12 @@ class JointModel(DriftModel):
     def feature_names(self) -> list[str]:
         """The columns' names; none before a fit."""
         return self.column_names if hasattr(self, "features_") else []
+
+    def compact(self) -> Compact:
+        """Scale factor over temperature, and a linear part of the features."""
+        self._check_fitted()
+        scale, linear = np.split(self.regressor_.coef_, [3])
+        return Compact(self.kind, affine(linear, self.regressor_.intercept_), scale, linear_beyond=True)
 
     def weights(self) -> dict[str, NDArray[Any]]:
         """Coefficients and intercept."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from numbers import Real
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,11 +15,15 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
 from fogml.models.arrays import expect_arrays
+from fogml.models.compact import affine
 from fogml.models.folds import dealt_folds
 from fogml.models.parameters import check_parameters
 from fogml.models.tall_least_squares import Condensed, Part, condense
 from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
+
+if TYPE_CHECKING:
+    from fogml.models.rbf.network import Network
 
 RIDGE_GRID = (0.0, *np.logspace(-8, 1, 19).tolist())
 """Ridges that ``ridge="auto"`` chooses from."""
@@ -134,6 +138,11 @@ class LinearRegressor(RegressorMixin, BaseEstimator):
         """A new regressor fitted to other rows with the ridge of this one."""
         check_is_fitted(self)
         return LinearRegressor(ridge=self.ridge_, fit_intercept=self.fit_intercept).fit(X, y)
+
+    def compact(self) -> Network:
+        """The fitted regressor as a network without Gaussians."""
+        check_is_fitted(self)
+        return affine(self.coef_, self.intercept_)
 
     def standard_errors(self) -> FloatArray:
         """Standard errors of (intercept, coefficients), shape (k + 1,): the roots of `covariance_`."""

@@ -10,17 +10,20 @@ from typing import Any, Literal
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.features.features import Features
 from fogml.features.parse import parse_features
+from fogml.features.terms import composition_plan
 from fogml.models.card import checked_runs
+from fogml.models.compact import Compact, network_of
 from fogml.models.feature_model import FeatureModel
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.names import make_model
-from fogml.models.regressors import regressor_to_saved
+from fogml.models.operations import operations_of_compact, operations_of_features
+from fogml.models.regressors import parameter_count, regressor_to_saved
 from fogml.models.table import RunRows, TrainingTable, usable_rows
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.tuning.auto_folds import held_out_predictions
-from fogml.tuning.operations import operations_per_sample
 from fogml.tuning.space import Choice, Space
 
 FOLD_COUNTS = (2, 4, 5, 10, 20)
@@ -150,7 +153,7 @@ class HeldOut:
             made, atoms = choice.made, self._atoms(choice.made.union.text)
             assert isinstance(made.model, FeatureModel)
             regressor = made.model.regressor_
-            cost = weight_bytes(regressor), operations_per_sample(made.model.features_, regressor)
+            cost = weight_bytes(regressor), self._operations(made.model.features_, regressor)
             for predicted in held_out_predictions(made, self._table, atoms, self.folds):
                 yield predicted, *cost
             return
@@ -165,7 +168,20 @@ class HeldOut:
             )
             if not np.isfinite(predicted).all():
                 raise InputError(f"{choice.model} of {choice.features}: values that are not finite")
-            yield predicted, weight_bytes(regressor), operations_per_sample(features, regressor)
+            yield predicted, weight_bytes(regressor), self._operations(features, regressor)
+
+    def _operations(self, features: Features, regressor: Any) -> int:
+        """Operations per sample, as exported code takes them.
+
+        Where a regressor has no compact form, each of its numbers is taken to be used in a multiplication
+        and an addition, which holds for kernel and network models.
+        """
+        steps = composition_plan(features.terms, features.atoms)
+        count = operations_of_features(features.atoms, steps, self.runs[0].sample_s)
+        network = network_of(regressor)
+        if network is None:
+            return count + 2 * (parameter_count(regressor) - 1)
+        return count + operations_of_compact(Compact("", network))
 
     def _atoms(self, text: str) -> FloatArray:
         features = parse_features(text)

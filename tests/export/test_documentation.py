@@ -72,9 +72,9 @@ def test_every_form_has_one(model_of, name):
 
 
 def test_what_has_no_compact_form_has_none(model_of):
-    run = Run.from_columns(
-        "a", Facts(), time=np.arange(900.0), gyro=np.zeros(900), T=np.linspace(0.0, 30.0, 900)
-    )
+    temperature = np.linspace(0.0, 30.0, 900)
+    columns = {"time": np.arange(900.0), "gyro": np.sin(temperature), "T": temperature}
+    run = Run.from_columns("a", Facts(), **columns)
     tree = make_model("sklearn.tree.DecisionTreeRegressor", features="T", parameters={"max_depth": 2}).fit(
         run
     )

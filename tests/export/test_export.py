@@ -7,17 +7,20 @@ import re
 import shutil
 from copy import copy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
 from fogml.export.c_float import literal
-from fogml.export.export import ExportSettings, export_model
+from fogml.export.export import export_model
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, history
+from fogml.export.settings import ExportSettings
 from fogml.export.storage import FILE_DTYPES, stored_array
 from fogml.features.atoms import AtomValues
+from fogml.models.base import DriftModel
 from fogml.models.card import TrainingRun
 from fogml.models.names import make_model
 from tests.export.conftest import NAMES, training_run
@@ -177,10 +180,67 @@ def test_refusals_say_why(model_of, tmp_path, settings, message):
         export_model(model_of("rbf"), tmp_path, settings)
 
 
-def test_a_regressor_without_a_compact_form_is_refused(tmp_path):
-    model = make_model("sklearn.linear_model.Ridge", "T, dT").fit(training_run())
-    with pytest.raises(InputError, match="no compact form"):
-        export_model(model, tmp_path, ExportSettings())
+SCIKIT_LEARN = [
+    ("sklearn.linear_model.Ridge", {}),
+    ("sklearn.cross_decomposition.PLSRegression", {"n_components": 2}),
+    ("sklearn.svm.SVR", {"kernel": "linear"}),
+    ("sklearn.svm.SVR", {"C": 10.0}),
+    ("sklearn.svm.NuSVR", {"gamma": 0.3}),
+    ("sklearn.kernel_ridge.KernelRidge", {"kernel": "rbf"}),
+    ("sklearn.gaussian_process.GaussianProcessRegressor", {"optimizer": None}),
+]
+
+
+@cache
+def of_scikit_learn(name: str, parameters: tuple[tuple[str, object], ...]) -> DriftModel:
+    model = make_model(name, "T, dT, T*dT", parameters=dict(parameters))
+    model.max_rows = 120
+    return model.fit(training_run())
+
+
+@pytest.mark.parametrize(("name", "parameters"), SCIKIT_LEARN)
+def test_linear_models_and_gaussian_kernels_have_the_compact_form(name, parameters):
+    model, run = of_scikit_learn(name, tuple(parameters.items())), disturbed(3)
+    value, flag = Plan.of(model).compensated(model.features_.atom_values(run), run.gyro)
+    expected = model.compensate(run)
+    np.testing.assert_allclose(value, expected.compensated, rtol=1e-9, atol=1e-9)
+    np.testing.assert_array_equal(flag, expected.flag)
+
+
+@needs_cc
+def test_support_vectors_run_in_c(tmp_path):
+    model = of_scikit_learn("sklearn.svm.SVR", (("C", 10.0),))
+    report = export_model(model, tmp_path, ExportSettings("c"))
+    assert report["model"]["centres"] == len(model.regressor_.regressor_[-1].support_)
+    assert report["compared"]["flags_differ"] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"),
+    [
+        ("sklearn.tree.DecisionTreeRegressor", {"max_depth": 4}),
+        ("sklearn.neural_network.MLPRegressor", {"hidden_layer_sizes": (4,), "solver": "lbfgs"}),
+        ("sklearn.svm.SVR", {"kernel": "poly"}),
+    ],
+)
+def test_what_has_no_compact_form_is_a_graph_alone(tmp_path, name, parameters):
+    pytest.importorskip("skl2onnx")
+    runtime = pytest.importorskip("onnxruntime")
+    model = of_scikit_learn(name, tuple(parameters.items()))
+    for to in ("c", "json", "mat"):
+        with pytest.raises(InputError, match=r"no compact form.*--to onnx"):
+            export_model(model, tmp_path, ExportSettings(to))
+    with pytest.raises(InputError, match="--with-pipeline is not for"):
+        export_model(model, tmp_path, ExportSettings("onnx", pipeline=True))
+    report = export_model(model, tmp_path, ExportSettings("onnx"))
+    assert report["files"] == ["fogml_model.onnx"]
+    session = runtime.InferenceSession(str(tmp_path / "fogml_model.onnx"), providers=["CPUExecutionProvider"])
+    run = disturbed(3)
+    columns = model.features_.transform(run, limited=True).astype(np.float32)
+    (drift,) = session.run(["drift"], {"features": columns})
+    off = np.abs(drift - model.predict(run))
+    # A value at a threshold of a tree may fall on its other side in float32.
+    assert np.quantile(off, 0.99) < 1e-4
 
 
 @pytest.mark.parametrize("dtype", ["float16", "int8"])

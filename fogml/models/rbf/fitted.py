@@ -109,6 +109,11 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
         """As `predict`, for inputs known to be finite float64 of shape (n, k)."""
         return self.network_(X, self.threads)
 
+    def compact(self) -> Network:
+        """The fitted network."""
+        check_is_fitted(self)
+        return self.network_
+
     @property
     def parameter_count(self) -> int:
         """Number of centres', widths', weights' and linear numbers."""

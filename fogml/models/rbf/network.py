@@ -70,6 +70,8 @@ class Network:
         return np.asarray(steps @ self.linear - 2.0 * (basis * along) @ self.weights)
 
     def _inside(self, inputs: FloatArray, threads: int | None, single: bool) -> FloatArray:
+        if not len(self.weights):
+            return np.asarray(inputs @ self.linear + self.constant)
         return evaluate_network(
             inputs,
             self.columns,

@@ -1,0 +1,105 @@
+"""What an export is asked for, and how far it may be from its model."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.export.c_source import C_DTYPES
+from fogml.export.check import Difference
+from fogml.export.storage import FILE_DTYPES
+from fogml.models.base import DriftModel
+
+SCHEMA = "fogml.export/1"
+Target = Literal["c", "onnx", "json", "mat"]
+TARGETS: tuple[str, ...] = get_args(Target)
+TABLE_TARGETS = ("segments", "px4", "ardupilot")
+"""What `fogml.export.tables` writes."""
+DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
+TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
+"""Difference allowed unless stated, as a share of the model's 90 % interval half-width."""
+BINNED_SHARE = 5e-3
+"""The same where windows keep samples in bins: a bin that a window's edge parts is parted along a line."""
+LEAST_TOLERANCE = {"float64": 1e-6, "float32": 1e-5, "q31": 5e-4, "q15": 1e-3, "float16": 1e-5, "int8": 1e-5}
+"""The same, at least [deg/h]."""
+_MOST_SCALE_PPM = 1.0
+
+
+@dataclass(frozen=True)
+class ExportSettings:
+    """What is wanted.
+
+    Attributes
+    ----------
+    to
+        ``c``, ``onnx``, ``json`` or ``mat``.
+    dtype
+        Number format; None: ``float32`` for C, else ``float64``.
+    budget
+        Most bytes that the numbers may take; None for all of them.
+    tolerance
+        Largest difference from the model allowed [deg/h]; None: a share of the model's interval.
+    pipeline
+        Of ONNX: from the temperatures' window instead of features.
+    sample_s
+        Sample interval to run at [s]; None: that of training.
+    seed
+        Seed of the points that are compared.
+    """
+
+    to: str = "c"
+    dtype: str | None = None
+    budget: int | None = None
+    tolerance: float | None = None
+    pipeline: bool = False
+    sample_s: float | None = None
+    seed: int = 0
+
+
+def tolerance_of(model: DriftModel, settings: ExportSettings, dtype: str, binned: bool = False) -> float:
+    if settings.tolerance is not None:
+        return settings.tolerance
+    share = max(TOLERANCE_SHARE[dtype], BINNED_SHARE if binned else 0.0)
+    return max(LEAST_TOLERANCE[dtype], share * float(model.intervals_.half_width(0.9)))
+
+
+def check_settings(settings: ExportSettings, dtype: str) -> None:
+    if settings.to not in TARGETS:
+        raise InputError(
+            f"--to '{settings.to}' is not known; known are {', '.join((*TARGETS, *TABLE_TARGETS))}"
+        )
+    if dtype not in DTYPES:
+        raise InputError(f"--dtype '{dtype}' is not known; known are {', '.join(DTYPES)}")
+    allowed = C_DTYPES if settings.to == "c" else FILE_DTYPES
+    if dtype not in allowed:
+        other = "for --to onnx, json and mat" if settings.to == "c" else "for --to c"
+        raise InputError(f"--dtype {dtype} is {other}; --to {settings.to} takes {', '.join(allowed)}")
+    if settings.pipeline and settings.to != "onnx":
+        raise InputError("--with-pipeline is for --to onnx; C code always takes raw temperatures")
+    if settings.budget is not None and settings.budget < 1:
+        raise InputError(f"--bytes {settings.budget}: a positive number was expected")
+    if settings.tolerance is not None and not 0.0 <= settings.tolerance < np.inf:
+        raise InputError(f"--tolerance {settings.tolerance}: a number of deg/h from 0 was expected")
+
+
+def hold_within(
+    total: float, difference: Difference, tolerance: float, settings: ExportSettings, dtype: str
+) -> None:
+    if not total <= tolerance:
+        raise InputError(
+            f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, "
+            f"more than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or "
+            "state --tolerance if that is good enough. Nothing was written"
+        )
+    if (
+        difference.scale_ppm is not None
+        and settings.tolerance is None
+        and difference.scale_ppm > _MOST_SCALE_PPM
+    ):
+        raise InputError(
+            f"export: in {dtype} the scale factor differs by up to {difference.scale_ppm:.3g} ppm, more than "
+            f"{_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
+        )
