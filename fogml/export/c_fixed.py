@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.escaping import CCode
 from fogml.export.c_float import array, box_comment, sensor_identifier
+from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.fixed_scales import (
     OUTPUT_BITS,
     VALUE_BITS,
@@ -78,6 +79,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "fixed": fixed,
         "rates": rates,
         "ratios": rates or bool(windows.of_method("lag")) or bool(plan.centres and plan.edge_columns),
+        "slice_inputs": slice_inputs(plan, scales.atoms),
         "real": "int64_t",
         "suffix": "",
         "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
@@ -246,6 +248,12 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
         ):
             whole = np.clip(np.round(values * steps), 1.0 - 2.0**31, 2.0**31 - 1.0)
             lines += array(name, whole, "int", "[ATOMS]", "int64_t", note)
+        if limits.slices is not None:
+            numbers = slice_numbers(plan, scales.atoms)
+            lines += slice_comment(plan)
+            lines += [f"#define SLICE_{name.upper()} INT64_C({numbers[name]})" for name in ("first", "width")]
+            for name in ("low", "high"):
+                lines += array(f"SLICE_{name.upper()}", numbers[name], "int", "[SLICED][SLICES]", "int64_t")
     arrays = plan.arrays
     constant = round(float(arrays["constant"][0]) * 2.0**scales.drift)
     lines += [

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
+from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
@@ -71,6 +72,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     gyro = f"[{plan.gyro_unit}]" if plan.gives_rate else "output as rate [deg/h]"
     return {
         "fixed": None,
+        "slice_inputs": slice_inputs(plan),
         "real": real,
         "suffix": suffix,
         "second_us": number(1e-6),
@@ -223,6 +225,12 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
             ("OUTER", limits.outer, "values above are flagged"),
         ):
             lines += array(name, values, dtype, "[ATOMS]", real, note)
+        if limits.slices is not None:
+            numbers = slice_numbers(plan)
+            lines += slice_comment(plan)
+            lines += [f"#define SLICE_{name.upper()} {number(numbers[name])}" for name in ("first", "width")]
+            for name in ("low", "high"):
+                lines += array(f"SLICE_{name.upper()}", numbers[name], dtype, "[SLICED][SLICES]", real)
     return [CCode(line) for line in (*lines, "", *_model_constants(plan, dtype, real))]
 
 

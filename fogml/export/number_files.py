@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,7 +27,8 @@ FORMULAS = {
 }
 LIMITING = (
     "an atom e beyond low or high becomes margin e/(margin + e) beyond it; below flag_below or above "
-    "flag_above a sample is flagged 1, outside training"
+    "flag_above a sample is flagged 1, outside training; so is one at which an input of slices, an atom less "
+    "another, is below low or above high of the slice floor((of - first)/width), the last one at most"
 )
 
 
@@ -90,6 +92,7 @@ def write_mat(
         "margin": limits.margin,
         "flag_below": limits.inner,
         "flag_above": limits.outer,
+        "slices": json.dumps(_slices(plan)),
         "card": json.dumps(dict(card), ensure_ascii=False),
         "arrays": arrays,
     }
@@ -169,7 +172,17 @@ def _document(plan: Plan) -> dict[str, Any]:
         "network_columns": list(plan.columns),
         "edge_columns": list(plan.edge_columns),
         "edge": plan.edge.tolist(),
+        "slices": _slices(plan),
     }
+
+
+def _slices(plan: Plan) -> dict[str, Any] | None:
+    """Trained ranges at each temperature, beyond which a sample is flagged, atoms by name."""
+    slices = plan.limits.slices
+    if slices is None:
+        return None
+    low, high = slices.bounds
+    return replace(slices, low=low, high=high).as_dict(plan.atoms)
 
 
 def _cells(words: Any) -> NDArray[np.object_]:

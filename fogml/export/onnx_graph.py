@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from fogml import __version__
 from fogml.errors import InputError, first_line
+from fogml.export.onnx_slices import beyond_slice
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
 from fogml.features.atoms import DEAD_BAND, MEMORIES, Atom, evaluate
@@ -248,6 +249,8 @@ def _columns_of_window(graph: _Graph, plan: Plan, weights: FloatArray) -> tuple[
     )
     whole = graph.add("Cast", [past], to=7)  # TensorProto.INT64, as not every type can be the greatest
     outside = graph.add("ReduceMax", [whole], axes=[1], keepdims=0)
+    if limits.slices is not None:
+        outside = graph.add("Max", [outside, beyond_slice(graph, limits.slices, atoms)])
     low, high, margin, zero = (graph.constant(v) for v in (limits.low, limits.high, limits.margin, 0.0))
     over = graph.add("Max", [graph.add("Sub", [atoms, high]), zero])
     under = graph.add("Max", [graph.add("Sub", [low, atoms]), zero])

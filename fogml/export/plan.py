@@ -13,6 +13,7 @@ from fogml.features.atoms import Atom, AtomValues
 from fogml.features.box import OVERSHOOT, TOLERANCE, Box
 from fogml.features.features import Features
 from fogml.features.reach import reaching_box
+from fogml.features.slices import Slices
 from fogml.features.terms import Step, composition_plan
 from fogml.models.base import DriftModel
 from fogml.models.compact import Compact, affine
@@ -41,6 +42,8 @@ class Limits:
         Values outside of these are flagged: the box and 1 % of its span.
     box_low, box_high
         The trained box itself.
+    slices
+        Trained ranges at each temperature; None where nothing depends on it.
     """
 
     low: FloatArray
@@ -50,6 +53,7 @@ class Limits:
     outer: FloatArray
     box_low: FloatArray
     box_high: FloatArray
+    slices: Slices | None = None
 
     @classmethod
     def of(cls, features: Features, linear: bool) -> Limits:
@@ -59,22 +63,29 @@ class Limits:
         reach = reaching_box(box, features.terms, features.atoms) if linear else box
         slack = TOLERANCE * box.span
         outside = box.low - slack, box.high + slack
-        return cls(reach.low, reach.high, OVERSHOOT * reach.span, *outside, box.low, box.high)
+        margin = OVERSHOOT * reach.span
+        return cls(reach.low, reach.high, margin, *outside, box.low, box.high, features.slices)
 
     @classmethod
     def none(cls) -> Limits:
         """The limits of a model without features."""
-        return cls(*[np.empty(0)] * 7)
+        none = np.empty(0)
+        return cls(none, none, none, none, none, none, none)
 
-    def apply(self, atoms: FloatArray, heeded: BoolArray) -> tuple[FloatArray, BoolArray]:
-        """Limited atoms (n, a), and rows outside (n,); `heeded` (n, a): where values mean something."""
+    def apply(self, atoms: FloatArray, heeded: BoolArray, full: BoolArray) -> tuple[FloatArray, BoolArray]:
+        """Limited atoms (n, a), and rows outside (n,).
+
+        `heeded` (n, a) tells where values mean something, `full` (n,) where all windows are full.
+        """
         above, below = atoms - self.high, self.low - atoms
         beyond = np.where(heeded, np.maximum(np.maximum(above, below), 0.0), 0.0)
         soft = self.margin * beyond / (self.margin + beyond)
         limited = np.where(above > 0.0, self.high + soft, self.low - soft)
         limited = np.where(beyond > 0.0, limited, atoms)
-        outside = heeded & ((atoms < self.inner) | (atoms > self.outer))
-        return np.asarray(limited), np.asarray(outside.any(axis=1))
+        outside = (heeded & ((atoms < self.inner) | (atoms > self.outer))).any(axis=1)
+        if self.slices is not None:
+            outside |= self.slices.outside(atoms) & full
+        return np.asarray(limited), np.asarray(outside)
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,7 +245,7 @@ class Plan:
 
     def limited(self, atoms: FloatArray, full: BoolArray) -> tuple[FloatArray, BoolArray]:
         """Limited atoms (n, a), and which rows lie outside the trained box (n,)."""
-        return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :] | (atoms != 0.0))
+        return self.limits.apply(atoms, full[:, None] | ~self.windowed[None, :] | (atoms != 0.0), full)
 
     def full_columns(self, atoms: FloatArray) -> FloatArray:
         """Feature columns (n, k) of atoms (n, a) where all windows are full."""

@@ -15,7 +15,9 @@ from fogml.features.box import Box
 from fogml.features.grammar import parse_terms
 from fogml.features.reach import reaching_box
 from fogml.features.signal import check_holds
+from fogml.features.slices import Slices
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
+from fogml.features.transformer import Transformer
 from fogml.features.unmeasured import evaluate_measured, heeded_rows
 from fogml.runs.run import Run
 
@@ -27,7 +29,7 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
-class Features:
+class Features(Transformer):
     """An ordered tuple of feature terms, each a product of powers of atoms.
 
     ``Features("T, dT, T*dT")`` builds them from feature text; ``a + b`` puts two beside each other
@@ -72,6 +74,7 @@ class Features:
         self._atoms = tuple(dict.fromkeys(atom for term in self._terms for atom in term.atoms))
         self._plan = composition_plan(self._terms, self._atoms)
         self._box: Box | None = None
+        self._slices: Slices | None = None
 
     def __repr__(self) -> str:
         return f"Features({self.text!r})"
@@ -98,10 +101,6 @@ class Features:
     def names(self) -> list[str]:
         """Names of the k columns, each the text form of its term."""
         return [term.text for term in self._terms]
-
-    def get_feature_names_out(self, input_features: object = None) -> NDArray[Any]:
-        """`names` as an array, the way scikit-learn asks for them."""
-        return np.array(self.names(), dtype=object)
 
     @property
     def terms(self) -> tuple[Term, ...]:
@@ -131,28 +130,6 @@ class Features:
         """
         return max((atom.window.memory_s for atom in self._atoms if atom.window is not None), default=0.0)
 
-    def get_params(self, deep: bool = True) -> dict[str, Any]:
-        """Parameters, as in scikit-learn."""
-        return {"text": self.text}
-
-    def set_params(self, **params: Any) -> Self:
-        """Set parameters, as in scikit-learn; what was learned is dropped."""
-        for name, value in params.items():
-            if name != "text":
-                raise InputError(f"features: no parameter '{name}'; the only one is text")
-            self.text = value
-        return self
-
-    def __sklearn_tags__(self) -> Any:
-        from sklearn.utils import Tags, TargetTags, TransformerTags
-
-        return Tags(
-            estimator_type=None, target_tags=TargetTags(required=False), transformer_tags=TransformerTags()
-        )
-
-    def __sklearn_is_fitted__(self) -> bool:
-        return True
-
     def fit(self, runs: Run | Sequence[Run], y: object = None) -> Self:
         """Learn the box: each atom's lowest and highest value over the runs' rows with full windows.
 
@@ -169,7 +146,11 @@ class Features:
             If a run lacks a temperature, or no row has a full window.
         """
         group = [runs] if isinstance(runs, Run) else runs
-        self._box = Box.around(self.atom_values(run)[:2] for run in group)
+        return self.learn([self.atom_values(run)[:2] for run in group])
+
+    def learn(self, parts: Sequence[tuple[FloatArray, BoolArray]]) -> Self:
+        """As `fit`, from the runs' atom values (n, a) and where they are full (n,)."""
+        self._box, self._slices = Box.around(parts), Slices.learn(self._atoms, parts)
         return self
 
     @property
@@ -190,8 +171,15 @@ class Features:
         pairs = zip(self._atoms, box.low.tolist(), box.high.tolist())
         return MappingProxyType({atom.text: (low, high) for atom, low, high in pairs})
 
-    def set_box(self, box: Mapping[str, tuple[float, float]]) -> Self:
-        """Take over a box as `box` gives it, for example from a saved model.
+    @property
+    def slices(self) -> Slices | None:
+        """Trained ranges at each temperature, learned with the box; None where nothing depends on it."""
+        return self._slices
+
+    def set_box(
+        self, box: Mapping[str, tuple[float, float]], slices: Mapping[str, Any] | None = None
+    ) -> Self:
+        """Take over a box as `box` gives it, and `Slices.as_dict`, for example from a saved model.
 
         Raises
         ------
@@ -203,6 +191,7 @@ class Features:
             raise InputError(f"trained box: no bounds of {', '.join(missing)}")
         low, high = zip(*(box[atom.text] for atom in self._atoms))
         self._box = Box(np.array(low), np.array(high))
+        self._slices = None if slices is None else Slices.from_dict(slices, self._atoms)
         return self
 
     def _learned_box(self) -> Box:
@@ -267,12 +256,14 @@ class Features:
         limited : (n, a) array
             `atom_values` itself where nothing exceeds the box.
         outside : (n,) bool array
-            Rows with an atom more than 1 % of its span beyond the box.
+            Rows with an atom more than 1 % of its span beyond the box, or jointly outside (`Slices`).
         """
         in_full = None if full is None else np.asarray(full, dtype=np.bool_)
         values, box = atom_matrix(atom_values, len(self._atoms)), self._learned_box()
         heeded = heeded_rows(self._atoms, values, in_full)
         limited, outside = box.limit(values, heeded)
+        if self._slices is not None and len(values):
+            outside |= self._slices.outside(values) & (True if in_full is None else in_full)
         if linear and limited is not values:
             limited, _ = reaching_box(box, self._terms, self._atoms).limit(values, heeded)
         return limited, outside

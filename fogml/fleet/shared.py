@@ -82,7 +82,10 @@ class SharedModel(FeatureModel):
             "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"
         )
         self.card_ = replace(
-            self.card_, box=self.features_.box, notes=(*self.card_.notes, note, *self._resting())
+            self.card_,
+            box=self.features_.box,
+            slices=None,
+            notes=(*self.card_.notes, note, *self._resting()),
         )
         return self
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -17,18 +18,22 @@ def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
 
     What lies beyond bounds is 0 in training rows and levels off by itself: its box is all that it can be.
     """
-    box = Box.around((values, np.ones(len(values), dtype=np.bool_)) for values in atoms)
-    names = [atom.text for atom in features.atoms]
-    spans = dict(zip(names, zip(box.low.tolist(), box.high.tolist()), strict=True))
+    features.learn([(values, np.ones(len(values), dtype=np.bool_)) for values in atoms])
+    spans = dict(features.box)
     for atom in features.atoms:
         if atom.bounds is not None:
             most = Beyond.most(*atom.bounds)
             spans[atom.text] = (-most, most)
-    features.set_box(spans)
+    features.set_box(spans, slices_of(features))
+
+
+def slices_of(features: Features) -> dict[str, Any] | None:
+    """The features' slices, JSON-ready; None if they have none."""
+    return None if features.slices is None else features.slices.as_dict(features.atoms)
 
 
 def distance_outside(atoms: FloatArray, outside: BoolArray, features: Features) -> FloatArray:
-    """Distance from the box as a share of its span, of the atom that is furthest out; shape (n,).
+    """Distance from the box, or a slice of it, as a share of its span, of what is furthest out; shape (n,).
 
     Parameters
     ----------
@@ -44,6 +49,9 @@ def distance_outside(atoms: FloatArray, outside: BoolArray, features: Features) 
         box = _box(features)
         away = np.maximum(box.low - atoms[outside], atoms[outside] - box.high) / box.span
         distance[outside] = np.maximum(away.max(axis=1), 0.0)
+        if features.slices is not None:
+            jointly = features.slices.excess(atoms[outside]).max(axis=1)
+            distance[outside] = np.maximum(distance[outside], jointly)
     return distance
 
 

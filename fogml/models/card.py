@@ -13,6 +13,9 @@ from pydantic import Field
 
 import fogml
 from fogml.errors import InputError
+from fogml.features.features import Features
+from fogml.features.slices import SavedSlices
+from fogml.models.box import slices_of
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 
@@ -47,6 +50,8 @@ class TrainingCard:
         Training rows used.
     box
         Atom of the features to its [low, high] in the training rows, in the atom's unit.
+    slices
+        Trained ranges at each temperature, as `fogml.features.slices.Slices.as_dict` gives them.
     notes
         What a user of the model should know.
     """
@@ -61,6 +66,7 @@ class TrainingCard:
     rows: int
     box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    slices: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The card as JSON-ready values."""
@@ -75,6 +81,7 @@ class TrainingCard:
             "rows": self.rows,
             "box": {name: [low, high] for name, (low, high) in self.box.items()},
             "notes": list(self.notes),
+            "slices": None if self.slices is None else dict(self.slices),
         }
 
     @classmethod
@@ -98,6 +105,7 @@ class TrainingCard:
             rows=saved.rows,
             box={name: (low, high) for name, (low, high) in saved.box.items()},
             notes=tuple(saved.notes),
+            slices=None if saved.slices is None else saved.slices.model_dump(),
         )
 
 
@@ -119,6 +127,7 @@ class _Saved(Strict):
     rows: int = Field(ge=0)
     box: dict[str, Annotated[list[float], Len(2, 2)]]
     notes: list[str]
+    slices: SavedSlices | None = None
 
 
 def training_card(
@@ -126,7 +135,7 @@ def training_card(
     *,
     hashes: Callable[[], list[str]],
     rows: int,
-    box: Mapping[str, tuple[float, float]] | None = None,
+    features: Features | None = None,
     notes: Sequence[str] = (),
 ) -> TrainingCard:
     """The card of a model fitted to `runs`, which `checked_runs` has passed.
@@ -139,8 +148,8 @@ def training_card(
         What `hash_ahead` gave for them.
     rows
         Training rows used.
-    box
-        Atoms' names to [low, high] in the training rows.
+    features
+        Features whose box is learned; None of a model without.
     notes
         What a user of the model should know.
     """
@@ -153,8 +162,9 @@ def training_card(
         sample_s=runs[0].sample_s,
         earth_known=runs[0].earth_known,
         rows=rows,
-        box=dict(box or {}),
+        box=dict(features.box) if features is not None else {},
         notes=tuple(notes),
+        slices=slices_of(features) if features is not None else None,
     )
 
 

@@ -127,7 +127,7 @@ class FeatureModel(DriftModel):
             if covariance is not None:
                 self.regressor_.covariance_ = covariance
         notes = [*(note for part in rows for note in part.notes), *self._fit_notes()]
-        self.card_ = training_card(group, hashes=hashes, rows=count, box=features.box, notes=notes)
+        self.card_ = training_card(group, hashes=hashes, rows=count, features=features, notes=notes)
         self.intervals_ = self._interval(rows)
         return self
 
@@ -267,7 +267,7 @@ class FeatureModel(DriftModel):
         """Set what a fit learned."""
         check_feature_text(saved.asked_features)
         self.features_ = parse_features(saved.features)
-        self.features_.set_box(card.box)
+        self.features_.set_box(card.box, card.slices)
         self.regressor_ = regressor_from_saved(saved.regressor, arrays)
         columns = getattr(self.regressor_, "n_features_in_", None)
         if columns != len(self.features_):

@@ -134,7 +134,7 @@ class JointModel(DriftModel):
             self.regressor_.covariance_ = covariance
         notes += [note for part in rows for note in part.notes]
         self.card_ = training_card(
-            group, hashes=hashes, rows=row_count(rows), box=self.features_.box, notes=notes
+            group, hashes=hashes, rows=row_count(rows), features=self.features_, notes=notes
         )
         table = interval_table(rows)
         self.intervals_ = out_of_fold_intervals(table, self._out_of_fold, guard_s=self.features_.window_s)
@@ -218,7 +218,7 @@ class JointModel(DriftModel):
         model = cls(saved.patent, saved.product, saved.rate_window_s)
         model.gradient_ = saved.gradient
         model.features_ = parse_features(model._feature_text())
-        model.features_.set_box(card.box)
+        model.features_.set_box(card.box, card.slices)
         model.regressor_ = LinearRegressor.from_saved(saved.regressor, arrays)
         if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
             raise InputError("coefficients and columns differ in number")

@@ -135,7 +135,7 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     learn_box(own, [part.atoms[:, places] for part in rows])
     model.features_, model.regressor_, model.intervals_ = own, linear, intervals
     notes = [note for part in rows for note in part.notes]
-    model.card_ = training_card(runs, hashes=hashes, rows=len(table), box=own.box, notes=notes)
+    model.card_ = training_card(runs, hashes=hashes, rows=len(table), features=own, notes=notes)
     shares = dict(zip(members, weights.tolist(), strict=True))
     return Weighed(model, shares, left, mean_left, tuple(members.values()), table, union)
 

@@ -77,7 +77,8 @@ def test_equals_compensate_sample_by_sample(model_of, tmp_path, name, dtype):
     # Nothing confirms a first reading on board; the recording does.
     assert np.count_nonzero(flag[1:] != expected.flag[1:]) <= (0 if dtype == "float64" else 2)
     if name not in ("none", "mean"):
-        assert set(flag.tolist()) == {0, 1, 2}
+        # What the memories have settled on is faster there than any training run was at these temperatures.
+        assert set(flag.tolist()) == ({1, 2} if name == "memory" else {0, 1, 2})
 
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])

@@ -1,0 +1,209 @@
+"""Jointly outside: the trained range of every other input at each temperature, not over all of them.
+
+The box of each atom by itself says nothing of a temperature that training passed one way only. So the range
+of temperature is cut into slices, and in each the trained range of how temperature moves (its rate, or its
+distance from its lag or play), of gradients and of other columns is held: two numbers a slice and input,
+which a microcontroller looks up at every sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fogml.errors import InputError
+from fogml.features.atoms import Atom
+from fogml.strict import Strict, strictly
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+SLICES = 32
+"""Slices of the trained range of temperature: 3 degC of a range of 100 degC, some minutes of a ramp."""
+SLACK = 0.25
+"""How far beyond a slice's range counts as inside still, as a share of the input's whole trained span: half
+the way from ramps of one direction to standing still, where both directions are trained. Corners of a
+programme and the few rows of a slice change its range by less; the other direction is beyond it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """Trained range of c inputs in each of s slices of temperature.
+
+    Attributes
+    ----------
+    level
+        Place among the atoms of the temperature that is sliced.
+    first, width
+        Its lowest trained value and the width of a slice [degC].
+    of, less
+        Each input is the atom of place ``of`` less that of place ``less``, or by itself where that is -1.
+    low, high
+        Lowest and highest value trained, shapes (c, s).
+    """
+
+    level: int
+    first: float
+    width: float
+    of: tuple[int, ...]
+    less: tuple[int, ...]
+    low: FloatArray
+    high: FloatArray
+
+    @property
+    def span(self) -> FloatArray:
+        """Whole trained span of each input, shape (c,); of one that never moved, float noise about it."""
+        low, high = self.low.min(axis=1), self.high.max(axis=1)
+        return np.asarray(np.maximum(high - low, 1e-9 * np.maximum(1.0, np.maximum(abs(low), abs(high)))))
+
+    @property
+    def bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Values beyond these, each of shape (c, s), are flagged: the trained range and `SLACK`."""
+        slack = SLACK * self.span[:, None]
+        return self.low - slack, self.high + slack
+
+    def excess(self, atoms: FloatArray) -> FloatArray:
+        """How far beyond the range of their slice atoms (n, a) lie, as a share of its span, shape (n, c)."""
+        place, values = self._placed(atoms)
+        away = np.maximum(self.low[:, place].T - values, values - self.high[:, place].T) / self.span
+        return np.maximum(away, 0.0)
+
+    def outside(self, atoms: FloatArray) -> BoolArray:
+        """Rows (n,) of atoms (n, a) with an input beyond the range of its slice; said of full windows."""
+        place, values = self._placed(atoms)
+        lowest, highest = self.bounds
+        found = np.zeros(len(atoms), dtype=np.bool_)
+        for value, low, high in zip(values.T, lowest, highest, strict=True):
+            found |= (value < low[place]) | (value > high[place])
+        return found
+
+    def _placed(self, atoms: FloatArray) -> tuple[NDArray[np.intp], FloatArray]:
+        """Slice of each row (n,), and the inputs' values (n, c)."""
+        count = self.low.shape[1]
+        share = np.clip((atoms[:, self.level] - self.first) / self.width, 0.0, count - 1.0)
+        return share.astype(np.intp), self._inputs(atoms)
+
+    def _inputs(self, atoms: FloatArray) -> FloatArray:
+        pairs = zip(self.of, self.less, strict=True)
+        return np.column_stack([atoms[:, i] if j < 0 else atoms[:, i] - atoms[:, j] for i, j in pairs])
+
+    @classmethod
+    def learn(cls, atoms: Sequence[Atom], parts: Iterable[tuple[FloatArray, BoolArray]]) -> Slices | None:
+        """The slices of training rows: atom values (n, a) with the rows marked full (n,); None if none apply.
+
+        A slice that no row fell in has the range of those beside it together.
+        """
+        level, pairs = _inputs_of(atoms)
+        if level is None or not pairs:
+            return None
+        values = np.concatenate([part if full.all() else part[full] for part, full in parts])
+        sliced = values[:, level]
+        first, last = float(sliced.min()), float(sliced.max())
+        width = (last - first) / SLICES
+        if not width > 1e-9 * max(1.0, abs(first), abs(last)):
+            return None
+        of, less = zip(*pairs, strict=True)
+        empty = np.full((len(of), SLICES), np.inf)
+        slices = cls(level, first, width, of, less, empty, -empty)
+        place, inputs = slices._placed(values)
+        order = np.argsort(place, kind="stable")
+        filled, starts = np.unique(place[order], return_index=True)
+        for column, value in enumerate(inputs.T):
+            slices.low[column, filled] = np.minimum.reduceat(value[order], starts)
+            slices.high[column, filled] = np.maximum.reduceat(value[order], starts)
+        beside = np.searchsorted(filled, np.arange(SLICES))
+        after, before = filled[beside], filled[np.maximum(beside - 1, 0)]
+        hole = ~np.isin(np.arange(SLICES), filled)
+        slices.low[:, hole] = np.minimum(slices.low[:, after], slices.low[:, before])[:, hole]
+        slices.high[:, hole] = np.maximum(slices.high[:, after], slices.high[:, before])[:, hole]
+        return slices
+
+    def as_dict(self, atoms: Sequence[Atom]) -> dict[str, Any]:
+        """JSON-ready values, atoms by their texts."""
+        names = [atom.text for atom in atoms]
+        return {
+            "of": names[self.level],
+            "first": self.first,
+            "width": self.width,
+            "inputs": [
+                {"atom": names[i], "less": None if j < 0 else names[j], "low": low, "high": high}
+                for i, j, low, high in zip(self.of, self.less, self.low.tolist(), self.high.tolist())
+            ],
+        }
+
+    @classmethod
+    def from_dict(cls, values: Mapping[str, Any], atoms: Sequence[Atom]) -> Slices:
+        """The slices that `as_dict` wrote.
+
+        Raises
+        ------
+        InputError
+            If they are none of these atoms.
+        """
+        saved = strictly(SavedSlices, values, "slices")
+        names = [atom.text for atom in atoms]
+        wanted = [saved.of, *(name for i in saved.inputs for name in (i.atom, i.less) if name is not None)]
+        unknown = [name for name in wanted if name not in names]
+        lengths = {len(ends) for i in saved.inputs for ends in (i.low, i.high)}
+        if unknown or len(lengths) != 1:
+            told = f"no atom '{unknown[0]}'" if unknown else f"ranges of {sorted(lengths)} slices"
+            raise InputError(f"trained slices: {told}")
+        return cls(
+            names.index(saved.of),
+            saved.first,
+            saved.width,
+            tuple(names.index(i.atom) for i in saved.inputs),
+            tuple(-1 if i.less is None else names.index(i.less) for i in saved.inputs),
+            np.array([i.low for i in saved.inputs]),
+            np.array([i.high for i in saved.inputs]),
+        )
+
+
+class _SavedInput(Strict):
+    atom: str
+    less: str | None
+    low: list[float] = Field(min_length=1)
+    high: list[float] = Field(min_length=1)
+
+
+class SavedSlices(Strict):
+    """Slices as `Slices.as_dict` writes them."""
+
+    of: str
+    first: float
+    width: Annotated[float, Field(gt=0.0)]
+    inputs: list[_SavedInput] = Field(min_length=1)
+
+
+def _inputs_of(atoms: Sequence[Atom]) -> tuple[int | None, list[tuple[int, int]]]:
+    """Place of the temperature that is sliced, and the inputs whose range depends on it.
+
+    What moves with a signal is told once: by its rates and differences, else its direction, else its distance
+    from its shortest lag, else from its narrowest play.
+    """
+    values = {atom.signal: i for i, atom in enumerate(atoms) if atom.operator == "value"}
+    levels = [i for signal, i in values.items() if signal.unit == "degC" and not signal.is_difference]
+    if not levels:
+        return None, []
+    level = levels[0]
+    pairs = []
+    for signal, i in values.items():
+        if i != level:
+            alike = signal.unit == "degC" and not signal.is_difference
+            pairs.append((i, level if alike else -1))
+    for signal in dict.fromkeys(atom.signal for atom in atoms):
+        own = [(atom.memory, i) for i, atom in enumerate(atoms) if atom.signal == signal]
+        moving = {name: [(m, i) for m, i in own if atoms[i].operator == name] for name in _MOTION}
+        if found := [i for name in ("d", "diff") for _, i in moving[name]] or [i for _, i in moving["sign"]]:
+            pairs += [(i, -1) for i in found]
+        elif (followed := moving["lag"] or moving["play"]) and signal in values:
+            pairs.append((min(followed)[1], values[signal]))
+    return level, pairs
+
+
+_MOTION = ("d", "diff", "sign", "lag", "play")
