@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
-.PHONY: demo test lint format benchmarks clean
+.PHONY: demo test oldest newest docs lint format benchmarks clean
 
 $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -22,6 +22,21 @@ demo: $(READY)
 test: $(READY)
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
+## The suite with the oldest versions that pyproject.toml allows, and with the newest there are; each in a virtual
+## environment of its own. PYTHON=python3.13 takes another Python.
+oldest newest:
+	test -x .venv-$@/bin/python || $(PYTHON) -m venv .venv-$@
+	if [ $@ = oldest ]; then $(PYTHON) .ci/oldest.py > .venv-$@/constraints.txt; else : > .venv-$@/constraints.txt; fi
+	.venv-$@/bin/python -m pip install --quiet --upgrade -c .venv-$@/constraints.txt -e '.[hdf5,export,sweep,cluster,test]'
+	.venv-$@/bin/python -m pytest -n 2 --dist loadfile
+
+## The documentation as a site and as a zip, warnings as errors; both work without a network.
+docs: $(READY)
+	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
+	$(BIN)/python -m sphinx -W --keep-going -q -j auto -d docs/_build/doctrees docs docs/_build/fogml-docs
+	cd docs/_build && ../../$(BIN)/python -m zipfile -c fogml-docs.zip fogml-docs
+	@echo "Open docs/_build/fogml-docs/index.html in a browser; docs/_build/fogml-docs.zip holds the same."
+
 lint: $(READY)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -36,4 +51,4 @@ benchmarks: $(READY)
 	$(BIN)/python -m experiments.benchmarks
 
 clean:
-	rm -rf $(VENV) build dist *.egg-info demo-results
+	rm -rf $(VENV) .venv-oldest .venv-newest build dist *.egg-info demo-results docs/_build

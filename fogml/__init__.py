@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from fogml.runs.writing import write_run as write_run
     from fogml.validation.judge import judge as judge
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 _HOMES = {
     "Run": "fogml.runs.run",

@@ -51,6 +51,7 @@ COMMANDS = {
         "Programmes that make wanted parameters identifiable, with expected standard errors.",
     ),
     "blind": ("fogml.cli.blind", "The check on withheld effects: make cases, answer them, score."),
+    "docs": ("fogml.cli.docs", "The documentation, without a network: list, read, or write as one page."),
 }
 """Name of each command: its module, and its help in one line."""
 

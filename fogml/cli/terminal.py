@@ -55,6 +55,15 @@ class Terminal:
         if not (self.quiet or self.as_json):
             typer.echo(terminal_text(text))
 
+    def markdown(self, text: str) -> None:
+        """Markdown on stdout for people, as headings, lists and tables."""
+        if self.quiet or self.as_json:
+            return
+        from rich.console import Console
+        from rich.markdown import Markdown
+
+        Console(markup=False).print(Markdown(terminal_text(text)))
+
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
         if self.as_json:

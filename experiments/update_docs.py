@@ -1,4 +1,4 @@
-"""Paste the experiments' tables into the README: ``python -m experiments.update_readme``."""
+"""Paste the experiments' tables into the pages of docs/: ``python -m experiments.update_docs``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from pathlib import Path
 from fogml.outputs import whole_file
 
 ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
 SECTIONS = {
     "thermal-cycle": ("thermal_cycle/results.md", "## rms (bias included)"),
     "thermal-cycle-stability": ("thermal_cycle/results.md", "## Bias stability"),
@@ -28,15 +29,22 @@ def table_after(text: str, heading: str) -> str:
 
 
 def main() -> None:
-    """Replace what stands between the markers of each section."""
-    readme = (ROOT / "README.md").read_text(encoding="utf-8")
-    for name, (page, heading) in SECTIONS.items():
-        table = table_after((ROOT / "experiments" / page).read_text(encoding="utf-8"), heading)
-        begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
-        start, stop = readme.index(begin) + len(begin), readme.index(end)
-        readme = readme[:start] + table + readme[stop:]
-    with whole_file(ROOT / "README.md") as partial:
-        partial.write_text(readme, encoding="utf-8")
+    """Replace what stands between the markers of each section, on whichever page has them."""
+    tables = {
+        name: table_after((ROOT / "experiments" / page).read_text(encoding="utf-8"), heading)
+        for name, (page, heading) in SECTIONS.items()
+    }
+    for path in sorted(DOCS.glob("*.md")):
+        old = text = path.read_text(encoding="utf-8")
+        for name in [name for name in tables if f"<!-- {name} -->" in text]:
+            begin, end = f"<!-- {name} -->\n", f"<!-- /{name} -->"
+            start, stop = text.index(begin) + len(begin), text.index(end)
+            text = text[:start] + tables.pop(name) + text[stop:]
+        if text != old:
+            with whole_file(path) as partial:
+                partial.write_text(text, encoding="utf-8")
+    if tables:
+        raise ValueError(f"no page has the markers of {', '.join(tables)}")
 
 
 if __name__ == "__main__":
