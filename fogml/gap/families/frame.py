@@ -227,31 +227,25 @@ class Field:
         data = self.whitening.stacked([r.gap for r in setting.scene.runs[:fitted]])
         self.fixed = self.whitening.stacked(setting.fixed[:fitted])
         self.base = LinearGaussian.of(data).beside(self.fixed)
-        picked = range(len(columns.nodes)) if only is None else only
-        places = np.concatenate(
-            [np.arange(columns.nodes[i].start, columns.nodes[i].stop) for i in picked] or [np.arange(0)]
-        )
-        raw = [values[:, places] if only is not None else values for values in columns.by_run[:fitted]]
+        picked = list(range(len(columns.nodes)) if only is None else only)
+        spans = [(columns.nodes[i].start, columns.nodes[i].stop) for i in picked]
+        raw = columns.by_run[:fitted]
+        if only is not None:
+            places = np.concatenate([np.arange(*span) for span in spans] or [np.arange(0)])
+            raw = tuple(values[:, places] for values in raw)
         white = self.whitening.stacked(raw)
-        across = self.base.basis.T @ white
-        kept = np.sum(white**2, axis=0) - np.sum(across**2, axis=0)
+        edges = np.cumsum([0, *(stop - start for start, stop in spans)])
         whole = np.sum(white**2, axis=0)
-        self.scale: dict[int, float] = {}
-        self.at: dict[int, slice] = {}
-        self.in_constants: set[int] = set()
-        at = 0
-        for i in picked:
-            node = columns.nodes[i]
-            part = slice(at, at + node.stop - node.start)
-            at = part.stop
-            length2 = float(kept[part].sum())
-            if not length2 > max(IN_CONSTANTS * float(whole[part].sum()), 1e-18):
-                self.in_constants.add(i)
-                white[:, part] = 0.0
-                continue
-            self.scale[i] = 1.0 / np.sqrt(length2)
-            white[:, part] *= self.scale[i]
-            self.at[i] = part
+        kept = whole - np.sum((self.base.basis.T @ white) ** 2, axis=0)
+        whole, kept = (np.add.reduceat(v, edges[:-1]) if picked else v for v in (whole, kept))
+        shown = kept > np.maximum(IN_CONSTANTS * whole, 1e-18)
+        scales = np.where(shown, 1.0 / np.sqrt(np.where(shown, kept, 1.0)), 0.0)
+        white *= np.repeat(scales, np.diff(edges))
+        self.scale = {i: float(s) for i, s in zip(picked, scales) if s}
+        self.at = {
+            i: slice(int(a), int(b)) for i, (a, b), s in zip(picked, pairwise(edges.tolist()), scales) if s
+        }
+        self.in_constants = {i for i in picked if i not in self.at}
         self.white = white
 
     def block(self, node: int) -> FloatArray:

@@ -18,9 +18,6 @@ from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from fogml.runs.run import FloatArray
 
-WIDE = 40
-"""Columns from which on a block is wide."""
-
 
 @dataclass(frozen=True, eq=False)
 class LinearGaussian:
@@ -71,36 +68,67 @@ class LinearGaussian:
 
 
 def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
-    """Gain in log evidence of a block at each size: gram (..., k, k), fits (..., k), to (..., sizes)."""
-    if gram.shape[-1] > WIDE:
-        if gram.ndim == 2:
-            return _by_factors(gram, fits, sizes)
-        return np.array([_by_factors(g, f, sizes) for g, f in zip(gram, fits)])
+    """Gain in log evidence of a block at each size.
+
+    Inner products beside all else, shape (..., k, k), those with the data (..., k), and sizes (..., s), to
+    (..., s).
+    """
+    square = sizes**2
+    if gram.shape[-1] == 2:
+        # By the determinant, far faster than eigenvectors.
+        a, b, d = gram[..., 0, 0], gram[..., 0, 1], gram[..., 1, 1]
+        f, g = fits[..., 0], fits[..., 1]
+        area = np.maximum(a * d - b * b, 0.0)[..., None]
+        both = np.asarray(f * f + g * g)[..., None]
+        turned = np.asarray(f * f * d - 2.0 * f * g * b + g * g * a)[..., None]
+        scaled = 1.0 + square * np.asarray(a + d)[..., None] + square**2 * area
+        return np.asarray(0.5 * (square * (both + square * turned) / scaled - np.log(scaled)))
     if gram.shape[-1] == 1:
         values, along = np.maximum(gram[..., 0], 0.0), fits**2
     else:
         values, vectors = np.linalg.eigh(gram)
         values = np.maximum(values, 0.0)
         along = np.einsum("...ki,...k->...i", vectors, fits) ** 2
-    wide = sizes[:, None] ** 2
-    scaled = 1.0 + wide * values[..., None, :]
-    return np.asarray(0.5 * np.sum(wide * along[..., None, :] / scaled - np.log(scaled), axis=-1))
+    scaled = 1.0 + square[..., :, None] * values[..., None, :]
+    gained = square[..., :, None] * along[..., None, :] / scaled
+    return np.asarray(0.5 * np.sum(gained - np.log(scaled), axis=-1))
+
+
+def wide_gains(
+    values: FloatArray, vectors: FloatArray, beside: FloatArray, fits: FloatArray, sizes: FloatArray
+) -> FloatArray:
+    """The same of one wide block, by the eigenvalues (k,) and eigenvectors (k, k) of its inner products.
+
+    What else is held takes ``beside @ beside.T`` away from those, shape (k, q): with W the block's posterior
+    covariance without it, its determinant and inverse follow from I - beside' W beside, of shape (q, q);
+    where that is the larger one, from its own inner products.
+    """
+    across, along = vectors.T @ beside, vectors.T @ fits
+    found = []
+    if across.shape[1] >= len(values):
+        gram = np.diag(values) - across @ across.T
+        for size in sizes.tolist():
+            factor = np.linalg.cholesky(np.eye(len(gram)) + size**2 * gram)
+            more = solve_triangular(factor, size * along, lower=True, check_finite=False)
+            found.append(float(0.5 * more @ more - np.log(np.diagonal(factor)).sum()))
+        return np.array(found)
+    for size in sizes.tolist():
+        scaled = 1.0 + size**2 * values
+        posterior = size**2 / scaled
+        gained = 0.5 * float(np.sum(posterior * along**2 - np.log(scaled)))
+        if across.shape[1]:
+            weighed = posterior[:, None] * across
+            factor = np.linalg.cholesky(np.eye(across.shape[1]) - across.T @ weighed)
+            more = solve_triangular(factor, weighed.T @ along, lower=True, check_finite=False)
+            gained += float(0.5 * more @ more - np.log(np.diagonal(factor)).sum())
+        found.append(gained)
+    return np.array(found)
 
 
 def log_sum_exp(values: FloatArray) -> float:
     """Logarithm of the sum of exponentials."""
     most = float(values.max())
     return most if most == -np.inf else most + float(np.log(np.exp(values - most).sum()))
-
-
-def _by_factors(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
-    """The same of one wide block, for which a factor at each size is faster than eigenvectors."""
-    found = []
-    for size in sizes.tolist():
-        factor = np.linalg.cholesky(np.eye(len(gram)) + size**2 * gram)
-        along = solve_triangular(factor, size * fits, lower=True, check_finite=False)
-        found.append(float(0.5 * along @ along - np.log(np.diagonal(factor)).sum()))
-    return np.array(found)
 
 
 @dataclass(frozen=True, eq=False)

@@ -128,6 +128,12 @@ class Scene:
         return [Place(recorded, float(len(bank)), "recorded electronics"), *bank]
 
     def _bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
+        key = ("bank", id(rows), tuple(mixes), tuple(lags_s))
+        if key not in self.cache:
+            self.cache[key] = self._made_bank(rows, mixes, lags_s)
+        return list(self.cache[key])
+
+    def _made_bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
         inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
         mixed = [m for m, same in zip(mixes, self._same(mixes)) if not same]
         time = rows.even.time

@@ -85,8 +85,8 @@ class Priors:
 
     @property
     def plant_lengths(self) -> FloatArray:
-        """The values of another plant's size, shape (2,)."""
-        return np.array([self.least_size, self.plant_size])
+        """The values of another plant's size, shape (sizes,)."""
+        return np.geomspace(self.least_size, self.plant_size, self.sizes)
 
     def trusted(self, log_odds: float) -> float:
         """Of a name, from what the evidence and carrying over say."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,8 @@ class Rows:
         (m, 2) [deg/h].
     masked
         Samples left out, by why.
+    cache
+        Inputs that were worked out, by the temperatures and constants in them.
     """
 
     run: Run
@@ -62,7 +65,7 @@ class Rows:
     by_sample: BySample
     replay_errors: FloatArray
     masked: Mapping[str, int] = field(default_factory=dict)
-    cache: dict[tuple[float, ...] | None, Inputs] = field(default_factory=dict)
+    cache: dict[tuple[Any, ...], Inputs] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.gap)
@@ -116,21 +119,28 @@ class Rows:
         if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
             inputs = self._by_sample_inputs(temperatures, met)
             return self.of(self.by_sample.means(np.asarray(declared.response(inputs, **shape), np.float64)))
-        inputs = self.even.afresh()
-        if temperatures:
-            inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
-        values = declared.response(_meeting(inputs, met), **shape)
+        values = declared.response(self._even_inputs(temperatures, met), **shape)
         return self.of(np.broadcast_to(np.asarray(values, dtype=np.float64), self.kept.shape))
 
     def _by_sample_inputs(
         self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
     ) -> Inputs:
-        """Inputs at the samples; those with the rows' own temperatures are worked out once."""
-        if temperatures:
-            return _meeting(self.by_sample.inputs(self.even, temperatures), constants)
-        key = None if constants is None else tuple(constants.values())
+        """Inputs at the samples."""
+        key = ("samples", *_key(temperatures, constants))
         if key not in self.cache:
-            self.cache[key] = _meeting(self.by_sample.inputs(self.even, None), constants)
+            self.cache[key] = _meeting(self.by_sample.inputs(self.even, temperatures), constants)
+        return self.cache[key].afresh()
+
+    def _even_inputs(
+        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+    ) -> Inputs:
+        """Inputs on the even rows."""
+        key = ("even", *_key(temperatures, constants))
+        if key not in self.cache:
+            inputs = self.even
+            if temperatures:
+                inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
+            self.cache[key] = _meeting(inputs, constants)
         return self.cache[key].afresh()
 
     def samples(self, values: FloatArray) -> FloatArray:
@@ -163,6 +173,7 @@ class BySample:
     used: NDArray[np.bool_]
     counts: FloatArray
     spread: float
+    cache: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
     def means(self, values: FloatArray) -> FloatArray:
         """Means of a series over even rows, shape (n,) to (e,); interpolated where there is no sample."""
@@ -175,9 +186,22 @@ class BySample:
     def inputs(self, even: Inputs, temperatures: Mapping[str, FloatArray] | None) -> Inputs:
         """Inputs at the samples, with the even rows' temperatures."""
         held = {**even.temperatures, **(temperatures or {})}
-        time = self.recorded.time
-        smooth = {name: at_points(even.time, values, time, self.spread) for name, values in held.items()}
+        smooth = {name: self._at_samples(even.time, values) for name, values in held.items()}
         return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={}, coil=even.coil)
+
+    def _at_samples(self, time: FloatArray, values: FloatArray) -> FloatArray:
+        """A course on the even rows at the samples, worked out once."""
+        if id(values) not in self.cache:
+            self.cache[id(values)] = values, at_points(time, values, self.recorded.time, self.spread)
+        return self.cache[id(values)][1]
+
+
+def _key(
+    temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+) -> tuple[Any, ...]:
+    """What inputs are told apart by; the arrays are kept with them, so that none takes another's place."""
+    told = tuple((name, id(values)) for name, values in (temperatures or {}).items())
+    return told, None if constants is None else tuple(constants.values())
 
 
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:

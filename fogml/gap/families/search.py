@@ -11,7 +11,7 @@ from scipy.linalg import solve_triangular
 
 from fogml.gap.families.blocks import Blocks
 from fogml.gap.families.frame import Field
-from fogml.gap.families.linear_gaussian import log_sum_exp, size_gains
+from fogml.gap.families.linear_gaussian import log_sum_exp
 from fogml.runs.run import FloatArray
 
 REFINED = 12
@@ -98,8 +98,7 @@ class Search:
         self._rows: dict[int, FloatArray] = {}
         self._across = held.base.basis.T @ held.white
         self._fits = held.white.T @ held.base.data - self._across.T @ (held.base.basis.T @ held.base.data)
-        every = {f: Blocks.of(held, self._across, f) for f in range(len(self.families))}
-        self.blocks = {f: b for f, b in every.items() if b.nodes}
+        self.blocks = Blocks(held, self._across)
 
     def explanations(self) -> list[Explanation]:
         """The sets worth keeping, the likeliest first.
@@ -140,13 +139,13 @@ class Search:
 
     def alone(self) -> Mapping[int, float]:
         """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
-        across, fits = self._beside(self._held(()))
-        return {f: log_sum_exp(self._gains(f, across, fits) + b.prior) for f, b in self.blocks.items()}
+        table = self.blocks.gains(*self._beside(self._held(()))) + self.blocks.prior
+        return {f: log_sum_exp(table[rows]) for f, rows in self.blocks.rows.items()}
 
     def best_members(self, beside: Sequence[Member]) -> dict[int, Member]:
         """The node and size that stand for each family beside members."""
-        across, fits = self._beside(self._held(beside))
-        return {f: self._averaged(f, self._gains(f, across, fits))[0] for f in self.blocks}
+        gains = self.blocks.gains(*self._beside(self._held(beside)))
+        return {f: self._averaged(f, gains[rows])[0] for f, rows in self.blocks.rows.items()}
 
     def exchanged(self, explanation: Explanation, family: int) -> dict[int, Explanation]:
         """The set with a known family exchanged for each other one that may be named, where near."""
@@ -157,7 +156,7 @@ class Search:
             if f in explanation.key or grown.score < self._alone(explanation) - 2.0 * self.priors.hopeless:
                 continue
             found[f] = self._refined(grown)
-            if forms > 1 and len(self.blocks[f].nodes) > 1:
+            if forms > 1 and self._forms(f) > 1:
                 found[f] = max(
                     found[f], self._refined(self._each_more(found[f], [f])[f]), key=lambda e: e.score
                 )
@@ -179,7 +178,7 @@ class Search:
 
     def families_of(self, kind: str) -> list[int]:
         """Families of a kind that have blocks."""
-        return [f for f in self.blocks if self.families[f].kind == kind]
+        return [f for f in self.blocks.rows if self.families[f].kind == kind]
 
     @staticmethod
     def _alone(explanation: Explanation) -> float:
@@ -203,23 +202,29 @@ class Search:
     def _may_join(self, explanation: Explanation, f: int) -> bool:
         if f not in explanation.key:
             return True
-        known = self.families[f].kind == "known" and len(self.blocks[f].nodes) > 1
+        known = self.families[f].kind == "known" and self._forms(f) > 1
         return known and explanation.key.count(f) < 2
 
+    def _forms(self, f: int) -> int:
+        """How many nodes a family has."""
+        return self.blocks.rows[f].stop - self.blocks.rows[f].start
+
     def _with_one_more(self, explanation: Explanation) -> list[Explanation]:
-        joining = [f for f in self.blocks if self._may_join(explanation, f)]
+        joining = [f for f in self.blocks.rows if self._may_join(explanation, f)]
         return list(self._each_more(explanation, joining).values())
 
     def _each_more(self, explanation: Explanation, joining: Sequence[int]) -> dict[int, Explanation]:
         """The set with each of some families more."""
         held = self._held(explanation.members)
         across, fits = self._beside(held)
-        return {f: self._grown(explanation, held, f, across, fits) for f in joining}
+        if len(joining) > 1:
+            every = self.blocks.gains(across, fits)
+            gains = {f: every[self.blocks.rows[f]] for f in joining}
+        else:
+            gains = {f: self.blocks.gains_of(f, across, fits) for f in joining}
+        return {f: self._grown(explanation, held, f, gains[f]) for f in joining}
 
-    def _grown(
-        self, rest: Explanation, held: _Held, f: int, across: FloatArray, fits: FloatArray
-    ) -> Explanation:
-        gains = self._gains(f, across, fits)
+    def _grown(self, rest: Explanation, held: _Held, f: int, gains: FloatArray) -> Explanation:
         member, averaged, spread = self._averaged(f, gains)
         return Explanation(
             (*rest.members, member),
@@ -230,10 +235,12 @@ class Search:
 
     def _averaged(self, f: int, gains: FloatArray) -> tuple[Member, float, float]:
         """The node and size that stand for a family, its gain averaged over all, and how much that adds."""
-        table = gains + self.blocks[f].prior
-        row, column = np.unravel_index(int(np.argmax(table)), table.shape)
+        rows = self.blocks.rows[f]
+        table = gains + self.blocks.prior[rows]
+        row, column = divmod(int(np.argmax(table)), table.shape[1])
         averaged = log_sum_exp(table)
-        member = Member(f, self.blocks[f].nodes[row], float(self.blocks[f].lengths[column]))
+        at = rows.start + row
+        member = Member(f, self.blocks.nodes[at], float(self.blocks.lengths[at, column]))
         return member, averaged, averaged - float(gains[row, column])
 
     def _refined(self, explanation: Explanation) -> Explanation:
@@ -243,8 +250,8 @@ class Search:
         total = explanation.log_evidence
         for i, member in enumerate(members):
             held = self._held([m for j, m in enumerate(members) if j != i])
-            across, fits = self._beside(held, self.blocks[member.family].span)
-            gains = self._gains(member.family, across, fits, self.blocks[member.family].span.start)
+            span = self.blocks.spans[member.family]
+            gains = self.blocks.gains_of(member.family, *self._beside(held, span), first=span.start)
             members[i], averaged, spreads[i] = self._averaged(member.family, gains)
             total = held.log_evidence + averaged - spreads[i]
         return replace(
@@ -279,17 +286,6 @@ class Search:
         rows = np.concatenate([row[:, span] for row in held.rows])
         across = solve_triangular(held.factor, held.size[:, None] * rows, lower=True, check_finite=False)
         return across, self._fits[span] - across.T @ held.along
-
-    def _gains(self, f: int, across: FloatArray, fits: FloatArray, first: int = 0) -> FloatArray:
-        """Gain of each node of a family at each size, shape (nodes, sizes); columns begin at `first`."""
-        blocks = self.blocks[f]
-        out = np.empty((len(blocks.nodes), len(blocks.lengths)))
-        for rows, places, grams in blocks.groups:
-            at = places - first
-            beside = across.T[at]
-            gram = grams - beside @ beside.transpose(0, 2, 1)
-            out[rows] = size_gains(gram, fits[at], blocks.lengths)
-        return out
 
     def _log_odds(self) -> FloatArray:
         count = {kind: sum(f.kind == kind for f in self.families) for kind in ("known", "unknown", "plant")}

@@ -10,6 +10,7 @@ from fogml.gap.families.linear_gaussian import (
     left_out_log_density,
     log_evidence,
     size_gains,
+    wide_gains,
 )
 
 
@@ -32,7 +33,7 @@ def test_evidence_is_the_density_of_the_data():
     assert held.log_evidence == pytest.approx(_dense(data, fixed, 2.0 * block, 0.3 * other), abs=1e-9)
 
 
-@pytest.mark.parametrize("width", [1, 4, 60])
+@pytest.mark.parametrize("width", [1, 2, 4, 30])
 def test_gains_at_sizes_are_differences_of_densities(width):
     rng = np.random.default_rng(2)
     data, fixed, *_ = _made(80)
@@ -43,6 +44,20 @@ def test_gains_at_sizes_are_differences_of_densities(width):
     expected = [_dense(data, fixed, s * block) - _dense(data, fixed) for s in sizes]
     np.testing.assert_allclose(gains, expected, atol=1e-8)
     np.testing.assert_allclose(size_gains(held.gram(block), held.fits(block), sizes), expected, atol=1e-8)
+
+
+@pytest.mark.parametrize(("width", "beside"), [(12, 0), (12, 3), (5, 9)])
+def test_a_wide_block_gains_beside_others_as_by_the_densities(width, beside):
+    rng = np.random.default_rng(3)
+    data, fixed, *_ = _made(60)
+    block, other = rng.standard_normal((60, width)), rng.standard_normal((60, beside))
+    held = LinearGaussian.of(data).beside(fixed)
+    both = held.beside(other)
+    own = both.basis[:, held.basis.shape[1] :]
+    sizes = np.array([0.5, 3.0])
+    gains = wide_gains(*np.linalg.eigh(held.gram(block)), block.T @ own, both.fits(block), sizes)
+    expected = [_dense(data, fixed, other, s * block) - _dense(data, fixed, other) for s in sizes]
+    np.testing.assert_allclose(gains, expected, atol=1e-8)
 
 
 def test_leaving_parts_out_is_conditioning():
