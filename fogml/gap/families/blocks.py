@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.families.frame import Field
-from fogml.gap.families.linear_gaussian import size_gains, wide_gains
+from fogml.gap.families.linear_gaussian import sign_gains, size_gains, wide_gains
 from fogml.runs.run import FloatArray
 
 WIDE = 40
@@ -20,12 +20,13 @@ WIDE = 40
 class Group:
     """Blocks of one width: their rows among the nodes, places of their columns, their inner products.
 
-    Wide ones hold eigenvalues and eigenvectors of those, too.
+    Those are positive whose sign physics gives. Wide ones hold eigenvalues and eigenvectors, too.
     """
 
     rows: NDArray[np.intp]
     places: NDArray[np.intp]
     grams: FloatArray
+    positive: NDArray[np.bool_]
     modes: tuple[FloatArray, FloatArray] | None
 
     def gains(
@@ -39,7 +40,10 @@ class Group:
             told = zip(values, vectors, beside, fits[at], lengths)
             return np.array([wide_gains(*one) for one in told])
         gram = self.grams[part] - beside @ beside.transpose(0, 2, 1) if len(across) else self.grams[part]
-        return size_gains(gram, fits[at], lengths)
+        gains, known = size_gains(gram, fits[at], lengths), self.positive[part]
+        if known.any():
+            gains[known] += sign_gains(gram[known], fits[at][known], lengths[known])
+        return gains
 
 
 class Blocks:
@@ -91,7 +95,8 @@ class Blocks:
             if width > WIDE:
                 values, vectors = np.linalg.eigh(grams)
                 modes = np.maximum(values, 0.0), vectors
-            group = Group(np.array(rows), places, grams, modes)
+            positive = np.array([held.columns.nodes[nodes[r]].positive for r in rows])
+            group = Group(np.array(rows), places, grams, positive, modes)
             self._groups.append(group)
             for f, span in self.rows.items():
                 low, high = np.searchsorted(rows, [span.start, span.stop]).tolist()

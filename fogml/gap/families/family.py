@@ -17,11 +17,13 @@ class Block(NamedTuple):
     """One member of a family, its few shapes given: columns of independent coefficients.
 
     ``columns`` [deg/h per unit] have shape (m, k), ``shape`` says which member, ``weight`` how likely it is.
+    Of a ``positive`` one physics gives the first column's sign.
     """
 
     columns: FloatArray
     shape: Mapping[str, Any] = {}
     weight: float = 1.0
+    positive: bool = False
 
 
 Build = Callable[[Rows, Scene, Mapping[str, float]], Iterator[Block]]
@@ -56,6 +58,6 @@ class Family:
     place: str = ""
 
 
-def column_block(*columns: FloatArray, **shape: Any) -> Block:
+def column_block(*columns: FloatArray, positive: bool = False, **shape: Any) -> Block:
     """A block of columns of shape (m,) each."""
-    return Block(np.column_stack(columns), shape)
+    return Block(np.column_stack(columns), shape, positive=positive)

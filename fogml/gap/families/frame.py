@@ -33,13 +33,14 @@ IN_CONSTANTS = 1e-4
 
 @dataclass(frozen=True)
 class Node:
-    """A block of a family over all runs: where its columns are, its shape and its weight's logarithm."""
+    """A block of a family over all runs: where its columns are, its shape, weight's logarithm and sign."""
 
     family: int
     start: int
     stop: int
     shape: Mapping[str, Any]
     log_weight: float
+    positive: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,7 @@ class Columns:
                         spread[:, r * width : (r + 1) * width] = block.columns
                     held.append(spread)
                 weight = float(np.log(max(blocks[0].weight, 1e-300) / total))
-                nodes.append(Node(f, at, at + wide, blocks[0].shape, weight))
+                nodes.append(Node(f, at, at + wide, blocks[0].shape, weight, blocks[0].positive))
                 at += wide
         return cls(tuple(families), tuple(nodes), tuple(np.concatenate(held, axis=1) for held in parts))
 

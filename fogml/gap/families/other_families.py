@@ -40,12 +40,13 @@ def signature_of(
 
     def build(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
         nodes = nodes_of(declared, scene, constants)
+        positive = not declared.amplitude.signed and declared.amplitude.limits[0] >= 0.0
         for name, temperature, weight in _driving(declared, rows, scene):
             for node in nodes:
                 columns = np.column_stack(
                     [_at(rows, declared, draw, temperature, constants) for draw in node.draws]
                 )
-                yield Block(columns @ node.mix, {**node.shape, "place": name}, weight)
+                yield Block(columns @ node.mix, {**node.shape, "place": name}, weight, positive)
 
     return build
 
@@ -161,10 +162,11 @@ def sensor_lag(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block
     missed = {n: rate(time, rows.even.temperatures[n]) / 60.0 for n in rows.readings}
     second = {n: SENSOR_LAG_S * rate(time, v) / 60.0 for n, v in missed.items()}
     together = through_nominal(rows, told, missed)
-    yield column_block(together)
-    yield column_block(together, through_nominal(rows, told, second))
+    yield column_block(together, positive=True)
+    yield column_block(together, through_nominal(rows, told, second), positive=True)
     for names in ({"T", "T_in"}, {"T_out"}):
-        yield column_block(through_nominal(rows, told, {n: v for n, v in missed.items() if n in names}))
+        own = {n: v for n, v in missed.items() if n in names}
+        yield column_block(through_nominal(rows, told, own), positive=True)
 
 
 def sensor_placement(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
@@ -173,18 +175,19 @@ def sensor_placement(rows: Rows, scene: Scene, constants: Constants) -> Iterator
     held = {n: rows.even.temperatures[n] for n in rows.readings if n in ("T", "T_in", "T_out")}
     for other in ("T_case", "T_chamber", "T_electronics"):
         elsewhere = rows.even.temperature(other)
-        yield column_block(through_nominal(rows, told, {n: v - elsewhere for n, v in held.items()}))
+        every = {n: v - elsewhere for n, v in held.items()}
+        yield column_block(through_nominal(rows, told, every), positive=True)
         for names in ({"T", "T_in"}, {"T_out"}):
             own = {n: v - elsewhere for n, v in held.items() if n in names}
-            yield column_block(through_nominal(rows, told, own))
+            yield column_block(through_nominal(rows, told, own), positive=True)
     behind = {n: v - lag(time, v, 600.0) for n, v in held.items()}
-    yield column_block(through_nominal(rows, told, behind))
+    yield column_block(through_nominal(rows, told, behind), positive=True)
 
 
 def sensor_steps(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """What the readings' steps hide, through the fitted nominal."""
     hidden = {n: rows.even.temperatures[n] - values for n, values in rows.readings.items()}
-    yield column_block(through_nominal(rows, slopes(rows, constants), hidden))
+    yield column_block(through_nominal(rows, slopes(rows, constants), hidden), positive=True)
 
 
 def clock_skew(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

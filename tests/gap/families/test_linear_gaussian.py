@@ -9,6 +9,7 @@ from fogml.gap.families.linear_gaussian import (
     Posterior,
     left_out_log_density,
     log_evidence,
+    sign_gains,
     size_gains,
     wide_gains,
 )
@@ -58,6 +59,22 @@ def test_a_wide_block_gains_beside_others_as_by_the_densities(width, beside):
     gains = wide_gains(*np.linalg.eigh(held.gram(block)), block.T @ own, both.fits(block), sizes)
     expected = [_dense(data, fixed, other, s * block) - _dense(data, fixed, other) for s in sizes]
     np.testing.assert_allclose(gains, expected, atol=1e-8)
+
+
+def test_a_sign_that_is_known_is_a_prior_on_half_the_space():
+    """By a sum over the plane of coefficients."""
+    rng = np.random.default_rng(4)
+    fixed, block = rng.standard_normal((40, 2)), rng.standard_normal((40, 2))
+    data = 0.3 * block[:, 0] + rng.standard_normal(40)
+    held = LinearGaussian.of(data).beside(fixed)
+    gram, fits, size = held.gram(block), held.fits(block), 0.7
+    grid = np.linspace(-6.0, 6.0, 1201)
+    c = size * np.stack(np.meshgrid(grid, grid, indexing="ij"), axis=-1)
+    log_density = c @ fits - 0.5 * np.einsum("...i,ij,...j->...", c, gram, c) - 0.5 * (c**2).sum(-1) / size**2
+    held_half = np.where(grid > 0.0, 1.0, np.where(grid == 0.0, 0.5, 0.0))[:, None]
+    expected = np.log(2.0 * (held_half * np.exp(log_density)).sum() / np.exp(log_density).sum())
+    found = sign_gains(gram[None], fits[None], np.array([[size]]))
+    assert found[0, 0] == pytest.approx(expected, abs=1e-4)
 
 
 def test_leaving_parts_out_is_conditioning():
