@@ -92,6 +92,7 @@ def families(case: CaseFiles, out: Path, *, cost_of_false_name: float = 1.0) -> 
         noise=read_run(case.noise) if case.noise else None,
         without=case.without,
         seed=case.seed,
+        plan=False,
         cost_of_false_name=cost_of_false_name,
     )
     write_json(out / "gap.json", found.as_dict(), indent=None)

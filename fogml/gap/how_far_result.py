@@ -45,3 +45,40 @@ class Nearest:
     effect: str
     share: float
     probability: float
+
+
+@dataclass(frozen=True)
+class Onset:
+    """Since when an effect acts: the run, the time on its clock [s], and what that explains more [nats]."""
+
+    run: str
+    time_s: float
+    gain: float
+
+
+@dataclass(frozen=True)
+class Rehearsed:
+    """What a diagnosis of these runs would say if one candidate acted alone.
+
+    Attributes
+    ----------
+    effect, form, size
+        What acts: its id; its shape, in the middle of the ranges or at their ends; its usual size or the
+        found one.
+    length
+        Whitened length beside the constants: how much the runs show of it.
+    outcome
+        ``named``, ``missed``, or ``mistaken`` for another.
+    named_as
+        The class that is named.
+    probability
+        Of that class.
+    """
+
+    effect: str
+    form: str
+    size: str
+    length: float
+    outcome: str
+    named_as: tuple[str, ...]
+    probability: float

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.confidence import Support
-from fogml.gap.how_far_result import HowFar, Nearest, WhatIf
+from fogml.gap.how_far_result import HowFar, Nearest, Onset, Rehearsed, WhatIf
 from fogml.gap.model import EffectValue, GyroModel, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
@@ -67,6 +67,10 @@ class Found:
         The amplitude from each run that can show it.
     consistent
         Whether those agree in sign and size.
+    grows
+        Change of its size a day, in its unit; None where the runs tell of none.
+    onset
+        Since when it acts; None where from the first run on.
     share
         Of the structural gap's energy above the floor, between 0 and 1.
     place
@@ -89,6 +93,8 @@ class Found:
     support: Support = field(default_factory=Support)
     unrealised: float = 0.0
     left_out: tuple[str, ...] = ()
+    grows: float | None = None
+    onset: Onset | None = None
 
     @property
     def named(self) -> bool:
@@ -250,6 +256,8 @@ class Diagnosis:
         The known families that come nearest to the gap, each alone.
     headline
         Sentences that say the result.
+    rehearsal
+        What these runs would name of each candidate, where that was asked for.
     """
 
     fit: tuple[str, ...]
@@ -275,6 +283,7 @@ class Diagnosis:
     what_if: tuple[WhatIf, ...] = ()
     nearest: tuple[Nearest, ...] = ()
     headline: tuple[str, ...] = ()
+    rehearsal: tuple[Rehearsed, ...] = ()
 
     @property
     def named(self) -> tuple[Found, ...]:

@@ -45,6 +45,7 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "what_if": [_plain(asdict(item)) for item in diagnosis.what_if],
         "nearest": [_plain(asdict(item)) for item in diagnosis.nearest],
         "headline": list(diagnosis.headline),
+        "rehearsal": [_plain(asdict(item)) for item in diagnosis.rehearsal],
         "assumed": list(diagnosis.assumed),
     }
 
@@ -60,6 +61,8 @@ def _found(found: Found) -> dict[str, Any]:
         "stage": found.stage,
         "by_run": [asdict(item) for item in found.by_run],
         "consistent": found.consistent,
+        "grows_per_day": found.grows,
+        "onset": None if found.onset is None else asdict(found.onset),
         "share": found.share,
         "place": found.place,
         "times_usual": found.times_usual,

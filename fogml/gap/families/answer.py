@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.families.card import Card, card_of
+from fogml.gap.families.ahead import next_run, rehearse
+from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause, shares
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.inference import Inference, Progress, infer
 from fogml.gap.families.posterior import Cause, Judgement, judge
@@ -20,15 +22,11 @@ from fogml.gap.families.reports import (
     series_of,
     stage_energies,
 )
-from fogml.gap.families.search import Member
 from fogml.gap.families.words import headline, looks_like
 from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (
     Diagnosis,
-    Estimate,
-    Found,
-    RunAmplitude,
     Unknown,
     Verdict,
 )
@@ -36,7 +34,7 @@ from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import GapOnRun, where
 from fogml.runs.epochs import with_epoch
 from fogml.runs.run import FloatArray, Run
-from fogml.twin.registry import effect
+from fogml.twin.registry import effect, effects
 
 SURELY_NOT_NOTHING = 0.02
 """Probability that nothing acts under which there is a gap, whatever makes it."""
@@ -54,6 +52,8 @@ def diagnose(
     without: Iterable[str] = (),
     seed: int = 0,
     priors: Priors | None = None,
+    plan: bool = True,
+    rehearsed: bool = False,
     cost_of_false_name: float = 1.0,
     progress: Progress | None = None,
 ) -> Diagnosis:
@@ -63,12 +63,26 @@ def diagnose(
     ----------
     priors
         What is taken for granted.
+    plan
+        Whether to look for a programme that would tell more.
+    rehearsed
+        Whether to tell what these runs would name of each candidate.
     cost_of_false_name
         Of a false name over that of a missed one: a cause is named from odds of this on.
+
+    Raises
+    ------
+    InputError
+        If runs are of different units, a run is used twice, no temperature moves, an effect is
+        unknown, or no run can be used.
     """
     from threadpoolctl import threadpool_limits
 
     tell = progress or (lambda what: None)
+    without = tuple(without)
+    for id in without:
+        if id not in effects():
+            raise InputError(f"--without {id}: there is no such effect; `fogml effects` lists them")
     check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
@@ -84,7 +98,15 @@ def diagnose(
                 f"{LEAST_MOTION_DEGC:g} degC or more"
             )
         tell("judging on held-out runs")
-        return _answer(found, judge(found), noise, part, seed, cost_of_false_name)
+        judged = judge(found)
+        answer = _answer(found, judged, noise, part, seed, cost_of_false_name)
+        if plan:
+            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell)
+            answer = replace(answer, separating_run=run)
+        if rehearsed:
+            tell("rehearsing each candidate")
+            answer = replace(answer, rehearsal=rehearse(found, answer.found, cost_of_false_name))
+        return answer
 
 
 def _answer(
@@ -102,11 +124,11 @@ def _answer(
     beside = [m for m in judged.best.members if found.columns.families[m.family].kind != "known"]
     after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
     structural = [r.gap - recalibrated.on(i) for i, r in enumerate(scene.runs)]
-    energies = {m: _energy(found, every, m) for m in judged.best.members}
-    shares = _shares(energies)
-    cards = {c.member: _card(found, judged, c) for c in judged.causes}
+    energies = {m: energy(found, every, m) for m in judged.best.members}
+    share = shares(energies)
+    cards = cards_of(found, judged)
     items = tuple(
-        _found(found, c, p, cards[c.member], sum(shares.get(m, 0.0) for m in c.members))
+        found_cause(found, every, c, p, cards[c.ids[0]], sum(share.get(m, 0.0) for m in c.members))
         for c, p in zip(judged.causes, shifted)
         if p >= LISTED
     )
@@ -123,6 +145,11 @@ def _answer(
     shown = () if verdict == "unknown" else tuple(f for f in items)
     from fogml.gap.noise import Noise
 
+    lies = where(
+        gaps,
+        stage_energies(found, energies),
+        Noise(found.field.whitening.noise, found.points.fit, found.points.source),
+    )
     return Diagnosis(
         fit=tuple(r.run.name for r in scene.runs[: scene.fitted]),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
@@ -132,25 +159,21 @@ def _answer(
         found=shown,
         suspected=() if verdict != "unknown" else tuple(f for f in items if not f.named),
         unknown=unknown,
-        where=where(
-            gaps,
-            stage_energies(found, energies),
-            Noise(found.field.whitening.noise, found.points.fit, found.points.source),
-        ),
+        where=lies,
         how_far=far,
         undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
         separating_run=None,
         constants=constants_of(found, after),
         evidence=evidence,
         noise=noise_of(found),
-        effects=tuple(cards[c.member].value for c in named),
+        effects=fitted_values(found, judged, named, cards),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,
         assumed=assumed(found),
         model=found.model.name,
         what_if=what_if,
         nearest=nearest,
-        headline=headline(found, judged, verdict, shown, nearest, far),
+        headline=headline(found, judged, verdict, shown, nearest, far, lies.segments),
     )
 
 
@@ -171,66 +194,6 @@ def _verdict(named: Sequence[Cause], judged: Judgement) -> Verdict:
     if named:
         return "explained" if all(len(c.ids) == 1 for c in named) else "ambiguous"
     return "unknown" if judged.unknown >= 0.5 or judged.nothing < SURELY_NOT_NOTHING else "no_gap"
-
-
-def _energy(found: Inference, every: Foretold, member: Member) -> float:
-    """Squares of what a cause makes on the fit runs [(deg/h)^2]."""
-    runs = found.setting.scene.runs[: found.setting.scene.fitted]
-    parts = [every.of_member(i, member) for i in range(len(runs))]
-    return float(sum(np.sum((p - p.mean()) ** 2) for p in parts))
-
-
-def _shares(energies: dict[Member, float]) -> dict[Member, float]:
-    total = sum(energies.values())
-    return {m: e / total for m, e in energies.items()} if total > 0.0 else {}
-
-
-def _card(found: Inference, judged: Judgement, cause: Cause) -> Card:
-    others = [(m.node, m.size) for m in judged.best.members if m not in cause.members]
-    shape = found.columns.nodes[cause.member.node].shape
-    return card_of(cause.ids[0], found.setting, found.field, found.field.beside(others), shape)
-
-
-def _found(found: Inference, cause: Cause, probability: float, card: Card, share: float) -> Found:
-    declared = effect(cause.ids[0])
-    _, high = declared.amplitude.range(found.setting.scene.grade)  # type: ignore[arg-type]
-    return Found(
-        effect=cause.ids[0],
-        stage=declared.stage,
-        members=cause.ids,
-        probability=probability,
-        amplitude=Estimate(card.value.amplitude, card.amplitude_se, declared.amplitude.unit),
-        parameters={
-            q.name: Estimate(card.value.shape[q.name], card.shape_se.get(q.name, 0.0), q.unit)
-            for q in declared.shape
-            if q.name in card.value.shape
-        },
-        by_run=_by_run(found, cause),
-        share=share,
-        place=declared.place,
-        times_usual=abs(card.value.amplitude) / high,
-    )
-
-
-def _by_run(found: Inference, cause: Cause) -> tuple[RunAmplitude, ...]:
-    """Scale of the cause that each run asks for, constants free, the rest as found; 1 is what all ask for."""
-    held = found.field
-    own = [(m.node, m.size) for m in cause.members]
-    design = held.design(own)
-    from fogml.gap.families.linear_gaussian import Posterior
-
-    first = held.fixed.shape[1]
-    mean = Posterior.of(design, held.base.data).mean[first:]
-    course = design[:, first:] @ mean
-    rows = []
-    for r, span in zip(found.setting.scene.runs, found.setting.spans):
-        fixed, part, data = held.fixed[span], course[span], held.base.data[span]
-        basis, _ = np.linalg.qr(fixed + 1e-12)
-        beside = part - basis @ (basis.T @ part)
-        size = float(beside @ beside)
-        if size > 9.0:
-            rows.append(RunAmplitude(r.run.name, float(beside @ data) / size, size**-0.5))
-    return tuple(rows)
 
 
 def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOut]) -> tuple[WhatIf, ...]:

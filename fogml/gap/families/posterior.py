@@ -68,20 +68,19 @@ def judge(found: Inference) -> Judgement:
     worse with it than with the best of what is unknown in its place, less so. The prior's trust maps them.
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
-    best = found.explanations[0]
+    best = _likeliest(found, found.explanations)
     exchanges = [e for f in search.names(best) for e in search.exchanged(best, f).values()]
     explanations = _with_more(found.explanations, exchanges)
-    best = explanations[0]
-    alike = {f: _alike(found, explanations, f) for f in search.names(best)}
+    best = _likeliest(found, explanations)
+    alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
     instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
     explanations = _with_more(explanations, [e for sets in instead.values() for e in sets])
-    if explanations[0].key != best.key and not search.names(explanations[0]) >= search.names(best):
-        best = explanations[0]
-        alike = {f: _alike(found, explanations, f) for f in search.names(best)}
+    likeliest = _likeliest(found, explanations)
+    if likeliest.key != best.key and not search.names(likeliest) >= search.names(best):
+        best = likeliest
+        alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
         instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
-    scores = np.array([e.score for e in explanations])
-    weights = np.exp(scores - scores.max())
-    weights /= weights.sum()
+    weights = _weights(explanations)
     causes = []
     for f, members in alike.items():
         held = float(sum(w for e, w in zip(explanations, weights) if set(members) & set(e.key)))
@@ -102,9 +101,30 @@ def judge(found: Inference) -> Judgement:
     return Judgement(best, tuple(causes), nothing, 1.0 - known_share, explanations, weights)
 
 
-def _alike(found: Inference, explanations: Sequence[Explanation], family: int) -> list[int]:
+def _weights(explanations: Sequence[Explanation]) -> FloatArray:
+    """Posterior of the sets, shape (n,)."""
+    scores = np.array([e.score for e in explanations])
+    weights = np.exp(scores - scores.max())
+    return np.asarray(weights / weights.sum())
+
+
+def _likeliest(found: Inference, explanations: Sequence[Explanation]) -> Explanation:
+    """The likeliest set with as many names as more sets have than not.
+
+    Where what acts is one of several that these runs don't tell apart, each set with a name may be less
+    likely than one without, and all of them together more.
+    """
+    counts = np.array([len(found.search.names(e)) for e in explanations])
+    weights = _weights(explanations)
+    most = max((k for k in set(counts.tolist()) if weights[counts >= k].sum() >= 0.5), default=0)
+    return next(e for e, k in zip(explanations, counts) if k >= min(max(most, counts[0]), counts.max()))
+
+
+def _alike(
+    found: Inference, explanations: Sequence[Explanation], best: Explanation, family: int
+) -> list[int]:
     """Families that one of the likeliest set may be exchanged for at a low cost; itself first."""
-    best, families = explanations[0], found.columns.families
+    families = found.columns.families
     rest = frozenset(best.key) - {family}
     by_set: dict[frozenset[int], float] = {}
     for e in explanations:

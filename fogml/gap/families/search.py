@@ -142,6 +142,12 @@ class Search:
         table = self.blocks.gains(*self._beside(self._held(()))) + self.blocks.prior
         return {f: log_sum_exp(table[rows]) for f, rows in self.blocks.rows.items()}
 
+    def alone_on(self, data: FloatArray) -> Mapping[int, float]:
+        """Log posterior of each family alone on other whitened data, shape (n,); that of nothing is 0."""
+        fits = self.field.white.T @ data - self._across.T @ (self.field.base.basis.T @ data)
+        table = self.blocks.gains(np.empty((0, len(fits))), fits) + self.blocks.prior
+        return {f: log_sum_exp(table[rows]) + self.log_odds[f] for f, rows in self.blocks.rows.items()}
+
     def best_members(self, beside: Sequence[Member]) -> dict[int, Member]:
         """The node and size that stand for each family beside members."""
         gains = self.blocks.gains(*self._beside(self._held(beside)))

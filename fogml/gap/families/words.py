@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from fogml.gap.how_far_result import HowFar, Nearest
 from fogml.gap.result import Found, Verdict
+from fogml.gap.where_result import GapSegment
 from fogml.twin.registry import effect
 
 if TYPE_CHECKING:
@@ -34,6 +35,7 @@ def headline(
     shown: Sequence[Found],
     nearest: Sequence[Nearest],
     far: Sequence[HowFar],
+    segments: Sequence[GapSegment],
 ) -> tuple[str, ...]:
     """Sentences: the verdict, each cause with its size, share and place, the nearest where none is sure."""
     said = []
@@ -47,6 +49,15 @@ def headline(
         share = f", {f.share:.0%} of the gap" if f.share is not None else ""
         look = f"; look at the {f.place}" if f.place else ""
         said.append(f"{title}{others}: {f.probability:.0%} probable, {size}{usual}{share}{look}.")
+        if f.onset is not None:
+            said.append(
+                f"{title} acts from {f.onset.run} on, {f.onset.time_s:.0f} s into it, and not before."
+            )
+        if f.grows is not None:
+            way = "grows" if f.grows * f.amplitude.value > 0.0 else "fades"
+            said.append(f"{title} {way} from run to run, by {abs(f.grows):.2g} {f.amplitude.unit} a day.")
+        elif not f.consistent and len(f.by_run) > 1:
+            said.append(f"{title}: the runs do not agree in its size.")
     if verdict in ("unknown", "partly_explained"):
         like = looks_like(found, judged)
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
@@ -56,6 +67,15 @@ def headline(
                     f"Nearest known cause: {effect(n.effect).title.lower()}, in whatever form, holds "
                     f"{n.share:.0%} of the gap."
                 )
+    order = sorted(range(found.setting.scene.fitted), key=lambda i: found.setting.scene.begun_s[i])
+    runs = [found.setting.scene.runs[i].run.name for i in order]
+    first = min((runs.index(s.run) for s in segments), default=0)
+    if first > 0:
+        begun = min(s.from_s for s in segments if s.run == runs[first])
+        said.append(
+            f"The gap shows from {runs[first]}, {begun:.0f} s, on, and in no run before: a diagnosis of the "
+            "runs from there on may name more."
+        )
     for h in far:
         if h.closed is None:
             said.append(f"{h.run}: {h.note}.")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from fogml.errors import InputError
 from fogml.gap.families.answer import diagnose
 from fogml.gap.families.making_rows import rows_of
 from fogml.gap.twin_model import TwinModel
@@ -38,20 +39,42 @@ def runs(tactical):
 
 
 def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
-    found = diagnose(TwinModel(tactical), runs[:2], runs[2:])
+    found = diagnose(TwinModel(tactical), runs[:2], runs[2:], plan=False)
     assert found.verdict == "no_gap"
     assert not found.named
     errors = [abs(c.value - getattr(tactical.nominal, c.name)) / c.se for c in found.constants]
     assert max(errors) < 3.0
 
 
-def test_a_size_that_the_twin_has_wrong_gets_its_own_name(tactical, runs):
+def test_a_size_that_the_twin_has_wrong_gets_its_own_name(tactical, runs, tmp_path):
     wrong = tactical.with_effect("thermal_hysteresis", 0.9, half_width=8.0)
-    found = diagnose(TwinModel(wrong), runs[:2], runs[2:])
+    found = diagnose(TwinModel(wrong), runs[:2], runs[2:], plan=False, rehearsed=True)
     assert [f.effect for f in found.named] == ["thermal_hysteresis"]
     (cause,) = found.named
     assert cause.amplitude.value == pytest.approx(0.12 - 0.9, abs=4.0 * cause.amplitude.se)
     assert found.how_far[0].closed is not None and found.how_far[0].closed > 0.8
+    # The twin that is written holds all of the effect, not the correction alone.
+    found.write_model(TwinModel(wrong), tmp_path / "twin.yaml")
+    written = load_twin(tmp_path / "twin.yaml").settings["thermal_hysteresis"]
+    assert written.amplitude == pytest.approx(0.12, abs=4.0 * cause.amplitude.se)
+    assert cause.consistent and cause.onset is None and cause.grows is None
+    _rehearsed(found.rehearsal)
+
+
+def _rehearsed(rows):
+    """What hardly shows is missed; of one form a larger size shows as much more, and is no less sure."""
+    assert {r.outcome for r in rows if r.length < 2.0} == {"missed"}
+    own = [r for r in rows if r.effect == "thermal_hysteresis" and r.form == "usual"]
+    usual, large = sorted(own, key=lambda r: r.length)
+    assert (usual.size, large.size) == ("usual", "found")
+    assert large.outcome == "named" and "thermal_hysteresis" in large.named_as
+    assert large.probability >= usual.probability
+    assert all((r.outcome == "missed") == (not r.named_as) for r in rows)
+
+
+def test_an_effect_that_no_one_knows_is_no_candidate(tactical, runs):
+    with pytest.raises(InputError, match="there is no such effect"):
+        diagnose(TwinModel(tactical), runs[:1], without=["phlogiston"])
 
 
 def test_dropped_rows_change_nothing_that_is_systematic(tactical):

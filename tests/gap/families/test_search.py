@@ -1,11 +1,18 @@
 """Sets of causes by inner products alone, and what stands in for a name."""
 
+import copy
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from fogml.gap.families import ahead
+from fogml.gap.families.causes import _onset, cards_of
+from fogml.gap.families.closing import Foretold
 from fogml.gap.families.inference import infer
 from fogml.gap.families.places import Scene
-from fogml.gap.families.posterior import judge
+from fogml.gap.families.posterior import _likeliest, judge
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.unknown import _decay, unknown_families
 from fogml.gap.twin_model import TwinModel
@@ -44,6 +51,52 @@ def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
     (cause,) = judge(found).causes
     assert cause.odds <= np.log(cause.evidence / (1.0 - cause.evidence)) + 1e-9
     assert cause.probability == pytest.approx(1.0 / (1.0 + np.exp(-priors.trusted(cause.odds))))
+
+
+def test_a_cause_acts_since_it_left_a_trace(found):
+    """Its course in the first run and a half of the second taken out of the data: it begins there."""
+    best = found.explanations[0]
+    every = Foretold.of(found, best.members, best.members)
+    (cause,) = judge(found).causes
+    assert _onset(found, every, cause) is None
+    courses = [sum(every.of_member(i, m) for m in cause.members) for i in range(2)]
+    half = len(courses[1]) // 2
+    courses[1] = np.where(np.arange(len(courses[1])) < half, courses[1], 0.0)
+    later = copy.copy(found.field)
+    later.base = replace(later.base, data=later.base.data - later.whitening.stacked(courses))
+    onset = _onset(SimpleNamespace(setting=found.setting, field=later), every, cause)
+    assert onset.run == found.setting.scene.runs[1].run.name
+    assert onset.time_s == pytest.approx(found.setting.scene.runs[1].time_s[half], abs=300.0)
+
+
+def test_a_name_among_several_that_are_alike_counts_for_all(found):
+    """Two sets with a name, each less likely than the one without, together more likely."""
+    named = found.explanations[0]
+    none = replace(named, members=())
+    one, other = (replace(named, log_prior=named.log_prior - less) for less in (0.3, 0.4))
+    assert _likeliest(found, [none, one, other]) is one
+    assert _likeliest(found, [none, one]) is none
+
+
+def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(found, monkeypatch):
+    judged = judge(found)
+    item = SimpleNamespace(
+        effect="thermal_hysteresis", named=True, members=("thermal_hysteresis", "glass_transition")
+    )
+    asked = {}
+
+    def told(twin, noise, constants, members, **rest):
+        asked.update(members=members, **rest)
+        return "a run"
+
+    monkeypatch.setattr(ahead, "separating_run", told)
+    assert ahead.next_run(found, judged, [item], (), 3, print) == "a run"
+    assert [m.id for m in asked["members"]] == list(item.members)
+    own, other = asked["members"]
+    assert own.amplitude == pytest.approx(cards_of(found, judged)[own.id].value.amplitude)
+    assert other.amplitude != 0.0
+    alone = SimpleNamespace(effect="thermal_hysteresis", named=True, members=("thermal_hysteresis",))
+    assert ahead.next_run(found, judged, [alone], (), 3, print) is None
 
 
 def test_noise_beside_what_was_found_is_the_twins(found):

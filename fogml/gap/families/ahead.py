@@ -1,0 +1,132 @@
+"""What lies ahead: the run that would tell more, and what these runs would name of each candidate."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from fogml.gap.families.card import card_of
+from fogml.gap.families.inference import Inference
+from fogml.gap.families.posterior import Judgement
+from fogml.gap.how_far_result import Rehearsed
+from fogml.gap.model import EffectValue
+from fogml.gap.result import NAMED, Found, SeparatingRun
+from fogml.gap.separating import separating_run
+from fogml.gap.shapes import corners
+from fogml.gap.showing import showing_run
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import NoiseEffect
+from fogml.twin.registry import effect
+
+MOST_MEMBERS = 4
+"""Members of a class that a programme is looked for."""
+MOST_PROGRAMMES = 200
+"""Programmes that are tried; `fogml plan` tries three times as many."""
+FORMS = ("usual", "low", "high")
+"""Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
+
+
+def next_run(
+    found: Inference,
+    judged: Judgement,
+    items: Sequence[Found],
+    undetectable: Sequence[str],
+    seed: int,
+    tell: Callable[[str], None],
+) -> SeparatingRun | None:
+    """The programme that tells the members of the most probable class of several apart.
+
+    Where each named effect stands alone, the one that shows what these runs could not. None where there is
+    nothing to tell, or no programme does.
+    """
+    setting = found.setting
+    twin, noise = found.model.twin, found.field.whitening.noise
+    facts = setting.scene.runs[0].run.facts
+    open_ = next((f for f in items if f.named and len(f.members) > 1), None)
+    if open_ is None:
+        if not undetectable:
+            return None
+        return showing_run(twin, noise, setting.values, undetectable, seed=seed, progress=tell, facts=facts)
+    members = _members(found, judged, open_)
+    if len(members) < 2:
+        return None
+    return separating_run(
+        twin,
+        noise,
+        setting.values,
+        members,
+        seed=seed,
+        progress=tell,
+        facts=facts,
+        most=MOST_PROGRAMMES,
+    )
+
+
+def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectValue]:
+    """Members of a class as each would be in the other's place."""
+    cause = next(c for c in judged.causes if c.ids[0] == item.effect)
+    others = [m for m in judged.best.members if m not in cause.members]
+    beside = found.field.beside([(m.node, m.size) for m in others])
+    best = {found.columns.families[f].id: m for f, m in found.search.best_members(others).items()}
+    values = []
+    for id in item.members[:MOST_MEMBERS]:
+        if id in best:
+            shape = found.columns.nodes[best[id].node].shape
+            values.append(card_of(id, found.setting, found.field, beside, shape).value)
+    return [v for v in values if v.amplitude != 0.0]
+
+
+def rehearse(
+    found: Inference, items: Sequence[Found], cost_of_false_name: float = 1.0
+) -> tuple[Rehearsed, ...]:
+    """What a diagnosis of these runs would name, miss or mistake if one candidate acted alone.
+
+    Each is put into replays of these very runs, at its usual size and, if it was found, at that, in several
+    forms. The data are what it is expected to make, without noise (G. Cowan et al., Eur. Phys. J. C 71 (2011)
+    1554), judged beside the constants by the evidence of one cause.
+    """
+    setting = found.setting
+    grade = setting.scene.grade
+    sizes = {f.effect: abs(f.amplitude.value) for f in items if f.named}
+    rows = []
+    for f in found.search.families_of("known"):
+        declared = effect(found.columns.families[f].id)
+        if isinstance(declared, NoiseEffect) and not declared.steady:
+            continue
+        usual = declared.amplitude.typical(grade)  # type: ignore[arg-type]
+        asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
+        for form, shape in zip(FORMS, corners(declared, grade)):
+            response = _response(found, declared.id, shape)
+            for size, amplitude in asked:
+                rows.append(_judged(found, f, form, size, amplitude * response, cost_of_false_name))
+            if not declared.shape:
+                break
+    return tuple(rows)
+
+
+def _response(found: Inference, id: str, shape: dict[str, float]) -> FloatArray:
+    """Whitened response of an effect to a unit of its amplitude on the fit runs."""
+    scene = found.setting.scene
+    bare = {name: value for name, value in shape.items() if name in {q.name for q in effect(id).shape}}
+    parts = [r.response(effect(id), bare, None, found.setting.values) for r in scene.runs[: scene.fitted]]
+    return found.field.whitening.stacked(parts)
+
+
+def _judged(found: Inference, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
+    search, priors, families = found.search, found.setting.priors, found.columns.families
+    basis = found.field.base.basis
+    length = math.sqrt(max(float(data @ data) - float(np.sum((basis.T @ data) ** 2)), 0.0))
+    scores = search.alone_on(data)
+    known = {f: s for f, s in scores.items() if families[f].kind == "known"}
+    best = max(known, key=known.__getitem__)
+    alike = sorted((f for f in known if known[f] > known[best] - priors.exchange), key=lambda f: -known[f])
+    own = float(np.logaddexp.reduce([known[f] for f in alike]))
+    rest = float(np.logaddexp.reduce([0.0, *(s for f, s in scores.items() if f not in alike)]))
+    odds = priors.trusted(own - rest) - math.log(cost)
+    probability = 1.0 / (1.0 + math.exp(-min(max(odds, -500.0), 500.0)))
+    named = probability >= NAMED
+    outcome = "missed" if not named else "named" if family in alike else "mistaken"
+    members = tuple(families[f].id for f in alike) if named else ()
+    return Rehearsed(families[family].id, form, size, length, outcome, members, probability)
