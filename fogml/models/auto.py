@@ -2,8 +2,8 @@
 
 Simple candidates are scored on averages of the training runs: blocks of their time are held out, and
 where there are several, each run in turn as well; `fogml.models.score.choose` picks one of them. It, a
-cubic in temperature and the mixed-effects model with its memories are then weighed on runs, halves of
-runs and directions left out, and combined (`fogml.models.combination`); what is held out is limited to
+cubic in temperature and the mixed-effects model with its memories are then weighed on runs left out, or
+else on blocks of one run, and combined (`fogml.models.weights`); what is held out is limited to
 the box of the rows fitted to, as in use. The weights' sum is the skill that left-out parts confirm, down
 to no compensation. A network is no part of a sum: it is taken alone, where the runs hold enough rates of
 temperature and it leaves clearly less than the others together.

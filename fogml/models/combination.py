@@ -1,19 +1,7 @@
-r"""Several linear descriptions of one drift, weighed on what is left out, and combined.
+r"""Several linear descriptions of one drift, fitted without parts of the training runs, and combined.
 
 Left out in turn are whole runs, halves of each run, either direction of temperature, and shorter blocks of
-time. With predictions :math:`p_m` of the members and outputs z on a part left out, all less the mean of the
-rows fitted to, the weights are
-
-.. math:: \min_{w \ge 0,\ \sum w = 1}\ \operatorname{mean}_\text{parts}
-          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\min_m \overline{(z - p_m)^2}}
-          + \kappa \sum_m (w_m - \bar w)^2,
-
-stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie, times
-the skill :math:`\sum \overline{pz} / \sum \overline{p^2}` of their sum p within 0 and 1: no compensation is
-its limit 0. Where temperature moves both ways, runs and blocks of time are asked: a half or a direction left
-out says how a fit of the rest goes on, which is not how a fit of both does. Where it moves one way only, runs
-and halves are all that there is. Of several runs the skill is asked of those left out alone: parts of a run
-are told by the rest of it whatever it is that moved the drift, time included.
+time; `fogml.models.weights` weighs what members predict of them.
 """
 
 from __future__ import annotations
@@ -22,11 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
-from statistics import NormalDist
 from typing import Protocol
 
 import numpy as np
-from scipy.optimize import minimize
 
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
@@ -34,7 +20,6 @@ from fogml.features.parse import parse_features
 from fogml.features.terms import Term
 from fogml.models.box import distance_outside, learn_box
 from fogml.models.folds import Fold, time_folds
-from fogml.models.intervals import LEVELS, Intervals
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import MixedEffects, linear_regressor
 from fogml.models.regressors import goes_on_linearly, predict_rows, refit
@@ -42,17 +27,8 @@ from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 from fogml.signals.memory import Beyond
 
-UNSEEN_SHIFT = 2.0**0.5
-"""Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken
-to have the variance of what is left within it."""
 LEAST_WEIGHT = 0.02
 """Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
-DRAWN_TOGETHER = 0.02
-"""Weight kappa of equal weights, against squared errors as shares of the best member's."""
-WIDENING_PER_SPAN = 1.0
-"""Growth of the half-width per box span outside the box, as a share of itself: errors of parts left out that
-lie outside the box of the rest are compared with those inside at this ratio (development data: the shipped
-thermal cycle, simulated tactical units)."""
 BLOCKS = 10
 """Folds of blocks of time."""
 LEAST_ROWS = 10
@@ -181,6 +157,13 @@ def left_out(
     return found
 
 
+def temperatures_of(table: TrainingTable, features: Features) -> FloatArray:
+    """T [degC] of averages of atoms; of the first column where T is not among them."""
+    values = [i for i, atom in enumerate(features.atoms) if atom.operator == "value"]
+    named = [i for i in values if features.atoms[i].signal.text == "T"]
+    return table.X[:, (named or values or [0])[0]]
+
+
 def _bounded(
     features: Features, rest: FloatArray, part: FloatArray
 ) -> tuple[Features, FloatArray, FloatArray]:
@@ -200,104 +183,6 @@ def _bounded(
             values_of[:, i] = beyond.push(values_of[:, values], values_of[:, values])[0]
     terms = [Term(tuple((moved.get(a, a), power) for a, power in t.factors)) for t in features.terms]
     return Features.from_terms(terms) if moved else parse_features(features.text), rest, part
-
-
-def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> FloatArray:
-    """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none.
-
-    Parameters
-    ----------
-    parts
-        What members predict of each part.
-    members
-        Their number m.
-    both_ways
-        Whether temperature moves both ways in training.
-    """
-    equal = np.full(members, 1.0 / members)
-    asked = [part for part in parts if part.kind in ("runs", "blocks" if both_ways else "halves")]
-    kinds = [part.kind for part in asked]
-    square, product = DRAWN_TOGETHER * (np.eye(members) - 1.0 / members), np.zeros(members)
-    for part in asked:
-        least = float(np.mean((part.told[:, None] - part.predicted) ** 2, axis=0).min())
-        if least > 0.0:
-            share = 1.0 / (len(part.told) * least * kinds.count(part.kind) * len(set(kinds)))
-            square = square + share * part.predicted.T @ part.predicted
-            product = product + share * part.predicted.T @ part.told
-    size = max(float(np.trace(square)), 1e-300)
-    found = minimize(
-        lambda w: ((0.5 * w @ square @ w - product @ w) / size, (square @ w - product) / size),
-        equal,
-        jac=True,
-        method="SLSQP",
-        bounds=[(0.0, 1.0)] * members,
-        constraints=[{"type": "eq", "fun": lambda w: w.sum() - 1.0, "jac": lambda w: np.ones(members)}],
-    )
-    weights = np.clip(np.asarray(found.x), 0.0, 1.0)
-    weights = np.where(weights < LEAST_WEIGHT, 0.0, weights)
-    weights /= weights.sum()
-    return weights * skill_of([part for part in asked if part.kind == "runs"] or asked, weights)
-
-
-def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
-    r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
-
-    With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is
-    :math:`\sum \overline{p z} / \sum \overline{p^2}`: the least-squares factor, each part counting alike.
-    """
-    sums = [(part.predicted @ weights, part.told) for part in parts]
-    product = sum(float(np.mean(predicted * told)) for predicted, told in sums)
-    square = sum(float(np.mean(predicted * predicted)) for predicted, _ in sums)
-    if not square > 0.0:
-        return 1.0
-    skill = float(np.clip(product / square, 0.0, 1.0))
-    return skill if skill >= LEAST_WEIGHT else 0.0
-
-
-def intervals_of(
-    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, both_ways: bool
-) -> Intervals:
-    """Half-widths from what is left on the parts left out: of each kind of part, the widest.
-
-    Of one run they are widened for the shift to the next, `UNSEEN_SHIFT`.
-
-    Errors are taken relative to how the half-width grows outside the box, so that the half-width inside it is
-    told by parts that had to be told from elsewhere too.
-
-    Parameters
-    ----------
-    parts, weights
-        What members predict of each part, and their weights, shape (m,).
-    table
-        The averages.
-    both_ways
-        Whether temperature moves both ways in training; else nothing can be verified of the way back, and
-        the interval is at least as wide as the drift that the runs hold.
-    """
-    kinds = dict.fromkeys(part.kind for part in parts)
-    half = np.max([np.zeros(len(LEVELS)), *(_quantiles(parts, weights, kind) for kind in kinds)], axis=0)
-    if not both_ways or not parts:
-        drift = float(table.y.std())
-        half = np.maximum(half, [drift * NormalDist().inv_cdf(0.5 + level / 2.0) for level in LEVELS])
-    if "runs" not in kinds:
-        half = UNSEEN_SHIFT * half
-    told = f"{' and '.join(kinds)} left out" if kinds else "none"
-    averaging_s, half_widths = float(table.averaging_s), tuple(half.tolist())
-    return Intervals(averaging_s, half_widths, len(table), told, LEVELS, WIDENING_PER_SPAN)
-
-
-def _quantiles(parts: Sequence[LeftOut], weights: FloatArray, kind: str) -> FloatArray:
-    """Quantiles at `LEVELS` of what is left on the parts of a kind [deg/h], each part counting alike."""
-    lefts = [
-        np.abs(part.told - part.predicted @ weights) / (1.0 + WIDENING_PER_SPAN * part.excess)
-        for part in parts
-        if part.kind == kind
-    ]
-    sizes = np.concatenate(lefts)
-    shares = np.concatenate([np.full(len(left), 1.0 / (len(left) * len(lefts))) for left in lefts])
-    order = np.argsort(sizes)
-    places = np.searchsorted(np.cumsum(shares[order]), np.array(LEVELS) - 1e-9)
-    return np.asarray(sizes[order][np.minimum(places, len(sizes) - 1)])
 
 
 def combined(

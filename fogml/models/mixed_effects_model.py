@@ -15,17 +15,17 @@ from fogml.features.signal import TIME_ON, held_by
 from fogml.models.combination import (
     SharedMember,
     combined,
-    intervals_of,
     left_out,
     left_out_parts,
-    weights_of,
+    temperatures_of,
 )
 from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.intervals import Intervals
 from fogml.models.mixed_effects import fit_mixed_effects
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
-from fogml.runs.run import FloatArray, Run
+from fogml.models.weights import intervals_of, weights_of
+from fogml.runs.run import Run
 
 AVERAGES = 240
 """Averages that the model is fitted to: enough for some twenty coefficients, a quarter of a second a fit."""
@@ -79,7 +79,8 @@ class MixedEffectsModel(FeatureModel):
         table = averages_of(rows)
         self.fitted_ = fit_mixed_effects(composed(table, features), features.terms)
         T = temperatures_of(table, features)
-        parts = left_out([SharedMember(features, self.fitted_)], features, table, left_out_parts(table, T))
+        member = SharedMember(features, self.fitted_)
+        parts = left_out([member], features, table, left_out_parts(table, T))
         weights = weights_of(parts, 1, self._both_ways)
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
@@ -107,13 +108,6 @@ def averages_of(rows: Sequence[RunRows]) -> TrainingTable:
 def composed(table: TrainingTable, features: Features) -> TrainingTable:
     """Averages of features, of those of their atoms."""
     return replace(table, X=features.compose(table.X))
-
-
-def temperatures_of(table: TrainingTable, features: Features) -> FloatArray:
-    """T [degC] of averages of atoms; of the first column where T is not among them."""
-    values = [i for i, atom in enumerate(features.atoms) if atom.operator == "value"]
-    named = [i for i in values if features.atoms[i].signal.text == "T"]
-    return table.X[:, (named or values or [0])[0]]
 
 
 def offered(runs: Sequence[Run]) -> Features:

@@ -23,18 +23,18 @@ from fogml.models.combination import (
     Member,
     SharedMember,
     combined,
-    intervals_of,
     left_out,
     left_out_parts,
-    weights_of,
+    temperatures_of,
 )
 from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
-from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features, temperatures_of
+from fogml.models.mixed_effects_model import averages_of, composed, offered, static_features
 from fogml.models.table import TrainingTable, run_rows
 from fogml.models.trial import fit_candidate
+from fogml.models.weights import intervals_of, weights_of
 from fogml.runs.run import FloatArray, Run
 
 CLEARLY = 0.95

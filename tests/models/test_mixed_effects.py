@@ -7,13 +7,14 @@ import pytest
 from scipy.optimize import approx_fprime
 
 from fogml.features.features import Features
-from fogml.models.combination import LeftOut, skill_of, weights_of
+from fogml.models.combination import LeftOut
 from fogml.models.directions import moves_both_ways
 from fogml.models.folds import dealt_blocks
 from fogml.models.mixed_effects import SizePriors, fit_mixed_effects
 from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.models.table import TrainingTable
+from fogml.models.weights import skill_of, weights_of
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from tests.models.test_memory_features import made_run

@@ -1,0 +1,166 @@
+r"""Weights of descriptions of one drift, and their interval, by what is left on parts left out.
+
+With predictions :math:`p_m` of the members and outputs z on a part left out, all less the mean of the
+rows fitted to, the weights are
+
+.. math:: \min_{w \ge 0,\ \sum w = 1}\ \operatorname{mean}_\text{parts}
+          \frac{\overline{(z - \sum_m w_m p_m)^2}}{\min_m \overline{(z - p_m)^2}}
+          + \kappa \sum_m (w_m - \bar w)^2,
+
+stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie, times
+the skill :math:`\sum \overline{pz} / \sum \overline{p^2}` of their sum p within 0 and 1: no compensation is
+its limit 0. Of several runs those left out alone are asked: parts of a run are told by the rest of it
+whatever it is that moved the drift, time included. Of one run blocks of time are asked where its temperature
+moves both ways, as a half or a direction left out says how a fit of the rest goes on, which is not how a fit
+of both does; else halves, which are all that there is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from statistics import NormalDist
+
+import numpy as np
+from scipy.optimize import minimize
+from scipy.stats import t as student
+
+from fogml.models.combination import LEAST_WEIGHT, LeftOut
+from fogml.models.intervals import LEVELS, Intervals
+from fogml.models.table import TrainingTable
+from fogml.runs.run import FloatArray
+
+UNSEEN_SHIFT = 2.0**0.5
+"""Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken
+to have the variance of what is left within it."""
+DRAWN_TOGETHER = 0.02
+"""Weight kappa of equal weights, against squared errors as shares of the best member's."""
+WIDENING_PER_SPAN = 1.0
+"""Growth of the half-width per box span outside the box, as a share of itself: errors of parts left out that
+lie outside the box of the rest are compared with those inside at this ratio (development data: the shipped
+thermal cycle, simulated tactical units)."""
+
+
+def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> FloatArray:
+    """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none.
+
+    Parameters
+    ----------
+    parts
+        What members predict of each part.
+    members
+        Their number m.
+    both_ways
+        Whether temperature moves both ways in training.
+    """
+    equal = np.full(members, 1.0 / members)
+    asked = asked_of(parts, both_ways)
+    square, product = DRAWN_TOGETHER * (np.eye(members) - 1.0 / members), np.zeros(members)
+    for part in asked:
+        least = float(np.mean((part.told[:, None] - part.predicted) ** 2, axis=0).min())
+        if least > 0.0:
+            share = 1.0 / (len(part.told) * least * len(asked))
+            square = square + share * part.predicted.T @ part.predicted
+            product = product + share * part.predicted.T @ part.told
+    size = max(float(np.trace(square)), 1e-300)
+    found = minimize(
+        lambda w: ((0.5 * w @ square @ w - product @ w) / size, (square @ w - product) / size),
+        equal,
+        jac=True,
+        method="SLSQP",
+        bounds=[(0.0, 1.0)] * members,
+        constraints=[{"type": "eq", "fun": lambda w: w.sum() - 1.0, "jac": lambda w: np.ones(members)}],
+    )
+    weights = np.clip(np.asarray(found.x), 0.0, 1.0)
+    weights = np.where(weights < LEAST_WEIGHT, 0.0, weights)
+    weights /= weights.sum()
+    return weights * skill_of(asked, weights)
+
+
+def asked_of(parts: Sequence[LeftOut], both_ways: bool) -> list[LeftOut]:
+    """Parts that tell what is left on another run: runs left out, else blocks, or halves of one way."""
+    runs = [part for part in parts if part.kind == "runs"]
+    return runs or [part for part in parts if part.kind == ("blocks" if both_ways else "halves")]
+
+
+def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
+    r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
+
+    With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is
+    :math:`\sum \overline{p z} / \sum \overline{p^2}`: the least-squares factor, each part counting alike.
+    """
+    sums = [(part.predicted @ weights, part.told) for part in parts]
+    product = sum(float(np.mean(predicted * told)) for predicted, told in sums)
+    square = sum(float(np.mean(predicted * predicted)) for predicted, _ in sums)
+    if not square > 0.0:
+        return 1.0
+    skill = float(np.clip(product / square, 0.0, 1.0))
+    return skill if skill >= LEAST_WEIGHT else 0.0
+
+
+def intervals_of(
+    parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, both_ways: bool
+) -> Intervals:
+    r"""Half-widths from what is left on runs left out; of one run on its parts, widened.
+
+    What is left on a run is mostly shifted as a whole, so K runs are K observations. At a level
+    :math:`p \le K/(K+1)` the half-width is conformal: the quantile of what is left where each run holds the
+    share 1/(K + 1) and the rest lies at infinity (hierarchical conformal prediction: Lee, Barber & Willett,
+    "Distribution-free inference with hierarchical data", 2023). Above it is Student's quantile with K degrees
+    of freedom times the rms of the runs. Of one run it is the widest of the kinds of its parts times
+    `UNSEEN_SHIFT`.
+
+    There errors are taken relative to how the half-width grows outside the box, as a half or a direction left
+    out lies outside of the rest; runs left out count as they are.
+
+    Parameters
+    ----------
+    parts, weights
+        What members predict of each part, and their weights, shape (m,).
+    table
+        The averages.
+    both_ways
+        Whether temperature moves both ways in training; else nothing can be verified of the way back, and
+        the variance of the drift that the runs hold is added.
+    """
+    kinds = list(dict.fromkeys(part.kind for part in parts))
+    if "runs" in kinds:
+        runs = [part for part in parts if part.kind == "runs"]
+        kinds, half = ["runs"], _of_runs([np.abs(part.told - part.predicted @ weights) for part in runs])
+    else:
+        widest = [_quantiles(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
+        half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)
+    if not both_ways or not parts:
+        drift = float(table.y.std())
+        back = np.array([drift * NormalDist().inv_cdf(0.5 + level / 2.0) for level in LEVELS])
+        half = np.hypot(half, back if "runs" in kinds else UNSEEN_SHIFT * back)
+    told = f"{' and '.join(kinds)} left out" if kinds else "none"
+    averaging_s, half_widths = float(table.averaging_s), tuple(half.tolist())
+    return Intervals(averaging_s, half_widths, len(table), told, LEVELS, WIDENING_PER_SPAN)
+
+
+def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str) -> list[FloatArray]:
+    """Sizes of what is left on each part of a kind [deg/h], relative to how the half-width grows."""
+    return [
+        np.abs(part.told - part.predicted @ weights) / (1.0 + WIDENING_PER_SPAN * part.excess)
+        for part in parts
+        if part.kind == kind
+    ]
+
+
+def _of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
+    """Half-widths at `LEVELS` from what is left on each of K runs [deg/h]."""
+    count, levels = len(lefts), np.array(LEVELS)
+    rms = float(np.sqrt(np.mean([np.mean(left**2) for left in lefts])))
+    conformal = _quantiles(lefts, np.minimum(levels * (count + 1) / count, 1.0))
+    normal = rms * student.ppf(0.5 + levels / 2.0, count)
+    half = np.where(levels <= count / (count + 1), conformal, normal)
+    return np.asarray(np.maximum.accumulate(half))
+
+
+def _quantiles(lefts: Sequence[FloatArray], levels: FloatArray) -> FloatArray:
+    """Quantiles of what is left on parts [deg/h], each part counting alike."""
+    sizes = np.concatenate(lefts)
+    shares = np.concatenate([np.full(len(left), 1.0 / (len(left) * len(lefts))) for left in lefts])
+    order = np.argsort(sizes)
+    places = np.searchsorted(np.cumsum(shares[order]), levels - 1e-9)
+    return np.asarray(sizes[order][np.minimum(places, len(sizes) - 1)])
