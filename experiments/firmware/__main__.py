@@ -7,9 +7,6 @@
 from __future__ import annotations
 
 import argparse
-import ctypes
-import subprocess
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,98 +14,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from experiments.firmware.units import FEATURES, NOISE_DEGC, Unit, blocks, temperatures, trained_model
 from experiments.results import write_results
-from experiments.synthetic_world import World, cycle
 from fogml import __version__
-from fogml.export.c_program import FLAGS, cortex_m4_size, host_compiler
-from fogml.export.c_source import C_DTYPES, CSource, c_source
-from fogml.export.check import expected_outputs
-from fogml.export.instructions import instructions_per_sample
+from fogml.export.c_source import C_DTYPES, c_source
 from fogml.export.plan import Plan
 from fogml.models.base import DriftModel
 from fogml.models.compensation import compensate_blocks
-from fogml.models.names import make_model
 from fogml.runs.dropouts import RULE
 from fogml.runs.run import Run
 
 HERE = Path(__file__).parent
 FloatArray = NDArray[np.float64]
-FEATURES = "T^1..3, dT, T*dT"
 _SIZES = ("ram_bytes", "flash_bytes", "instructions_per_sample")
-_BLOCK = 1 << 19
-_STEP = 1.0 / 256.0
-_NOISE_DEGC = 0.005
 SENTINELS = (-127.0, 85.0, 0.0, 999.0, -9999.0, np.nan)
 """What thermometers show that are cut off, starting or shorted [degC]."""
-_FEEDER = """
-#include "fogml_model.c"
-void feed(fogml_state *state, int64_t count, uint64_t start_us, uint64_t step_us, const {T} *temperatures,
-          const {G} *gyro, {G} *out, int8_t *flag)
-{{
-    int64_t i;
-    for (i = 0; i < count; i++) {{
-        fogml_time time_us = (fogml_time)(start_us + (uint64_t)i * step_us);
-        flag[i] = (int8_t)fogml_step(state, time_us, &temperatures[i], gyro[i], &out[i]);
-    }}
-}}
-unsigned long state_bytes(void) {{ return sizeof(fogml_state); }}
-"""
-_NUMPY = {"double": "f8", "float": "f4", "int32_t": "i4", "int16_t": "i2"}
-
-
-class Unit:
-    """Compiled C with a state of its own."""
-
-    def __init__(self, source: CSource, *flags: str) -> None:
-        self._numbers, self.dtype = source.numbers, source.dtype
-        kinds = {"T": source.numbers["temperature_type"], "G": source.numbers["gyro_type"]}
-        self._kinds = {name: np.dtype(_NUMPY[kind]) for name, kind in kinds.items()}
-        self._folder = tempfile.TemporaryDirectory()
-        folder = Path(self._folder.name)
-        source = source.with_expected(*expected_outputs(source, folder))
-        for name, text in {**source.files, "feed.c": _FEEDER.format(**kinds)}.items():
-            (folder / name).write_text(text, encoding="utf-8")
-        self.size = cortex_m4_size(source, folder)
-        if self.size is not None:
-            self.size["instructions_per_sample"] = instructions_per_sample(source, folder)
-        words = [host_compiler(), *FLAGS, *flags, "-shared", "-fPIC", "-o", str(folder / "unit.so")]
-        subprocess.run([*words, str(folder / "feed.c")], check=True)
-        self._library = ctypes.CDLL(str(folder / "unit.so"))
-        self._state = ctypes.create_string_buffer(self._library.state_bytes())
-        self._library.fogml_init(self._state)
-        self.self_test = int(self._library.fogml_self_test())
-
-    def feed(self, start_us: int, step_us: int, T: FloatArray, gyro: FloatArray) -> tuple[FloatArray, Any]:
-        """Outputs [deg/h] and flags of samples."""
-        fixed = self._numbers["fixed"]
-        unit = 1.0
-        if fixed:
-            unit = fixed["compensated_value"]
-            T = np.nan_to_num(T / fixed["temperature_value"], nan=-1e30)
-            info = np.iinfo(self._kinds["T"])
-            T, gyro = np.clip(np.round(T), info.min, info.max), np.round(gyro / fixed["gyro_value"])
-        temperatures, output = T.astype(self._kinds["T"]), gyro.astype(self._kinds["G"])
-        out, flag = np.empty(len(T), self._kinds["G"]), np.empty(len(T), np.int8)
-        places = [a.ctypes.data_as(ctypes.c_void_p) for a in (temperatures, output, out, flag)]
-        start = ctypes.c_uint64(start_us % (1 << 64))
-        self._library.feed(self._state, ctypes.c_int64(len(T)), start, ctypes.c_uint64(step_us), *places)
-        return out.astype(np.float64) * unit, flag
-
-
-def temperatures(time: FloatArray, seed: int) -> FloatArray:
-    """A unit's days [degC]: a day's course, hours of load, minutes of a fan; read in steps with noise."""
-    T = 22.0 + 12.0 * np.sin(time / 86400.0 * 2.0 * np.pi) + 6.0 * np.sin(time / 5100.0)
-    T += 0.6 * np.sin(time / 410.0)
-    noise = np.random.default_rng([seed, len(time), int(time[0])]).standard_normal(len(time))
-    return np.round((T + _NOISE_DEGC * noise) / _STEP) * _STEP
-
-
-def blocks(seconds: float, sample_s: float, seed: int) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Times and temperatures of a recording, block by block."""
-    count = round(seconds / sample_s)
-    for low in range(0, count, _BLOCK):
-        time = sample_s * np.arange(low, min(low + _BLOCK, count))
-        yield time, temperatures(time, seed)
 
 
 def beside_the_model(
@@ -183,11 +103,7 @@ def main() -> int:
     parser.add_argument("--days-1-hz", type=float, default=365.0)
     parser.add_argument("--samples", type=int, default=1_000_000)
     asked = parser.parse_args()
-    world = World(noise=0.1)
-    rates = np.concatenate([cycle(rate) for rate in (0.5, 1.0, 2.0)])
-    trained, _ = world.run(rates, 1.0, 1, "train.csv")
-    columns = {"time": trained.time, "gyro": trained.gyro, "T": trained.columns["T_in"]}
-    model = make_model("polynomial", FEATURES).fit(Run("train.csv", columns))
+    model = trained_model()
     half_width = float(model.intervals_.half_width(0.9))
     cases: dict[str, Any] = {}
     for name, seconds, sample_s, dtypes, flags in (
@@ -222,7 +138,7 @@ def _page(result: dict[str, Any]) -> str:
         "# Exported C over days, a year and a million samples with faults",
         "",
         f"Synthetic. Model: polynomial of {result['features']} with one thermometer, which shows steps of "
-        f"1/256 °C with {_NOISE_DEGC * 1e3:g} m°C of noise; its 90 % half-width is "
+        f"1/256 °C with {NOISE_DEGC * 1e3:g} m°C of noise; its 90 % half-width is "
         f"{result['half_width_90_deg_h']:.3g} deg/h. Clocks begin at Unix time in microseconds; at 1 Hz they "
         "are 32-bit and wrap every 71.6 minutes. Sizes are bytes on a Cortex-M4 (arm-none-eabi-gcc -Os), "
         "instructions those of its code for one sample (-O2), counted in an emulator.",

@@ -82,6 +82,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "slice_inputs": slice_inputs(plan, scales.atoms),
         "real": "int64_t",
         "suffix": "",
+        "zero": "0",
         "temperature_type": "int16_t" if dtype == "q15" else "int32_t",
         "gyro_type": "int32_t",
         "atom_type": "int32_t",
@@ -314,10 +315,11 @@ def _network_constants(plan: Plan, scales: Scales, stored: str) -> list[str]:
         *array("INVERSE_WIDTH", np.round(inverse * 2.0**bits), "int", "[CENTRES][INPUTS]", stored),
         *array("WIDTH_SHIFT", shift, "int", "[INPUTS]", "int"),
         *array("WEIGHT", np.round(arrays["weights"] * 2.0**scales.weight_bits), "int", "[CENTRES]", stored),
-        f"#define WEIGHT_SPARE {spare}",
+        f"#define BASIS_SHIFT {30 - spare}",
         f"#define WEIGHT_SHIFT {scales.weight_bits + spare - scales.drift}",
     ]
     if plan.edge_columns:
+        lines.append(f"#define SLOPE_SHIFT {scales.weight_bits + spare - scales.drift + 19}")
         steps = 2.0 ** scales.columns[list(plan.edge_columns)]
         lines += [
             "",

@@ -75,6 +75,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "slice_inputs": slice_inputs(plan),
         "real": real,
         "suffix": suffix,
+        "zero": "0.0" + suffix,
         "second_us": number(1e-6),
         "temperature_type": real,
         "gyro_type": real,

@@ -102,6 +102,10 @@ class CProgram:
         """What ``fogml_self_test`` returns."""
         return self._done("self-test").status
 
+    def state_bytes(self) -> int:
+        """Bytes of a state, as of every machine that aligns 64-bit numbers to 8 bytes."""
+        return int(np.frombuffer(self._run("bytes", b""), dtype="<u4")[0])
+
     def steps(
         self, time: Any, temperatures: Any, gyro: Any, power_cycle: tuple[int, int] | None = None
     ) -> tuple[NDArray[Any], NDArray[np.int32]]:

@@ -199,7 +199,7 @@ def _clock_constants(windows: Layout, sample_s: float) -> list[str]:
         lines += [
             f"#define BIN_SAMPLES {windows.bin_samples}",
             f"#define BIN_TICKS {round(ticks)}U /* a sample so long after a bin's first begins the next */",
-            f"#define MOST_IN_BIN {MOST_IN_BIN}",
+            f"#define MOST_IN_BIN {MOST_IN_BIN}U",
         ]
     return [CCode(line) for line in lines]
 

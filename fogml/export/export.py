@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fogml import __version__
 from fogml.errors import InputError
-from fogml.export.c_program import CProgram, cortex_m4_size
+from fogml.export.c_program import CProgram, cortex_m4_size, write_files
 from fogml.export.c_source import c_source, number_of
 from fogml.export.card import card_lines, export_card
 from fogml.export.check import (
@@ -29,6 +29,7 @@ from fogml.export.layout import layout
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
 from fogml.export.plan import Plan
 from fogml.export.points import box_points
+from fogml.export.project_files import RUST_FILE, project_files, rust_bindings
 from fogml.export.prune import pruned
 from fogml.export.settings import SCHEMA, ExportSettings, check_settings, hold_within, tolerance_of
 from fogml.export.sklearn_graph import export_graph, is_graph_alone
@@ -157,11 +158,15 @@ def _write_c(
         if program.self_test() != 0:
             raise InputError("export: the generated C fails its own self-test on this machine")
         difference = c_difference(plan, source, program, seed)
+        files = {
+            **source.files,
+            **project_files("fogml_model"),
+            RUST_FILE: rust_bindings(source, program.state_bytes()),
+        }
         size = cortex_m4_size(source, Path(scratch))
         if size is not None:
             size["instructions_per_sample"] = instructions_per_sample(source, Path(scratch))
-    for name, text in source.files.items():
-        (folder / name).write_text(text, encoding="ascii")
+    write_files(files, folder)
     fixed = source.numbers["fixed"]
     report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}
     windows = source.layout

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.export.c_program import compiled_output
+from fogml.export.c_program import compiled_output, write_files
 from fogml.export.c_source import templates
+from fogml.export.project_files import project_files
 from fogml.export.segments import Segments
 from fogml.json_files import write_json
 
@@ -85,8 +86,8 @@ def write(
     write_json(folder / JSON_FILE, document, indent=1)
     files = _source(tables, matrix, cards, dtype)
     difference = _difference(files, tables, matrix, dtype)
-    for name in (HEADER, SOURCE):
-        (folder / name).write_text(files[name], encoding="ascii")
+    kept = {name: files[name] for name in (HEADER, SOURCE)}
+    write_files({**kept, **project_files("fogml_segments")}, folder)
     return {axis: {**values, "c_largest_difference": difference} for axis, values in told.items()}
 
 

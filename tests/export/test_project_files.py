@@ -1,0 +1,117 @@
+"""Generated C taken by C++, CMake and Rust, and by the rules of MISRA C:2012 save those listed."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from fogml.export.c_source import c_source
+from fogml.export.export import export_model
+from fogml.export.plan import Plan
+from fogml.export.settings import ExportSettings
+from fogml.export.tables import TableSettings, export_tables
+
+pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+DEVIATIONS = Path(__file__).parents[2] / "docs" / "firmware-misra.md"
+CPP = """
+#include "fogml_model.h"
+int main()
+{
+    fogml_state state;
+    float temperatures[FOGML_TEMPERATURES] = {20.0F};
+    float compensated = 0.0F;
+    fogml_init(&state);
+    const int flag = fogml_step(&state, 0U, temperatures, 7.5F, &compensated);
+    return flag == FOGML_WINDOW_NOT_FULL ? fogml_self_test() : 99;
+}
+"""
+RUST = """
+mod fogml_model;
+use fogml_model::*;
+fn main() {
+    let mut state = State::new();
+    let (mut last, mut flag) = state.step(0, &[20.0], 7.5);
+    assert!(flag == WINDOW_NOT_FULL);
+    for i in 1..200 {
+        (last, flag) = state.step(2_000_000 * i, &[20.0], 7.5);
+    }
+    assert!(flag == GOOD && last.is_finite() && last != 7.5 && self_test());
+}
+"""
+CMAKE = """
+cmake_minimum_required(VERSION 3.13)
+project(unit LANGUAGES C CXX)
+add_subdirectory(model)
+add_executable(unit main.cpp)
+target_link_libraries(unit fogml_model)
+"""
+
+
+def needs(*tools: str) -> None:
+    for tool in tools:
+        if shutil.which(tool) is None:
+            pytest.skip(f"{tool} is not installed")
+
+
+def run(*words: object, folder: Path) -> None:
+    done = subprocess.run(list(map(str, words)), cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+@pytest.fixture(scope="module")
+def exported(model_of, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("exported")
+    export_model(model_of("polynomial"), folder, ExportSettings("c", "float32"))
+    return folder
+
+
+def test_cplusplus_calls_it_through_cmake(exported, tmp_path):
+    needs("cmake", "g++")
+    shutil.copytree(exported, tmp_path / "model")
+    (tmp_path / "main.cpp").write_text(CPP)
+    (tmp_path / "CMakeLists.txt").write_text(CMAKE)
+    strict = "-DCMAKE_CXX_FLAGS=-Wall -Wextra -Wpedantic -Wconversion -Werror"
+    run("cmake", "-S", ".", "-B", "build", strict, folder=tmp_path)
+    run("cmake", "--build", "build", folder=tmp_path)
+    run(tmp_path / "build" / "unit", folder=tmp_path)
+
+
+def test_rust_calls_it(exported, tmp_path):
+    needs("rustc")
+    shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
+    (tmp_path / "main.rs").write_text(RUST)
+    run("gcc", "-std=c99", "-c", "fogml_model.c", "-o", "fogml_model.o", folder=tmp_path)
+    run("rustc", "-C", "link-arg=fogml_model.o", "main.rs", "-o", "unit", folder=tmp_path)
+    run(tmp_path / "unit", folder=tmp_path)
+
+
+def test_a_folder_is_a_library_of_arduino(exported, model_of, tmp_path):
+    export_tables([model_of("polynomial")], tmp_path, TableSettings("segments"))
+    for folder, name in ((exported, "fogml_model"), (tmp_path, "fogml_segments")):
+        lines = (folder / "library.properties").read_text(encoding="ascii").splitlines()
+        held = dict(line.split("=", 1) for line in lines)
+        assert held["name"] == name and held["includes"] == f"{name}.h"
+        assert {"version", "author", "maintainer", "sentence", "category", "architectures"} < held.keys()
+        assert (folder / f"{name}.c").is_file() and not (folder / "src").exists()
+
+
+def violated(folder: Path) -> set[str]:
+    words = ["cppcheck", "--addon=misra", "--std=c99", "--platform=arm32-wchar_t4", "-q", "--template={id}"]
+    done = subprocess.run([*words, "fogml_model.c"], cwd=folder, capture_output=True, text=True, check=True)
+    return set(re.findall(r"misra-c2012-([0-9.]+)", done.stderr))
+
+
+@pytest.mark.parametrize(("name", "dtype", "sample_s"), [("memory", "float32", 0.1), ("rich", "q15", None)])
+def test_misra_rules_hold_save_those_listed(model_of, tmp_path, name, dtype, sample_s):
+    needs("cppcheck")
+    source = c_source(Plan.of(model_of(name), sample_s), dtype, [])
+    for file, text in source.files.items():
+        (tmp_path / file).write_text(text)
+    listed = set(re.findall(r"^\| ([0-9]+\.[0-9]+) ", DEVIATIONS.read_text(), flags=re.MULTILINE))
+    found = violated(tmp_path)
+    assert "8.9" in found, "cppcheck told nothing"
+    assert found <= listed
