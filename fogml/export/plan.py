@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -71,6 +71,12 @@ class Limits:
         """The limits of a model without features."""
         none = np.empty(0)
         return cls(none, none, none, none, none, none, none)
+
+    def of_atoms(self, places: Sequence[int]) -> Limits:
+        """The limits of the atoms at some places alone."""
+        slices = None if self.slices is None else self.slices.of_atoms(places)
+        ends = {name: ends[places] for name, ends in vars(self).items() if name != "slices"}
+        return Limits(**ends, slices=slices)
 
     def apply(self, atoms: FloatArray, heeded: BoolArray, full: BoolArray) -> tuple[FloatArray, BoolArray]:
         """Limited atoms (n, a), and rows outside (n,).

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.export.plan import Limits, Plan
+from fogml.export.plan import Plan
 from fogml.export.storage import design, weight_bytes
 from fogml.features.parse import parse_features
 from fogml.features.terms import composition_plan
@@ -110,14 +110,13 @@ def _with_terms(plan: Plan, names: list[str]) -> Plan:
     """The plan with some of its features, their limits as they were."""
     features = parse_features(", ".join(names))
     places = [plan.atoms.index(atom) for atom in features.atoms]
-    limits = Limits(**{name: values[places] for name, values in vars(plan.limits).items()})
     return replace(
         plan,
         sensors=features.sensors,
         atoms=features.atoms,
         steps=composition_plan(features.terms, features.atoms),
         names=tuple(names),
-        limits=limits,
+        limits=plan.limits.of_atoms(places),
     )
 
 

@@ -9,7 +9,7 @@ which a microcontroller looks up at every sample.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -122,6 +122,17 @@ class Slices:
         slices.low[:, hole] = np.minimum(slices.low[:, after], slices.low[:, before])[:, hole]
         slices.high[:, hole] = np.maximum(slices.high[:, after], slices.high[:, before])[:, hole]
         return slices
+
+    def of_atoms(self, places: Sequence[int]) -> Slices | None:
+        """The slices with the atoms at some places alone; None if no input is left of them."""
+        where = {place: new for new, place in enumerate(places)} | {-1: -1}
+        pairs = zip(self.of, self.less, strict=True)
+        kept = [row for row, (i, j) in enumerate(pairs) if i in where and j in where]
+        if self.level not in where or not kept:
+            return None
+        of, less = (tuple(where[held[row]] for row in kept) for held in (self.of, self.less))
+        level = where[self.level]
+        return replace(self, level=level, of=of, less=less, low=self.low[kept], high=self.high[kept])
 
     def as_dict(self, atoms: Sequence[Atom]) -> dict[str, Any]:
         """JSON-ready values, atoms by their texts."""

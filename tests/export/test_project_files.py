@@ -16,7 +16,7 @@ from fogml.export.settings import ExportSettings
 from fogml.export.tables import TableSettings, export_tables
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
-DEVIATIONS = Path(__file__).parents[2] / "docs" / "firmware-misra.md"
+DEVIATIONS = Path(__file__).parents[2] / "docs" / "firmware-code.md"
 CPP = """
 #include "fogml_model.h"
 int main()

@@ -24,11 +24,14 @@ from fogml.export.settings import ExportSettings
 
 HERE = Path(__file__).parent
 SAMPLE_S = 0.01
-QEMU = ("qemu-system-arm", "-M", "mps2-an386", "-nographic", "-semihosting-config", "enable=on,target=native")
+QEMU = (
+    *("qemu-system-arm", "-M", "mps2-an386", "-display", "none", "-serial", "none", "-monitor", "none"),
+    *("-chardev", "stdio,id=told", "-semihosting-config", "enable=on,target=native,chardev=told"),
+)
 
 
-def built(model: Path, folder: Path, hours: int) -> dict[str, list[str]]:
-    """What runs the unit for so many hours on this machine, and on a Cortex-M4.
+def built(model: Path, folder: Path, samples: int) -> dict[str, list[str]]:
+    """What runs the unit for so many samples on this machine, and on a Cortex-M4.
 
     Parameters
     ----------
@@ -37,7 +40,7 @@ def built(model: Path, folder: Path, hours: int) -> dict[str, list[str]]:
     folder
         Where to compile.
     """
-    flags = [*FLAGS, f"-DHOURS={hours}", "-I", str(model), "-I", str(HERE)]
+    flags = [*FLAGS, f"-DSAMPLES={samples}U", "-I", str(model), "-I", str(HERE)]
     sources = [str(model / "fogml_model.c"), str(HERE / "unit.c")]
     subprocess.run(
         [host_compiler(), *flags, *sources, str(HERE / "report_host.c"), "-o", str(folder / "host")],
@@ -70,10 +73,10 @@ def built(model: Path, folder: Path, hours: int) -> dict[str, list[str]]:
     return {"this machine": [str(folder / "host")], "Cortex-M4": [*QEMU, "-kernel", str(folder / "unit.elf")]}
 
 
-def reports(model: Path, hours: int) -> dict[str, str]:
+def reports(model: Path, samples: int) -> dict[str, str]:
     """What each machine reports."""
     with tempfile.TemporaryDirectory() as name:
-        machines = built(model, Path(name), hours)
+        machines = built(model, Path(name), samples)
         found = {}
         for machine, words in machines.items():
             began = time.monotonic()
@@ -90,7 +93,7 @@ def main() -> int:
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         report = export_model(trained_model(), Path(name), ExportSettings("c", "float32", sample_s=SAMPLE_S))
-        told = reports(Path(name), asked.hours)
+        told = reports(Path(name), round(3600 * asked.hours / SAMPLE_S))
     same = len(set(told.values())) == 1
     figures = dict(line.rsplit(" ", 1) for line in told["Cortex-M4"].splitlines())
     result: dict[str, Any] = {

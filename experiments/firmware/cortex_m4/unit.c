@@ -42,7 +42,7 @@ int main(void)
         return 1;
     }
     fogml_init(&state);
-    for (sample = 0; sample < HOURS * HOUR; sample++) {
+    for (sample = 0; sample < SAMPLES; sample++) {
         /* A day's course, hours of load, minutes of a fan. */
         const int32_t steps = 256 * 8 + triangle(sample, 24U * HOUR, 256 * 24) + triangle(sample, 3U * HOUR, 256 * 6)
                               + triangle(sample, HOUR / 10U, 256) + (int32_t)(drawn() % 5U) - 2;
