@@ -2,8 +2,8 @@
 
 ``python -m experiments.benchmarks.firmware`` writes ``firmware.json`` and ``firmware.md`` beside this file.
 Errors are against the truth, on runs at ramp rates that were not trained at.
-Instructions are counted by ``valgrind --tool=callgrind`` on this machine (gcc -O2), from features
-to drift, as the difference between two numbers of rounds.
+Instructions are counted by ``valgrind --tool=callgrind`` on this machine (gcc -O2), as the difference
+between two numbers of rounds.
 """
 
 from __future__ import annotations
@@ -39,8 +39,11 @@ FEATURES = "T, dT, T*dT"
 _ROWS = 200
 _ROW_S = 20
 # Seconds that a training row of the other libraries averages over: what their solvers can take.
-EQUAL = 1.1
-"""Ratio of errors within which models are called as accurate."""
+SIZES = (8, 6, 4)
+"""Centres of smaller networks, trained at that size."""
+POLYNOMIALS = ("T^1..3, dT, T*dT", "T^1..5, dT, T*dT, T^2*dT, T^3*dT")
+LEVELS = (1.1, 1.5, 2.5, 5.0)
+"""Errors, as multiples of the network's, at which the smallest model of each exporter is told."""
 _RATES, _HELD = (0.5, 1.0, 2.0), 1
 # Ramp rates of the training cycles [degC/min], and the one that settings are judged on.
 
@@ -68,6 +71,7 @@ class _Case:
     def __init__(self, trained: Any, test: Any, truth: FloatArray) -> None:
         from fogml.models.names import make_model
 
+        self.trained = trained
         self.model = make_model("rbf", FEATURES).fit(trained)
         features = self.model.features_
         assert features is not None
@@ -88,48 +92,66 @@ class _Case:
         return float(np.sqrt(np.mean((np.asarray(drift, dtype=np.float64) - self.truth) ** 2)))
 
     def ours(self) -> list[dict[str, Any]]:
-        """C of the network, whole and pruned, and the same graph in onnxruntime."""
-        from fogml.export.c_source import c_source
+        """C of networks of several sizes and of polynomials, the network's graph, and a table."""
         from fogml.export.plan import Plan
-        from fogml.export.points import box_points
-        from fogml.export.prune import pruned
+        from fogml.models.names import make_model
+
+        plans = [Plan.of(self.model)]
+        for centres in SIZES:
+            fitted = make_model("rbf", FEATURES, parameters={"centres": centres}).fit(self.trained)
+            plans.append(Plan.of(fitted))
+        polynomials = [make_model("polynomial", text).fit(self.trained) for text in POLYNOMIALS]
+        rows = [self.of_plan(plan) for plan in (*plans, *map(Plan.of, polynomials))]
+        return [*rows, self.onnxruntime(plans[0]), self.table()]
+
+    def of_plan(self, plan: Any) -> dict[str, Any]:
+        """Generated C of a plan."""
+        from fogml.export.c_source import c_source
         from fogml.export.storage import weight_bytes
 
-        whole = Plan.of(self.model)
-        points = whole.compose(box_points(whole, 0))
-        rows = []
-        for budget in (None, 512, 256):
-            plan = whole
-            if budget is not None:
-                plan = pruned(whole, budget, "float32", True, points, whole.value(points))
-                if plan is whole:
-                    continue
-            source = c_source(plan, "float32", [])
-            with tempfile.TemporaryDirectory() as name:
-                folder = Path(name)
-                for file, text in source.files.items():
-                    (folder / file).write_text(text)
-                count = instructions(
-                    folder,
-                    '#include "fogml_model.c"\n',
-                    "drift_of(x[row])",
-                    "float",
-                    self.probes.astype("f4"),
-                    [],
-                )
-                text = source.files["fogml_model.c"]
-                flash = cortex_bytes(folder, text, ["-DFOGML_NO_SELF_TEST"])
-            rows.append(
-                {
-                    "name": f"fogml, RBF of {plan.centres} centres, float32 C",
-                    "error": self.error(plan.value(self.x)),
-                    "weights": weight_bytes(plan, "float32", True),
-                    "flash": flash,
-                    "flash_note": "feature windows, trained box and flags included",
-                    "instructions": count,
-                }
-            )
-        return [*rows, self.onnxruntime(whole)]
+        source = c_source(plan, "float32", [])
+        what = f"RBF of {plan.centres} centres" if plan.centres else f"polynomial of {len(plan.names)} terms"
+        return {
+            "name": f"fogml, {what}, float32",
+            "error": self.error(plan.value(plan.full_columns(self.x[:, :2]))),
+            "weights": weight_bytes(plan, "float32", True),
+            **self.cost(source.files, "fogml_model.c", "compensate(x, true, 0.0f, &out)"),
+            "flash_note": "feature windows, trained box and flags included",
+        }
+
+    def table(self) -> dict[str, Any]:
+        """The segment table of the network: what it says at rest."""
+        from fogml.export.segments import Segments
+        from fogml.export.tables import TableSettings, export_tables
+
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            report = export_tables([self.model], folder, TableSettings("segments"))["axes"]["x"]
+            files = {file: (folder / file).read_text() for file in ("fogml_segments.c", "fogml_segments.h")}
+            held = json.loads((folder / "fogml_segments.json").read_text())["axes"]["x"]
+        knots = np.array(held["temperature_degc"])
+        one = np.ones(len(knots))
+        table = Segments("T", "deg/h", knots, np.array(held["bias_deg_h"]), one, 0.0, 0.0, 0.0)
+        return {
+            "name": f"fogml, segment table of {len(knots)} breakpoints, float32",
+            "error": self.error(table.at(self.x[:, 0])[0]),
+            "weights": report["bytes"],
+            **self.cost(files, "fogml_segments.c", "fogml_segments(x, &zero, &out)"),
+            "flash_note": "of temperature alone: the rate is left out",
+        }
+
+    def cost(self, files: dict[str, str], main: str, call: str) -> dict[str, Any]:
+        """Flash of generated C, and its instructions from temperature and rate to a flagged output."""
+        head = f'#include "{main}"\nstatic const float zero = 0.0f;\n'
+        head += f"static float told(const float *x) {{ float out; (void)zero; (void){call}; return out; }}\n"
+        with tempfile.TemporaryDirectory() as name:
+            folder = Path(name)
+            for file, text in files.items():
+                (folder / file).write_text(text)
+            atoms = np.ascontiguousarray(self.probes[:, :2]).astype("f4")
+            count = instructions(folder, head, "told(x[row])", "float", atoms, [])
+            flash = cortex_bytes(folder, files[main], ["-DFOGML_NO_SELF_TEST"])
+        return {"flash": flash, "instructions": count}
 
     def onnxruntime(self, plan: Any) -> dict[str, Any]:
         """The same network as an ONNX graph."""
@@ -200,7 +222,8 @@ def _page(rows: list[dict[str, Any]], machine: dict[str, Any]) -> str:
         "**Synthetic** unit (experiments/synthetic_world.py), trained at 0.5, 1 and 2 degC/min, judged at",
         "0.7 and 1.5 degC/min; error is the rms against the noise-free truth, sample by sample, features",
         "limited to the trained box. Weights and flash (Cortex-M4, -Os) in bytes; instructions of this",
-        "machine a sample, from features to drift, by callgrind. The size and settings of emlearn's and",
+        "machine a sample by callgrind: of fogml's from temperature and rate to the output with its flag, of",
+        "the others from scaled features to scaled drift. The size and settings of emlearn's and",
         "m2cgen's models are chosen on the training run alone, fitted at 0.5 and 2 degC/min and judged at",
         f"1: the smallest that comes within {NEAR - 1.0:.0%} of the best judged. {machine['processor']}, "
         f"{machine['date']}.",
@@ -231,21 +254,28 @@ def _page(rows: list[dict[str, Any]], machine: dict[str, Any]) -> str:
 
 
 def _equal(rows: list[dict[str, Any]], ours: float) -> list[str]:
-    """Of each other exporter the smallest model that is as accurate as ours on the test run."""
-    said = []
-    for name in ("emlearn", "m2cgen"):
-        near = [row for row in rows if "judged" in row and row["name"].startswith(name)]
-        equal = [row for row in near if row["error"] <= EQUAL * ours]
-        if equal:
-            least = min(equal, key=lambda row: row["weights"])
-            said.append(
-                f"- {name}: the smallest of these within {EQUAL - 1.0:.0%} of our error on the test run is "
-                f"`{least['name']}`, {least['weights']:,} bytes of weights."
-            )
-        elif near:
-            best = min(near, key=lambda row: row["error"])
-            said.append(f"- {name}: none comes within {EQUAL - 1.0:.0%}; nearest is `{best['name']}`.")
-    return said
+    """At each level of error the smallest model of each exporter that keeps to it on the test run."""
+    lines = [
+        "Equal accuracy: the smallest model of each exporter whose error on the test run is at most so",
+        "large; weights in bytes, and instructions.",
+        "",
+        "| error, deg/h, at most | fogml | emlearn | m2cgen |",
+        "|---:|---|---|---|",
+    ]
+    for level in LEVELS:
+        cells = []
+        for name in ("fogml", "emlearn", "m2cgen"):
+            near = [row for row in rows if row["name"].startswith(name) and "error" in row]
+            equal = [row for row in near if row["error"] <= level * ours]
+            least = min(equal, key=lambda row: row["weights"], default=None)
+            cells.append("none" if least is None else _told(least))
+        lines.append(f"| {level * ours:.4f} | {' | '.join(cells)} |")
+    return lines
+
+
+def _told(row: dict[str, Any]) -> str:
+    what = row["name"].split(", ")[1]
+    return f"{what}: {row['weights']:,} B, {row['instructions']:,.0f}"
 
 
 if __name__ == "__main__":

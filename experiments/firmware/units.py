@@ -42,12 +42,12 @@ unsigned long state_bytes(void) {{ return sizeof(fogml_state); }}
 _NUMPY = {"double": "f8", "float": "f4", "int32_t": "i4", "int16_t": "i2"}
 
 
-def trained_model() -> DriftModel:
+def trained_model(features: str = FEATURES) -> DriftModel:
     """A polynomial trained on a synthetic unit at three rates of temperature."""
     rates = np.concatenate([cycle(rate) for rate in (0.5, 1.0, 2.0)])
     trained, _ = World(noise=0.1).run(rates, 1.0, 1, "train.csv")
     columns = {"time": trained.time, "gyro": trained.gyro, "T": trained.columns["T_in"]}
-    return make_model("polynomial", FEATURES).fit(Run("train.csv", columns))
+    return make_model("polynomial", features).fit(Run("train.csv", columns))
 
 
 class Unit:

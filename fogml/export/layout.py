@@ -25,6 +25,9 @@ from fogml.signals.clock import (
 )
 
 Number = Literal["float64", "float32", "fixed"]
+OPERATORS = frozenset(("value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"))
+METHODS = frozenset(("block", "slope", "exp", "first"))
+"""Operators and methods of windows that there is C for: each has its lines in the templates."""
 
 TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
 """Held temperatures are multiples of 2**-bits degC."""
@@ -173,7 +176,15 @@ def layout(plan: Plan, number: Number) -> Layout:
 
 
 def _check_held(atom: Atom, number: Number) -> None:
-    """Refuse what C code can't hold in a number format: columns whose range it can't know."""
+    """Refuse what C code can't hold: what it has no lines for, columns whose range it can't know."""
+    known = atom.operator in OPERATORS and (atom.window is None or atom.window.method in METHODS)
+    if not known:
+        raise InputError(
+            f"export: the model takes {atom.text}, which there is no C for; C code holds the operators "
+            f"{', '.join(sorted(OPERATORS))} and windows of {', '.join(sorted(METHODS))}. Export it "
+            "--to onnx or json, which take features, or --to onnx --with-pipeline, which takes any window "
+            "that is linear in temperature"
+        )
     if all(is_temperature(name) for name in atom.signal.sensors):
         return
     if number == "fixed":

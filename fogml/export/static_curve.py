@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.export.layout import OPERATORS
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
 from fogml.runs.columns import is_temperature
@@ -121,6 +122,11 @@ def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
 def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     """An atom's values (n,) where nothing moves, from those of the columns that it is of, each (n,)."""
     count = len(next(iter(held.values())))
+    if atom.operator not in OPERATORS:
+        raise InputError(
+            f"export: the model takes {atom.text}, of which it is not known what it is where nothing moves; "
+            "export it --to onnx or json"
+        )
     if atom.window is not None or atom.operator == "since_on":
         return np.zeros(count)
     value = np.sum([weight * held[name] for name, weight in atom.signal.parts], axis=0)

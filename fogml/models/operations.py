@@ -21,6 +21,8 @@ MEMORY_OPERATIONS = {"lag": 6, "play": 8, "beyond": 9, "since_on": EXPONENTIAL_O
 def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_s: float) -> int:
     """Additions, multiplications and divisions from a sample to feature columns, windows full.
 
+    Windows and memories that are not in the tables above count for nothing.
+
     Parameters
     ----------
     atoms, steps
@@ -32,7 +34,7 @@ def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_
     windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in atoms if atom.window}
     for _, window, _ in windows:
         assert window is not None
-        count += WINDOW_OPERATIONS[window.method]
+        count += WINDOW_OPERATIONS.get(window.method, 0)
         count += HELD_OPERATIONS.get(window.method, 0) * ring_of([window], sample_s)[0]
     count += sum(MEMORY_OPERATIONS.get(atom.operator, 0) for atom in atoms)
     count += sum(2 * len(atom.signal.parts) - 1 for atom in atoms)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from experiments.firmware.cortex_m4.__main__ import reports
 from fogml.export.c_source import c_source
 from fogml.export.export import export_model
 from fogml.export.plan import Plan
@@ -87,6 +88,13 @@ def test_rust_calls_it(exported, tmp_path):
     run("gcc", "-std=c99", "-c", "fogml_model.c", "-o", "fogml_model.o", folder=tmp_path)
     run("rustc", "-C", "link-arg=fogml_model.o", "main.rs", "-o", "unit", folder=tmp_path)
     run(tmp_path / "unit", folder=tmp_path)
+
+
+def test_a_bare_cortex_m4_gives_the_same_bits(exported):
+    needs("arm-none-eabi-gcc", "qemu-system-arm")
+    told = reports(exported, 2000)
+    assert told["Cortex-M4"] == told["this machine"]
+    assert told["Cortex-M4"].splitlines()[0] == "samples 2000"
 
 
 def test_a_folder_is_a_library_of_arduino(exported, model_of, tmp_path):
