@@ -7,6 +7,8 @@
 from __future__ import annotations
 
 import argparse
+import json
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -17,7 +19,9 @@ from numpy.typing import NDArray
 from experiments.firmware.units import FEATURES, NOISE_DEGC, Unit, blocks, temperatures, trained_model
 from experiments.results import write_results
 from fogml import __version__
-from fogml.export.c_source import C_DTYPES, c_source
+from fogml.export.c_program import cortex_m4_size
+from fogml.export.c_source import C_DTYPES, CSource, c_source
+from fogml.export.instructions import instructions_per_sample
 from fogml.export.plan import Plan
 from fogml.models.base import DriftModel
 from fogml.models.compensation import compensate_blocks
@@ -95,6 +99,14 @@ def with_faults(model: DriftModel, units: list[Unit], count: int) -> Any:
     return {"samples": count, "faults": int(fault.sum()), "within_the_rule": int(hidden.sum()), "units": rows}
 
 
+RATES = {
+    "100 Hz": (0.01, C_DTYPES, ()),
+    "1 kHz": (0.001, C_DTYPES, ()),
+    "1 Hz": (1.0, ("float32",), ("-DFOGML_CLOCK_32",)),
+}
+"""Sample interval [s], number formats and options of the compiler by rate."""
+
+
 def main() -> int:
     """Measure, write and print."""
     parser = argparse.ArgumentParser()
@@ -102,35 +114,50 @@ def main() -> int:
     parser.add_argument("--hours-1-khz", type=float, default=48.0)
     parser.add_argument("--days-1-hz", type=float, default=365.0)
     parser.add_argument("--samples", type=int, default=1_000_000)
+    parts = (*RATES, "faults", "sizes")
+    parser.add_argument(
+        "--only", nargs="*", choices=parts, default=parts, help="others stay as results.json has them"
+    )
     asked = parser.parse_args()
+    lengths = 3600.0 * np.array([asked.hours_100_hz, asked.hours_1_khz, 24.0 * asked.days_1_hz])
     model = trained_model()
-    half_width = float(model.intervals_.half_width(0.9))
-    cases: dict[str, Any] = {}
-    for name, seconds, sample_s, dtypes, flags in (
-        ("100 Hz", 3600.0 * asked.hours_100_hz, 0.01, C_DTYPES, ()),
-        ("1 kHz", 3600.0 * asked.hours_1_khz, 0.001, C_DTYPES, ()),
-        ("1 Hz", 86400.0 * asked.days_1_hz, 1.0, ("float32",), ("-DFOGML_CLOCK_32",)),
-    ):
-        units = [Unit(c_source(Plan.of(model, sample_s), dtype, []), *flags) for dtype in dtypes]
-        # The clock begins at Unix time.
-        cases[name] = beside_the_model(model, units, seconds, sample_s, 1_764_000_000_000_000)
-        for row, unit in zip(cases[name]["units"], units):
-            row |= {"cortex_m4": unit.size, "self_test": unit.self_test}
-        print(name, cases[name], flush=True)
-    units = [Unit(c_source(Plan.of(model, 1.0), dtype, [])) for dtype in C_DTYPES]
-    faults = with_faults(model, units, asked.samples)
+    held = json.loads((HERE / "results.json").read_text()) if set(asked.only) < set(parts) else {}
     result = {
         "fogml": __version__,
         "data": "synthetic",
         "features": FEATURES,
-        "half_width_90_deg_h": half_width,
-        "cases": cases,
-        "faults": faults,
+        "half_width_90_deg_h": float(model.intervals_.half_width(0.9)),
+        "cases": held.get("cases", {}),
+        "faults": held.get("faults"),
+        "sizes": held.get("sizes"),
     }
+    for (name, (sample_s, dtypes, flags)), seconds in zip(RATES.items(), lengths.tolist(), strict=True):
+        if name in asked.only:
+            units = [Unit(c_source(Plan.of(model, sample_s), dtype, []), *flags) for dtype in dtypes]
+            # The clock begins at Unix time.
+            result["cases"][name] = beside_the_model(model, units, seconds, sample_s, 1_764_000_000_000_000)
+            print(name, result["cases"][name], flush=True)
+    if "faults" in asked.only:
+        units = [Unit(c_source(Plan.of(model, 1.0), dtype, [])) for dtype in C_DTYPES]
+        result["faults"] = with_faults(model, units, asked.samples)
+    if "sizes" in asked.only:
+        result["sizes"] = {
+            name: {dtype: sizes(c_source(Plan.of(model, sample_s), dtype, [])) for dtype in dtypes}
+            for name, (sample_s, dtypes, _) in RATES.items()
+        }
     page = _page(result)
     write_results(HERE, result, page)
     print(page)
     return 0
+
+
+def sizes(source: CSource) -> dict[str, Any] | None:
+    """Bytes and instructions of a sample on a Cortex-M4; None without its compiler."""
+    with tempfile.TemporaryDirectory() as name:
+        size = cortex_m4_size(source, Path(name))
+        if size is not None:
+            size["instructions_per_sample"] = instructions_per_sample(source, Path(name))
+        return size
 
 
 def _page(result: dict[str, Any]) -> str:
@@ -151,9 +178,7 @@ def _page(result: dict[str, Any]) -> str:
         hours = case["seconds"] / 3600.0
         length = f"{hours:g} h" if hours < 1000.0 else f"{hours / 24.0:g} days"
         for row in case["units"]:
-            size = row["cortex_m4"] or dict.fromkeys(
-                ("ram_bytes", "flash_bytes", "instructions_per_sample"), "–"
-            )
+            size = result["sizes"][name][row["dtype"]] or dict.fromkeys(_SIZES, "–")
             counts = ", ".join(str(count) for count in case["flags"])
             lines.append(
                 f"| {name} | {length} | {row['dtype']} | {row['largest_difference']:.2g} "

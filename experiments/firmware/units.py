@@ -13,10 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from experiments.synthetic_world import World, cycle
-from fogml.export.c_program import FLAGS, cortex_m4_size, host_compiler
+from fogml.export.c_program import FLAGS, host_compiler
 from fogml.export.c_source import CSource
 from fogml.export.check import expected_outputs
-from fogml.export.instructions import instructions_per_sample
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -62,15 +61,13 @@ class Unit:
         source = source.with_expected(*expected_outputs(source, folder))
         for name, text in {**source.files, "feed.c": _FEEDER.format(**kinds)}.items():
             (folder / name).write_text(text, encoding="utf-8")
-        self.size = cortex_m4_size(source, folder)
-        if self.size is not None:
-            self.size["instructions_per_sample"] = instructions_per_sample(source, folder)
         words = [host_compiler(), *FLAGS, *flags, "-shared", "-fPIC", "-o", str(folder / "unit.so")]
         subprocess.run([*words, str(folder / "feed.c")], check=True)
         self._library = ctypes.CDLL(str(folder / "unit.so"))
         self._state = ctypes.create_string_buffer(self._library.state_bytes())
         self._library.fogml_init(self._state)
-        self.self_test = int(self._library.fogml_self_test())
+        if self._library.fogml_self_test() != 0:
+            raise RuntimeError(f"the self-test of {self.dtype} fails")
 
     def feed(self, start_us: int, step_us: int, T: FloatArray, gyro: FloatArray) -> tuple[FloatArray, Any]:
         """Outputs [deg/h] and flags of samples."""
