@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.escaping import CCode
-from fogml.export.c_float import array, box_comment, sensor_identifier
+from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.fixed_scales import (
     OUTPUT_BITS,
@@ -240,13 +240,7 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
             "",
             box_comment(plan),
         ]
-        for name, values, note in (
-            ("LOW", limits.low, "values below are levelled off"),
-            ("HIGH", limits.high, "values above are levelled off"),
-            ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
-            ("INNER", limits.inner, "values below are flagged"),
-            ("OUTER", limits.outer, "values above are flagged"),
-        ):
+        for name, values, note in box_numbers(limits):
             whole = np.clip(np.round(values * steps), 1.0 - 2.0**31, 2.0**31 - 1.0)
             lines += array(name, whole, "int", "[ATOMS]", "int64_t", note)
         if limits.slices is not None:

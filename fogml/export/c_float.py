@@ -6,17 +6,18 @@ from math import factorial, log
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.layout import RANGE_BITS, Layout
-from fogml.export.plan import Plan
+from fogml.export.plan import Limits, Plan
 from fogml.features.atoms import DEAD_BAND
 from fogml.features.signal import Signal, unit_of
 from fogml.runs.columns import is_temperature
 
+FloatArray = NDArray[np.float64]
 OTHER_LIMIT = 1e15
 """Values of other columns than temperatures up to this size, in their units, are taken."""
 EXP_TERMS = {"float64": 13, "float32": 7}
@@ -218,13 +219,7 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
     if plan.atoms:
         limits = plan.limits
         lines += ["", box_comment(plan)]
-        for name, values, note in (
-            ("LOW", limits.low, "values below are levelled off"),
-            ("HIGH", limits.high, "values above are levelled off"),
-            ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
-            ("INNER", limits.inner, "values below are flagged"),
-            ("OUTER", limits.outer, "values above are flagged"),
-        ):
+        for name, values, note in box_numbers(limits):
             lines += array(name, values, dtype, "[ATOMS]", real, note)
         if limits.slices is not None:
             numbers = slice_numbers(plan)
@@ -238,6 +233,17 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
 def box_comment(plan: Plan) -> str:
     """The line above the trained box."""
     return f"/* The trained box, by atom: {c_text(', '.join(atom.text for atom in plan.atoms))}. */"
+
+
+def box_numbers(limits: Limits) -> tuple[tuple[str, FloatArray, str], ...]:
+    """The constants of the trained box: name, values by atom, and what they are for."""
+    return (
+        ("LOW", limits.low, "values below are levelled off"),
+        ("HIGH", limits.high, "values above are levelled off"),
+        ("MARGIN", limits.margin, "how far beyond a levelled value gets"),
+        ("INNER", limits.inner, "values below are flagged"),
+        ("OUTER", limits.outer, "values above are flagged"),
+    )
 
 
 def _model_constants(plan: Plan, dtype: str, real: str) -> list[str]:
