@@ -29,6 +29,26 @@ def diagnose(
         list[str] | None,
         typer.Option("--without", metavar="EFFECT", help="Effect that is no candidate; may be repeated."),
     ] = None,
+    method: Annotated[
+        str | None,
+        typer.Option(
+            "--method",
+            metavar="METHOD",
+            help="'diagnosis', or 'families': each effect in whatever form its family has (diagnosis).",
+        ),
+    ] = None,
+    cost: Annotated[
+        float | None,
+        typer.Option(
+            "--cost-of-false-name",
+            metavar="RATIO",
+            help="Of 'families': a false name costs so many times what a missed one does (1).",
+        ),
+    ] = None,
+    rehearse: Annotated[
+        bool | None,
+        typer.Option("--rehearse", help="Of 'families': what these runs would name of each candidate."),
+    ] = None,
     repair: options.Repair = None,
     repair_anyway: options.RepairAnyway = None,
     out: options.Out = None,
@@ -52,6 +72,9 @@ def diagnose(
             "noise": noise,
             "twin": twin,
             "without": without,
+            "method": method,
+            "cost_of_false_name": cost,
+            "rehearse": rehearse,
             "repair": options.repairing(repair, repair_anyway),
             "out": str(out) if out else None,
             "seed": seed,

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar, Literal
+
+from pydantic import Field
 
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
-from fogml.gap.diagnosis import as_model, diagnose
-from fogml.gap.result import Diagnosis
+from fogml.gap.diagnosis import as_model
+from fogml.gap.result import FAMILIES, Diagnosis
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.twin.twin_file import load_twin, twin_names
@@ -28,6 +30,9 @@ class DiagnoseSettings(Settings):
     noise: str | None = None
     twin: str = "nominal"
     without: list[str] = []
+    method: Literal["diagnosis", "families"] = "diagnosis"
+    cost_of_false_name: float | None = Field(None, gt=0.0)
+    rehearse: bool = False
     repair: Repairing = False
     out: str = "diagnosis"
 
@@ -42,20 +47,16 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     both = sorted(set(settings.runs) & set(settings.held_out))
     if both:
         raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")
+    if settings.method != FAMILIES and (settings.rehearse or settings.cost_of_false_name is not None):
+        raise InputError(f"--rehearse and --cost-of-false-name: for --method {FAMILIES} alone")
     model = as_model(load_twin(settings.twin))
     with whole_folder(settings.out) as folder:
         runs = open_runs(settings.runs, terminal, repair=settings.repair)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
         noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
         with terminal.work("diagnosing") as work:
-            found = diagnose(
-                model,
-                runs,
-                held_out,
-                noise=noise,
-                without=settings.without,
-                seed=settings.seed,
-                progress=work.doing,
+            found = _diagnosed(
+                settings, model, runs, held_out, noise=noise, seed=settings.seed, progress=work.doing
             )
             work.doing("writing")
             _write(folder, settings, found)
@@ -64,6 +65,24 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     terminal.result(found.as_dict())
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
     return found
+
+
+def _diagnosed(settings: DiagnoseSettings, *given: Any, **named: Any) -> Diagnosis:
+    """By the method that is asked for."""
+    if settings.method == FAMILIES:
+        from fogml.gap.families import answer
+
+        cost = 1.0 if settings.cost_of_false_name is None else settings.cost_of_false_name
+        return answer.diagnose(
+            *given,
+            **named,
+            without=settings.without,
+            rehearsed=settings.rehearse,
+            cost_of_false_name=cost,
+        )
+    from fogml.gap.diagnosis import diagnose
+
+    return diagnose(*given, **named, without=settings.without)
 
 
 def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
@@ -109,6 +128,15 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
     if (run := found.separating_run) is not None:
         verb = "would show" if run.aim == "show" else "would tell apart"
         terminal.say(f"Next: a programme of {run.hours:.1f} h {verb} {', '.join(run.separates)}: {NEXT_RUN}")
+    for said in found.headline:
+        terminal.say(said)
+    if found.rehearsal:
+        rows = [
+            [r.effect, r.form, r.size, number(r.length), r.outcome, ", ".join(r.named_as) or "–"]
+            for r in found.rehearsal
+        ]
+        head = ["if this acted", "shape", "size", "whitened length", "it would be", "as"]
+        terminal.table("What these runs would name", head, rows)
     if found.held_out_is_part:
         terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
     for name, reason in found.unusable:

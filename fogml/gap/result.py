@@ -18,6 +18,8 @@ from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
 from fogml.runs.run import FloatArray
 
+FAMILIES = "families"
+"""The diagnosis on families, as results and settings call it."""
 NAMED = 0.5
 """An effect is named from this probability on."""
 Verdict = Literal["no_gap", "explained", "ambiguous", "partly_explained", "unknown"]
@@ -71,6 +73,8 @@ class Found:
         Change of its size a day, in its unit; None where the runs tell of none.
     onset
         Since when it acts; None where from the first run on.
+    log_odds
+        By the evidence: of a known cause in its place against something unknown; of its class among those.
     share
         Of the structural gap's energy above the floor, between 0 and 1.
     place
@@ -95,6 +99,7 @@ class Found:
     left_out: tuple[str, ...] = ()
     grows: float | None = None
     onset: Onset | None = None
+    log_odds: tuple[float, float] | None = None
 
     @property
     def named(self) -> bool:
@@ -258,6 +263,8 @@ class Diagnosis:
         Sentences that say the result.
     rehearsal
         What these runs would name of each candidate, where that was asked for.
+    method
+        What answered: ``diagnosis`` or ``families``.
     """
 
     fit: tuple[str, ...]
@@ -284,6 +291,7 @@ class Diagnosis:
     nearest: tuple[Nearest, ...] = ()
     headline: tuple[str, ...] = ()
     rehearsal: tuple[Rehearsed, ...] = ()
+    method: str = "diagnosis"
 
     @property
     def named(self) -> tuple[Found, ...]:

@@ -26,6 +26,7 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
             "unusable": [{"run": run, "reason": reason} for run, reason in diagnosis.unusable],
         },
         "model": diagnosis.model,
+        "method": diagnosis.method,
         "verdict": diagnosis.verdict,
         "which": [_found(found) for found in diagnosis.found],
         "suspected": [_found(found) for found in diagnosis.suspected],
@@ -63,6 +64,9 @@ def _found(found: Found) -> dict[str, Any]:
         "consistent": found.consistent,
         "grows_per_day": found.grows,
         "onset": None if found.onset is None else asdict(found.onset),
+        "log_odds": None
+        if found.log_odds is None
+        else dict(zip(("against_unknown", "among_known"), found.log_odds)),
         "share": found.share,
         "place": found.place,
         "times_usual": found.times_usual,

@@ -5,7 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fogml.gap.result import Diagnosis, RunSeries
-from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables
+from fogml.report import (
+    figures_gap,
+    figures_gap_evidence,
+    figures_gap_where,
+    gap_tables,
+    gap_tables_ahead,
+)
 from fogml.report.error_rates import error_sentences
 from fogml.report.gap_tiles import headline_tiles, warnings
 from fogml.report.gap_words import (
@@ -62,6 +68,8 @@ def gap_page(found: Diagnosis) -> str:
         causes=gap_tables.causes_table(found, names),
         classes=gap_tables.classes_table(found.found, names),
         how_far=gap_tables.how_far_table(found) if found.how_far else None,
+        what_if=gap_tables_ahead.what_if_table(found, names),
+        rehearsal=gap_tables_ahead.rehearsal_table(found, names),
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],
         runs=drawn,
         not_drawn=[s.run for s in found.series if s.run not in {d.name for d in drawn}],

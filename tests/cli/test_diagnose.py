@@ -126,6 +126,40 @@ def test_gap_json_holds_every_key(gap):
     assert set(far) >= wanted and far["run"] == "c.csv" and len(far["closed_ci90"]) == 2
 
 
+def test_families_answer_in_the_same_files(runs, tmp_path, monkeypatch):
+    for search in ("separating_run", "showing_run"):
+        monkeypatch.setattr(f"fogml.gap.families.ahead.{search}", lambda *given, **named: None)
+    out = tmp_path / "out"
+    given = [str(runs["a"]), str(runs["b"]), "--held-out", str(runs["c"]), "--out", str(out)]
+    result = CliRunner().invoke(
+        app, ["diagnose", *given, "--method", "families", "--rehearse"], catch_exceptions=False
+    )
+    assert result.exit_code == 0, result.stderr
+    told = json.loads((out / "gap.json").read_text())
+    assert told["method"] == "families"
+    found = told["which"][0]
+    assert found["effect"] == "thermal_hysteresis" and found["probability"] > 0.9
+    assert abs(found["amplitude"]["value"] - HYSTERESIS) < 4.0 * found["amplitude"]["se"] < 0.2
+    assert load_twin(out / "twin.yaml").settings["thermal_hysteresis"].amplitude == pytest.approx(
+        found["amplitude"]["value"]
+    )
+    (far,) = told["how_far"]
+    assert far["closed"] > 0.9
+    alone = [w for w in told["what_if"] if w["effect"] == "thermal_hysteresis" and not w["beside"]]
+    assert alone[0]["closed"] == pytest.approx(far["closed"], abs=0.1)
+    rehearsed = [r for r in told["rehearsal"] if r["effect"] == "thermal_hysteresis" and r["size"] == "found"]
+    assert {r["outcome"] for r in rehearsed} == {"named"}
+    page = (out / "gap.html").read_text(encoding="utf-8")
+    assert "What these runs would name" in page and "What if: with each candidate" in page
+    assert told["headline"][0] in page
+
+
+def test_what_families_alone_can_do_is_refused_of_the_other(runs, tmp_path):
+    for option in (["--rehearse"], ["--cost-of-false-name", "3"]):
+        result = CliRunner().invoke(app, ["diagnose", str(runs["a"]), *option, "--out", str(tmp_path / "o")])
+        assert result.exit_code == 2 and "for --method families alone" in result.stderr
+
+
 def test_the_effect_is_named_with_its_size(gap):
     assert gap["verdict"] in ("explained", "ambiguous")
     found = gap["which"][0]

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.special import expit
 
 from fogml.gap.families.card import card_of
 from fogml.gap.families.inference import Inference
@@ -122,10 +123,17 @@ def _judged(found: Inference, family: int, form: str, size: str, data: FloatArra
     known = {f: s for f, s in scores.items() if families[f].kind == "known"}
     best = max(known, key=known.__getitem__)
     alike = sorted((f for f in known if known[f] > known[best] - priors.exchange), key=lambda f: -known[f])
-    own = float(np.logaddexp.reduce([known[f] for f in alike]))
-    rest = float(np.logaddexp.reduce([0.0, *(s for f, s in scores.items() if f not in alike)]))
-    odds = priors.trusted(own - rest) - math.log(cost)
-    probability = 1.0 / (1.0 + math.exp(-min(max(odds, -500.0), 500.0)))
+    own, others, unknown = (
+        float(np.logaddexp.reduce(np.array(told)))
+        for told in (
+            [known[f] for f in alike],
+            [-np.inf, *(s for f, s in known.items() if f not in alike)],
+            [0.0, *(s for f, s in scores.items() if f not in known)],
+        )
+    )
+    acts = expit(priors.trusted(float(np.logaddexp(own, others)) - unknown))
+    probability = float(acts * expit(priors.trust * (own - others)))
+    probability = probability / (probability + cost * (1.0 - probability))
     named = probability >= NAMED
     outcome = "missed" if not named else "named" if family in alike else "mistaken"
     members = tuple(families[f].id for f in alike) if named else ()

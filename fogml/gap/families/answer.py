@@ -26,6 +26,7 @@ from fogml.gap.families.words import headline, looks_like
 from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (
+    FAMILIES,
     Diagnosis,
     Unknown,
     Verdict,
@@ -171,6 +172,7 @@ def _answer(
         unusable=found.unusable,
         assumed=assumed(found),
         model=found.model.name,
+        method=FAMILIES,
         what_if=what_if,
         nearest=nearest,
         headline=headline(found, judged, verdict, shown, nearest, far, lies.segments),

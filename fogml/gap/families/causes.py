@@ -88,6 +88,7 @@ def found_cause(
         share=share,
         place=declared.place,
         times_usual=abs(card.value.amplitude) / high,
+        log_odds=(cause.odds, cause.within),
     )
 
 

@@ -25,11 +25,15 @@ class Cause:
     ids
         Effects that these runs don't tell from it, itself first.
     probability
-        That one of them acts, trust and carrying over in it.
+        That one of them acts, trust and doubt in it.
     evidence
         The same by the evidence alone.
     carried
         What it adds to the log density of each run given the others, over the best set without it [nats].
+    known
+        That it, or another known cause in its place, acts, by the evidence alone.
+    doubted
+        What of that is not believed.
     """
 
     members: tuple[Member, ...]
@@ -37,6 +41,8 @@ class Cause:
     probability: float
     evidence: float
     carried: float
+    known: float
+    doubted: float = 0.0
 
     @property
     def member(self) -> Member:
@@ -45,8 +51,16 @@ class Cause:
 
     @property
     def odds(self) -> float:
-        """Logarithm of its odds by the evidence, less what the runs foretell each other worse with it."""
-        return _log_odds(self.evidence) + min(self.carried, 0.0)
+        """Logarithm of the odds that a known cause acts in its place, against something unknown or nothing.
+
+        Less what the runs foretell each other worse with it.
+        """
+        return _log_odds(self.known) + min(self.carried, 0.0)
+
+    @property
+    def within(self) -> float:
+        """Logarithm of its odds against other known causes in its place."""
+        return _log_odds(self.evidence / max(self.known, self.evidence, 1e-300))
 
 
 @dataclass(frozen=True)
@@ -65,7 +79,9 @@ def judge(found: Inference) -> Judgement:
     """Causes of the likeliest set with their classes.
 
     The odds of a cause are those of all sets that hold a member of its class; where runs foretell each other
-    worse with it than with the best of what is unknown in its place, less so. The prior's trust maps them.
+    worse with it than with the best of what is unknown in its place, less so. Forms are never quite known, so
+    that all odds count less (`Priors.trust`); and those of any known cause against something unknown are
+    doubted, since what is unknown has more forms than families of it.
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
     best = _likeliest(found, found.explanations)
@@ -87,8 +103,19 @@ def judge(found: Inference) -> Judgement:
         near = [e for e in instead[f] if e.score > instead[f][0].score - priors.exchange]
         carried = carries(found, best) - max(carries(found, e) for e in near)
         own = sorted((m for m in best.members if m.family == f), key=lambda m: -m.size)
-        cause = Cause(tuple(own), tuple(families[g].id for g in members), 0.0, held, carried)
-        causes.append(replace(cause, probability=_chance(priors.trusted(cause.odds))))
+        rest = search.names(best) - {f}
+        known = float(sum(w for e, w in zip(explanations, weights) if search.names(e) - rest))
+        cause = Cause(
+            tuple(own), tuple(families[g].id for g in members), 0.0, held, carried, max(known, held)
+        )
+        believed = _chance(priors.trusted(cause.odds))
+        causes.append(
+            replace(
+                cause,
+                probability=believed * _chance(priors.trust * cause.within),
+                doubted=max(cause.known - believed, 0.0),
+            )
+        )
     causes.sort(key=lambda c: -c.probability)
 
     def weight(counts: Callable[[Explanation], bool]) -> float:
@@ -96,7 +123,7 @@ def judge(found: Inference) -> Judgement:
 
     known_share = 1.0 - weight(lambda e: any(families[f].kind == "unknown" for f in e.key))
     for cause in causes:
-        known_share *= 1.0 - max(cause.evidence - cause.probability, 0.0)
+        known_share *= 1.0 - cause.doubted
     nothing = weight(lambda e: all(families[f].kind == "plant" for f in e.key))
     return Judgement(best, tuple(causes), nothing, 1.0 - known_share, explanations, weights)
 

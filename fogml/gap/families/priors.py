@@ -42,10 +42,11 @@ class Priors:
     exchange
         Members of a class cost less than this to be exchanged [nats]: one in twenty.
     trust, doubt
-        Logarithms of a name's odds are multiplied by the first, then less the second, for what no family
-        describes: a monotone map, the same for all. A half lies at 6 nats, under which most names of
-        development cases of two realities were false; ``python -m experiments.families --calibrate`` prints
-        what answered suites ask for.
+        Logarithms of odds are multiplied by the first, since no form is quite known; those of known causes
+        against something unknown are then less the second, since what is unknown has more forms than families
+        of it: a monotone map, the same for all. A half lies at 6 nats, under which most names of development
+        cases of two realities were false; ``python -m experiments.families --calibrate`` prints what answered
+        suites ask for.
     slow_noise
         Prior standard deviations from the median at which random walk is integrated over; flicker at all but
         the last. Far above, since a short static run shows little of a walk.

@@ -49,8 +49,13 @@ def test_what_stands_in_for_a_name_has_none_of_its_class(found):
 def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
     priors = found.setting.priors
     (cause,) = judge(found).causes
-    assert cause.odds <= np.log(cause.evidence / (1.0 - cause.evidence)) + 1e-9
-    assert cause.probability == pytest.approx(1.0 / (1.0 + np.exp(-priors.trusted(cause.odds))))
+    assert cause.evidence <= cause.known
+    known = 1.0 / (1.0 + np.exp(-priors.trusted(cause.odds)))
+    among = 1.0 / (1.0 + np.exp(-priors.trust * cause.within))
+    assert cause.probability == pytest.approx(known * among)
+    # Of a rival that is known nothing more is unknown.
+    rival = replace(cause, evidence=0.5 * cause.evidence)
+    assert rival.odds == cause.odds and rival.within < cause.within
 
 
 def test_a_cause_acts_since_it_left_a_trace(found):

@@ -1,0 +1,90 @@
+"""Tables of a diagnosis beyond what is named: what each candidate would close, what these runs would name."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from fogml.gap.how_far_result import Rehearsed, WhatIf
+from fogml.gap.result import Diagnosis
+from fogml.report.gap_words import interval_words, probability_words, title_of
+from fogml.report.tables import Row, Table
+from fogml.report.words import MISSING, number, percent
+
+MOST_ROWS = 20
+_SIZES = {"usual": "usual", "found": "as found"}
+_FORMS = {"usual": "middle of the ranges", "low": "low ends", "high": "high ends"}
+
+
+def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """What the held-out runs keep with each candidate, the most closed first; None where not known."""
+    if not found.what_if:
+        return None
+    ranked = sorted(found.what_if, key=lambda w: (len(w.beside), -w.share))
+    rows = [_what_if(w, names) for w in ranked[:MOST_ROWS]]
+    return Table(
+        columns=(
+            ("Candidate", "", "text"),
+            ("Beside", "", "text"),
+            ("Of the fit runs' gap", "", "number"),
+            ("Run", "held out", "text"),
+            ("After", "deg/h", "number"),
+            ("Closed", "", "number"),
+            ("90 % interval", "", "text"),
+        ),
+        rows=tuple(rows),
+        caption="Each candidate in whatever form its family has, fitted alone or beside what is named. Those "
+        f"that hold most of the gap, at most {MOST_ROWS}; gap.json has all.",
+    )
+
+
+def _what_if(w: WhatIf, names: dict[str, str]) -> Row:
+    return Row(
+        (
+            title_of(w.effect, names),
+            "; ".join(title_of(b, names) for b in w.beside) or MISSING,
+            percent(w.share),
+            w.run,
+            number(w.after),
+            percent(w.closed),
+            MISSING if w.closed_ci90 is None else interval_words(*w.closed_ci90),
+        )
+    )
+
+
+def rehearsal_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """What these runs would name if each candidate acted alone; None where it was not asked for."""
+    if not found.rehearsal:
+        return None
+    return Table(
+        columns=(
+            ("If this acted", "", "text"),
+            ("Shape", "", "text"),
+            ("Size", "", "text"),
+            ("Shows", "noise lengths", "number"),
+            ("It would be", "", "text"),
+            ("Probability", "", "number"),
+        ),
+        rows=tuple(_rehearsed(r, names) for r in _worst_first(found.rehearsal)),
+        caption="Each candidate is put into replays of these very runs, without noise, and judged by the "
+        "evidence of one cause. Under a length of 3 nothing can be told.",
+    )
+
+
+def _rehearsed(r: Rehearsed, names: dict[str, str]) -> Row:
+    titles = " or ".join(title_of(m, names) for m in r.named_as)
+    outcome = {"missed": "missed", "mistaken": f"mistaken for {titles}", "named": f"named {titles}"}
+    return Row(
+        (
+            title_of(r.effect, names),
+            _FORMS[r.form],
+            _SIZES[r.size],
+            number(r.length),
+            outcome[r.outcome],
+            probability_words(r.probability),
+        )
+    )
+
+
+def _worst_first(rows: Sequence[Rehearsed]) -> list[Rehearsed]:
+    order = {"mistaken": 0, "missed": 1, "named": 2}
+    return sorted(rows, key=lambda r: (order[r.outcome], -r.length))
