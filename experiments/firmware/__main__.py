@@ -37,10 +37,13 @@ SENTINELS = (-127.0, 85.0, 0.0, 999.0, -9999.0, np.nan)
 
 def beside_the_model(
     model: DriftModel, units: list[Unit], seconds: float, sample_s: float, origin_us: int = 0
-) -> Any:
-    """Largest difference at flag 0 and flags that differ, of each unit; counts of flags."""
+) -> list[dict[str, Any]]:
+    """Of each unit the largest difference at flag 0, flags that differ, and counts of flags."""
     step_us = round(sample_s * 1e6)
-    found = [{"dtype": unit.dtype, "largest_difference": 0.0, "flags_differ": 0} for unit in units]
+    found: list[dict[str, Any]] = [
+        {"dtype": unit.dtype, "seconds": seconds, "largest_difference": 0.0, "flags_differ": 0}
+        for unit in units
+    ]
     flags = np.zeros(3, dtype=np.int64)
 
     def recorded() -> Iterator[Run]:
@@ -56,7 +59,7 @@ def beside_the_model(
             off = float(np.abs(out - expected.compensated)[good].max(initial=0.0))
             row["largest_difference"] = max(row["largest_difference"], off)
             row["flags_differ"] += int(np.count_nonzero(flag != expected.flag))
-    return {"seconds": seconds, "sample_s": sample_s, "flags": flags.tolist(), "units": found}
+    return [row | {"flags": flags.tolist()} for row in found]
 
 
 def with_faults(model: DriftModel, units: list[Unit], count: int) -> Any:
@@ -118,10 +121,15 @@ def main() -> int:
     parser.add_argument(
         "--only", nargs="*", choices=parts, default=parts, help="others stay as results.json has them"
     )
+    parser.add_argument("--formats", nargs="*", choices=C_DTYPES, default=C_DTYPES)
     asked = parser.parse_args()
     lengths = 3600.0 * np.array([asked.hours_100_hz, asked.hours_1_khz, 24.0 * asked.days_1_hz])
     model = trained_model()
-    held = json.loads((HERE / "results.json").read_text()) if set(asked.only) < set(parts) else {}
+    held = (
+        json.loads((HERE / "results.json").read_text())
+        if set(asked.only) < set(parts) or set(asked.formats) < set(C_DTYPES)
+        else {}
+    )
     result = {
         "fogml": __version__,
         "data": "synthetic",
@@ -133,10 +141,13 @@ def main() -> int:
     }
     for (name, (sample_s, dtypes, flags)), seconds in zip(RATES.items(), lengths.tolist(), strict=True):
         if name in asked.only:
-            units = [Unit(c_source(Plan.of(model, sample_s), dtype, []), *flags) for dtype in dtypes]
+            wanted = [dtype for dtype in dtypes if dtype in asked.formats]
+            units = [Unit(c_source(Plan.of(model, sample_s), dtype, []), *flags) for dtype in wanted]
             # The clock begins at Unix time.
-            result["cases"][name] = beside_the_model(model, units, seconds, sample_s, 1_764_000_000_000_000)
-            print(name, result["cases"][name], flush=True)
+            rows = beside_the_model(model, units, seconds, sample_s, 1_764_000_000_000_000)
+            print(name, rows, flush=True)
+            kept = [row for row in result["cases"].get(name, []) if row["dtype"] not in wanted]
+            result["cases"][name] = sorted([*kept, *rows], key=lambda row: dtypes.index(row["dtype"]))
     if "faults" in asked.only:
         units = [Unit(c_source(Plan.of(model, 1.0), dtype, [])) for dtype in C_DTYPES]
         result["faults"] = with_faults(model, units, asked.samples)
@@ -175,11 +186,11 @@ def _page(result: dict[str, Any]) -> str:
         "|---|---|---|---|---|---|---|---|---|",
     ]
     for name, case in result["cases"].items():
-        hours = case["seconds"] / 3600.0
-        length = f"{hours:g} h" if hours < 1000.0 else f"{hours / 24.0:g} days"
-        for row in case["units"]:
+        for row in case:
+            hours = row["seconds"] / 3600.0
+            length = f"{hours:g} h" if hours < 1000.0 else f"{hours / 24.0:g} days"
             size = result["sizes"][name][row["dtype"]] or dict.fromkeys(_SIZES, "–")
-            counts = ", ".join(str(count) for count in case["flags"])
+            counts = ", ".join(str(count) for count in row["flags"])
             lines.append(
                 f"| {name} | {length} | {row['dtype']} | {row['largest_difference']:.2g} "
                 f"| {row['flags_differ']} | {counts} | {size['ram_bytes']} | {size['flash_bytes']} "
