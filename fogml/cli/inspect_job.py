@@ -11,6 +11,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.report.words import duration
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
@@ -66,7 +67,7 @@ def _print(run: dict[str, Any], terminal: Terminal) -> None:
         [column["name"], column["unit"] or "–", *(number(column[key]) for key in _STATISTICS)]
         for column in run["columns"]
     ]
-    title = f"{run['run']}: {run['rows']} rows, {number(run['span_s'])} s, one in {number(run['sample_s'])} s"
+    title = f"{run['run']}: {run['rows']} rows, {duration(run['span_s'])}, one in {duration(run['sample_s'])}"
     terminal.table(title, ["column", "unit", *(key.replace("_", " ") for key in _STATISTICS)], rows)
     if run["earth_rate_deg_h"] is not None:
         terminal.say(f"Earth rate along the input axis: {number(run['earth_rate_deg_h'])} deg/h")
@@ -80,10 +81,10 @@ def _print(run: dict[str, Any], terminal: Terminal) -> None:
     gaps = run["gaps"]
     if gaps["count"]:
         terminal.say(
-            f"gaps: {gaps['count']}, the longest {number(gaps['longest_s'])} s, {gaps['stretches']} stretches"
+            f"gaps: {gaps['count']}, the longest {duration(gaps['longest_s'])}, {gaps['stretches']} stretches"
         )
     spent = [
-        f"{name.replace('_', ' ')} {number(time)} s"
+        f"{name.replace('_', ' ')} {duration(time)}"
         for name, time in run["regimes"]["seconds"].items()
         if time
     ]

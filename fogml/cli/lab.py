@@ -144,7 +144,10 @@ def rate(
 @app.command()
 def north(
     positions: Annotated[
-        str | None, typer.Option("--positions", metavar="FILE", help="A run with a column position, 1 to 4.")
+        str | None,
+        typer.Option(
+            "--positions", metavar="FILE", help="A run with a column position, 1 to 4, or the table's angle."
+        ),
     ] = None,
     azimuth: Annotated[
         float | None, typer.Option("--azimuth", metavar="DEG", help="Simulate a seek at this azimuth.")

@@ -14,8 +14,8 @@ from fogml.errors import InputError
 from fogml.json_files import finite_json
 from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
+from fogml.report.words import duration
 
-_COLUMNS = ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "se")
 WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
 
 
@@ -142,13 +142,20 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
                 name,
                 *(
                     number(told[key])
-                    for key in ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "se")
+                    for key in ("dwell_s", "error_deg", "greatest_error_deg", "rms_error_deg", "rms_se")
                 ),
             ]
             for name, told in values["ways"].items()
         ]
-        header = ["way", "dwell [s]", "error here [deg]", "greatest [deg]", "rms [deg]", "se of noise [deg]"]
-        terminal.table(f"Ways to spend {values['duration_s']:g} s", header, rows)
+        header = [
+            "way",
+            "dwell [s]",
+            "error here [deg]",
+            "greatest [deg]",
+            "rms [deg]",
+            "se of noise, rms [deg]",
+        ]
+        terminal.table(f"Ways to spend {duration(values['duration_s'])}", header, rows)
     quiet, worst = (
         ", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) or "none" for k in ("quiet", "worst")
     )

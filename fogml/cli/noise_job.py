@@ -12,6 +12,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
+from fogml.report.words import duration
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
 
@@ -112,11 +113,12 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     floor = values.get("floor")
     if floor:
         low, high = floor["ci"][0]
+        over = duration(floor["averaging_s"][0])
         terminal.say(
-            f"noise floor of averages over {floor['averaging_s'][0]:g} s: {number(floor['value'][0])} deg/h "
+            f"noise floor of averages over {over}: {number(floor['value'][0])} deg/h "
             f"({level} from {number(low)} to {number(high)}), from {floor['source']}"
         )
     minimum = values["minimum"]
-    terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {number(minimum['tau_s'])} s")
+    terminal.say(f"minimum: {number(minimum['adev'])} deg/h at {duration(minimum['tau_s'])}")
     for text in (*values["notes"], *(finding["message"] for finding in values["findings"])):
         terminal.say(text)

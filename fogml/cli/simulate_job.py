@@ -16,7 +16,7 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.between_runs import Storage
 from fogml.twin.programme import Programme, load_programme, programme_names
-from fogml.twin.simulate import DEFAULT_COLUMNS, DEFAULT_FACTS, simulate_to_file, world_of, write_world
+from fogml.twin.simulate import DEFAULT_COLUMNS, default_facts, simulate_to_file, world_of, write_world
 from fogml.twin.timeline import timeline
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
@@ -112,7 +112,7 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     if settings.truth is not None and Path(settings.truth).absolute() == out.absolute():
         raise InputError(f"{out}: is the run and the truth; choose another --truth")
     programme, twin = load_programme(settings.programme), load_twin(settings.twin)
-    facts = DEFAULT_FACTS if settings.facts is None else facts_from(settings.facts, "facts")
+    facts = default_facts(programme) if settings.facts is None else facts_from(settings.facts, "facts")
     with settings.written_beside(out, "simulate"):
         rows = _simulate(settings, programme, twin, facts, out, terminal)
     _print(settings, programme, twin, rows, terminal)
@@ -134,8 +134,8 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
         stack.enter_context(settings.written_beside(outs[0], "simulate"))
         for number, (run, out) in enumerate(zip(settings.runs, outs)):
             stated = run.facts if run.facts is not None else settings.facts
-            facts = DEFAULT_FACTS if stated is None else facts_from(stated, "facts")
             programme = load_programme(run.programme)
+            facts = default_facts(programme) if stated is None else facts_from(stated, "facts")
             before = world_of(
                 programme,
                 twin,

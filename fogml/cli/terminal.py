@@ -78,12 +78,16 @@ class Terminal:
         from rich.table import Table
 
         table = Table(title=terminal_text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        console = Console(highlight=False, markup=False)
+        columns = [[terminal_text(cell) for cell in cells] for cells in zip(header, *rows, strict=True)]
+        widths = _column_widths(columns, console.width)
         for number, name in enumerate(header):
-            # Words break anywhere rather than be cut: a figure is never lost.
-            table.add_column(name, justify="right" if number else "left", overflow="fold")
+            # Where whole words don't fit they break anywhere rather than be cut: a figure is never lost.
+            width = widths[number] if widths else None
+            table.add_column(name, justify="right" if number else "left", overflow="fold", width=width)
         for row in rows:
             table.add_row(*map(terminal_text, row))
-        Console(highlight=False, markup=False).print(table)
+        console.print(table)
 
     @contextmanager
     def work(self, what: str, total: float | None = None) -> Iterator[Work]:
@@ -95,6 +99,25 @@ class Terminal:
                 yield work
         else:
             yield _Lines(what, total)
+
+
+_BETWEEN = 3
+"""Characters between two columns of a table."""
+
+
+def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
+    """Widths in which no word is broken, wider where there is room; None where words alone don't fit."""
+    whole = [max(map(len, cells)) for cells in columns]
+    widths = [max((len(word) for cell in cells for word in cell.split()), default=1) for cells in columns]
+    room = width - _BETWEEN * len(columns) - sum(widths)
+    if room < 0:
+        return None
+    for _ in range(room):
+        short = [most - held for most, held in zip(whole, widths, strict=True)]
+        if max(short) <= 0:
+            break
+        widths[short.index(max(short))] += 1
+    return widths
 
 
 class _Silent:

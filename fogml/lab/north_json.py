@@ -24,6 +24,8 @@ from fogml.runs.run import FloatArray, Run
 
 SCHEMA = "fogml.north/1"
 CIRCLE_DEG = np.arange(0.0, 360.0, 1.0)
+ROUND_OFF_DEG = 360.0 * float(np.finfo(np.float64).eps)
+"""Errors below this are none: angles on a circle differ by no less."""
 MAP_LATITUDES_DEG = np.arange(0.0, 81.0, 5.0)
 MAP_DWELLS_S = np.array([15.0, 30.0, 60.0, 90.0, 120.0, 180.0, 240.0, 300.0])
 
@@ -183,15 +185,20 @@ def _told(
     stays = sum(len(each.order_deg) for each in seeks)
     between = way.fine.transfer_s if isinstance(way, CoarseFine) else 0.0
     return {
-        "error_deg": float(error_of(way, azimuth_deg, drift, latitude_deg)),
-        "greatest_error_deg": way_greatest(way, errors, drift, latitude_deg),
-        "rms_error_deg": float(np.sqrt(np.mean(errors**2))),
+        "error_deg": _seen(float(error_of(way, azimuth_deg, drift, latitude_deg))),
+        "greatest_error_deg": _seen(way_greatest(way, errors, drift, latitude_deg)),
+        "rms_error_deg": _seen(float(np.sqrt(np.mean(errors**2)))),
         "se": se if random_walk > 0.0 else None,
         "rms_se": float(np.sqrt(np.mean(on_circle**2))) if random_walk > 0.0 else None,
         "dwell_s": scheme.dwell_s,
         "stays": stays,
         "duration_s": sum(each.duration_s for each in seeks) + between,
     }
+
+
+def _seen(error_deg: float) -> float:
+    """An error, or none where it is the arithmetic's."""
+    return error_deg if abs(error_deg) >= ROUND_OFF_DEG else 0.0
 
 
 def way_greatest(way: Way, errors: FloatArray, drift: Drift, latitude_deg: float) -> float:

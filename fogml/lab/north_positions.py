@@ -88,8 +88,11 @@ def north_from_positions(
     method: str = "auto",
     settle_s: float = 0.0,
     latitude_deg: float | None = None,
+    angle_tolerance_deg: float = 0.5,
 ) -> NorthFix:
     """North from a run with a column ``position``; 0 or nothing there is on the way.
+
+    Without that column positions follow from ``angle``, the table's: where it rests at the angle of one.
 
     Parameters
     ----------
@@ -106,6 +109,8 @@ def north_from_positions(
         Time left out at the begin of each stay [s].
     latitude_deg
         For a check on the rate seen; that of the run's facts if None.
+    angle_tolerance_deg
+        Without ``position``: how far from its angle the table may be and count as in a position [deg].
 
     Raises
     ------
@@ -114,7 +119,7 @@ def north_from_positions(
     """
     if method not in METHODS:
         raise InputError(f"method '{method}': one of {', '.join(METHODS)} was expected")
-    stays = _stays(run, len(order_deg), settle_s)
+    stays = _stays(run, order_deg, sense, settle_s, angle_tolerance_deg)
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)
     check_design(plain_design, False)
@@ -157,20 +162,38 @@ def north_from_positions(
     )
 
 
-def _stays(run: Run, count: int, settle_s: float) -> _Stays:
-    """Mean, middle time and number of samples of each stay, and the variance of a sample within."""
-    if "position" not in run.columns:
+def _recorded_positions(run: Run, order_deg: Sequence[float], sense: str, tolerance_deg: float) -> FloatArray:
+    """Position of each sample as recorded, or as the table's angle tells it; shape (n,)."""
+    if "position" in run.columns:
+        return run.columns["position"]
+    if "angle" not in run.columns:
         raise InputError(
-            f"{run.name}: no column 'position'; 1 to {count} in a position and 0 on the way were expected"
+            f"{run.name}: no column 'position', 1 to {len(order_deg)} in a position and 0 on the way, and no "
+            "column 'angle [deg]' of the table that would tell it; one of them is needed"
         )
+    # The table's angle counts counter-clockwise.
+    turned = run.columns["angle"] * (-1.0 if sense == "cw" else 1.0)
+    off = (turned[:, None] - np.asarray(order_deg, dtype=np.float64) + 180.0) % 360.0 - 180.0
+    nearest = np.argmin(np.abs(off), axis=1)
+    there = np.abs(off[np.arange(len(off)), nearest]) <= tolerance_deg
+    position = np.where(there, nearest + 1.0, 0.0)
+    # A sample is a mean over its interval, so its neighbours have to be there as well.
+    padded = np.concatenate([position[:1], position, position[-1:]])
+    return np.where((padded[:-2] == position) & (padded[2:] == position), position, 0.0)
+
+
+def _stays(run: Run, order_deg: Sequence[float], sense: str, settle_s: float, tolerance_deg: float) -> _Stays:
+    """Mean, middle time and number of samples of each stay, and the variance of a sample within."""
+    count = len(order_deg)
+    recorded = _recorded_positions(run, order_deg, sense, tolerance_deg)
     if not (np.isfinite(settle_s) and settle_s >= 0.0):
         raise InputError(f"settle {settle_s:g} s: a time that is not negative is needed")
-    position = np.nan_to_num(run.columns["position"], nan=0.0, posinf=-1.0, neginf=-1.0)
+    position = np.nan_to_num(recorded, nan=0.0, posinf=-1.0, neginf=-1.0)
     wrong = (position < 0.0) | (position > count) | (position != np.round(position))
     if wrong.any():
         row = int(np.argmax(wrong))
         raise InputError(
-            f"{run.name}, column 'position', row {row + 1}: {run.columns['position'][row]:g} is no position; "
+            f"{run.name}, column 'position', row {row + 1}: {recorded[row]:g} is no position; "
             f"1 to {count} in a position and 0 on the way were expected"
         )
     missing = sorted(set(range(1, count + 1)) - set(position[position > 0].astype(int).tolist()))

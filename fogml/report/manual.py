@@ -95,14 +95,11 @@ def mathml(formula: str) -> str:
 
 
 def manual_page(folder: Path, made: Mapping[str, str] | None = None) -> str:
-    """All pages as one HTML page, with a list of them, formulas and pictures within it."""
+    """All pages as one HTML page, formulas and pictures within it; the first lists the others."""
     names = page_names(folder)
     texts = {name: page_text(folder, name, made) for name in names}
     sections = [(name, Markup(_html(text, name, names, folder))) for name, text in texts.items()]
-    links = [(name, title_of(texts[name])) for name in names]
-    return render(
-        "manual.html", title=f"fogml {fogml.__version__}: the manual", links=links, sections=sections
-    )
+    return render("manual.html", title=f"fogml {fogml.__version__}: the manual", sections=sections)
 
 
 def _html(text: str, name: str, names: Iterable[str], folder: Path) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.errors import InputError, quoted
+from fogml.runs.facts import Facts, facts_from
 from fogml.twin.schedule import Schedule, schedule
 from fogml.twin.sentences import parse_action, parse_quantity, parse_step
 from fogml.twin.steps import Action, Repeat, Step, number_text
@@ -24,7 +25,7 @@ _QUANTITIES = {
     "fastest_rate": ("temperature rate", "degC/min"),
     "table_acceleration": ("table acceleration", "deg/s2"),
 }
-_KEYS = ("schema", "name", "description", *_QUANTITIES, "power", "steps")
+_KEYS = ("schema", "name", "description", *_QUANTITIES, "input_axis", "power", "steps")
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +47,8 @@ class Programme:
     powered
         Whether the unit is on at the beginning, since long before. None: on, unless the first
         that the steps say of the power is that it goes on.
+    input_axis
+        How the gyro is mounted for it, as in the facts of a run; None: however the run's facts say.
 
     Raises
     ------
@@ -60,6 +63,7 @@ class Programme:
     fastest_rate: float = 5.0
     table_acceleration: float = 50.0
     powered: bool | None = None
+    input_axis: Any = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "steps", tuple(self.steps))
@@ -107,6 +111,8 @@ class Programme:
             values["description"] = self.description
         for key, (_, unit) in _QUANTITIES.items():
             values[key] = f"{number_text(getattr(self, key))} {unit}"
+        if self.input_axis is not None:
+            values["input_axis"] = Facts(input_axis=self.input_axis).model_dump(mode="json")["input_axis"]
         if self.powered is not None:
             values["power"] = "on" if self.powered else "off"
         return {**values, "steps": [_as_value(step) for step in self.steps]}
@@ -161,6 +167,8 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
     for key, (dimension, _) in _QUANTITIES.items():
         if key in values:
             settings[key] = _pointed(parse_quantity, f"{source}, key '{key}'", values[key], dimension)
+    if "input_axis" in values:
+        settings["input_axis"] = facts_from({"input_axis": values["input_axis"]}, source).input_axis
     if "power" in values:
         settings["powered"] = _power(values["power"], source)
     # Under the file's name until all is checked, so that messages state it.

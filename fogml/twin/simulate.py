@@ -81,8 +81,9 @@ def simulate(
     columns
         What to record beside time and gyro, by the run format's names; `DEFAULT_COLUMNS` if None.
     facts
-        Set-up facts; latitude 39.9 deg and the input axis up if None. The unit is the twin's name and
-        the notes say what was simulated, unless stated; power-on is the programme's.
+        Set-up facts; if None latitude 39.9 deg, and the input axis as the programme states it, or up.
+        Unless stated, the unit is the twin's name and the notes say what was simulated; power-on is the
+        programme's.
     truth
         Whether to keep every node and every effect's contribution.
     after
@@ -215,6 +216,11 @@ def _never_on(world: World) -> InputError:
     return InputError(f"{world.timeline.programme.name}: the unit is never on; add a step with 'power on'")
 
 
+def default_facts(programme: Programme) -> Facts:
+    """Set-up facts where none are stated: the gyro mounted as the programme says."""
+    return DEFAULT_FACTS.model_copy(update={"input_axis": programme.input_axis or DEFAULT_FACTS.input_axis})
+
+
 def world_of(
     programme: Any,
     twin: Twin | str | Path,
@@ -231,7 +237,7 @@ def world_of(
     if not isinstance(programme, Programme):
         programme = load_programme(programme)
     unit = twin if isinstance(twin, Twin) else load_twin(twin)
-    facts = DEFAULT_FACTS if facts is None else facts
+    facts = default_facts(programme) if facts is None else facts
     notes = f"synthetic: programme {programme.name}, twin {unit.name}, seed {seed}"
     stated = facts.model_copy(update={"unit": facts.unit or unit.name, "notes": facts.notes or notes})
     counts = unit.counts_per_deg_h(sample_s)

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 import yaml
 
+from fogml.errors import InputError
 from fogml.lab.misalignment_simulation import TableUnit, measurements
 from fogml.lab.north import Drift, Scheme
-from fogml.lab.north_positions import simulated_positions
+from fogml.lab.north_positions import north_from_positions, simulated_positions
+from fogml.runs.run import Run
 
 MISALIGNMENT_KEYS = ("K", "delta_x_deg", "delta_y_deg", "delta_deg", "fixture_error_deg", "se")
 NORTH_KEYS = (
@@ -82,6 +84,30 @@ def test_north_of_a_recording(positions: Path, tmp_path: Path, invoke, invoke_js
     out = tmp_path / "north"
     assert "azimuth 77.0" in invoke("lab", "north", "--positions", positions, "-o", out).stdout
     assert sorted(p.name for p in out.iterdir()) == ["lab-north.config.yaml", "north.html", "north.json"]
+
+
+@pytest.mark.parametrize(("sense", "turn"), [("cw", -1.0), ("ccw", 1.0)])
+def test_positions_follow_from_the_table_angle(sense: str, turn: float) -> None:
+    """As recorded, clockwise negative; a sample beside a turn is on the way."""
+    run = simulated_positions(Scheme(sense=sense, dwell_s=30.0, transfer_s=10.0), 77.0, 30.0, Drift(2.0))
+    position = run.columns["position"]
+    held = np.maximum.accumulate(np.where(position > 0.0, np.arange(len(position)), 0))
+    angle = turn * 90.0 * (position[held] - 1.0) + np.where(position > 0.0, 0.0, 45.0)
+    angles = Run("turned", {"time": run.time, "gyro": run.columns["gyro"], "angle": angle + 360.0}, run.facts)
+    found = north_from_positions(angles, sense=sense)
+    assert found.azimuth_deg == pytest.approx(north_from_positions(run, sense=sense).azimuth_deg, abs=0.05)
+    assert found.azimuth_deg == pytest.approx(77.0, abs=0.05)
+    with pytest.raises(InputError, match="column 'angle"):
+        north_from_positions(Run("neither", {"time": run.time, "gyro": run.columns["gyro"]}, run.facts))
+
+
+def test_a_simulated_seek_is_read_as_it_was_written(tmp_path: Path, invoke, invoke_json) -> None:
+    out = tmp_path / "seek.csv"
+    invoke("simulate", "--programme", "four-positions", "--twin", "tactical", "-o", out)
+    assert yaml.safe_load(out.with_suffix(".yaml").read_text())["input_axis"] == "north"
+    told = invoke_json("lab", "north", "--positions", out)
+    off = (told["azimuth_deg"] + 180.0) % 360.0 - 180.0
+    assert 0.0 < told["se"] < 2.0 and abs(off) < 4.0 * told["se"]
 
 
 def test_north_simulated(tmp_path: Path, invoke, invoke_json) -> None:
@@ -195,3 +221,13 @@ def test_train_shows_the_cost_in_navigation(run_files, tmp_path: Path, invoke, i
     assert "navigation" in json.loads((out / "report.json").read_text())
     message = invoke(*asked, "-o", tmp_path / "other", "--navigation", 90, status=2).stderr
     assert "latitude 90" in message and not (tmp_path / "other").exists()
+
+
+def test_what_rounding_leaves_is_no_error_and_the_terminal_shows_the_page(tmp_path: Path, invoke) -> None:
+    asked = ("--azimuth", 77, "--latitude", 40, "--transfer", 10, "--drift", 0.18, "--noise", 0.01)
+    told = invoke("lab", "north", *asked, "-o", tmp_path / "out").stdout
+    ways = json.loads((tmp_path / "out" / "north.json").read_text())["ways"]
+    assert ways["palindrome"]["greatest_error_deg"] == ways["drift-observing"]["error_deg"] == 0.0
+    assert ways["plain"]["error_deg"] > 1e-3 and "e-1" not in told
+    for way in ways.values():
+        assert f"{way['rms_se']:.4g}" in told

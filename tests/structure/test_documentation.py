@@ -17,6 +17,7 @@ import fogml
 from experiments.guide_commands.__main__ import NEEDS_NETWORK, ROOT, blocks_of, files_of, lines_of, pages
 from fogml.cli.main import app
 from fogml.report.manual import page_names
+from fogml.runs.shipped import shipped_names
 
 CODE = Path(fogml.__file__).parent
 PAGES = pages()
@@ -59,6 +60,11 @@ def test_commands_and_options_within_the_text_exist(path: Path) -> None:
         command, _, context = resolved([word for word in words if word != "…"])
         known = {name for p in command.get_params(context) for name in (*p.opts, *p.secondary_opts)}
         assert {word for word in words if word.startswith("--")} <= known, text
+
+
+def test_recordings_that_are_named_ship() -> None:
+    named = {name for text in TEXTS.values() for name in re.findall(r"shipped:([a-z][\w-]*)", text)}
+    assert named and named <= set(shipped_names())
 
 
 def test_each_file_is_there_or_made_before() -> None:

@@ -19,6 +19,7 @@ from fogml.twin.programme import (
     programme_names,
 )
 from fogml.twin.sentences import parse_action, parse_step
+from fogml.twin.simulate import default_facts
 from fogml.twin.steps import Hold, Ramp, Repeat, Setting, Soak, Turn, TurnTo
 from fogml.twin.timeline import timeline
 
@@ -281,3 +282,15 @@ def test_separating_has_all_that_separates() -> None:
     # Five soaks on both branches are turned in.
     turned_at = {line.step_names[i] for i in np.unique(block.step[np.abs(block.table_rate) == 100.0])}
     assert len(turned_at) >= 5
+
+
+def test_a_programme_may_state_how_the_gyro_is_mounted() -> None:
+    programme = programme_from({"input_axis": {"heading": 30.0}, "steps": ["hold for 60 s"]})
+    assert programme.input_axis.heading == 30.0
+    assert programme_from(programme.as_dict()).input_axis == programme.input_axis
+    assert default_facts(programme).earth_rate_deg_h == pytest.approx(
+        15.041067 * np.cos(np.radians(39.9)) * np.cos(np.radians(30.0))
+    )
+    assert default_facts(load_programme("multi-point-cycle")).input_axis == "up"
+    with pytest.raises(InputError, match="input_axis"):
+        programme_from({"input_axis": "sideways", "steps": ["hold for 60 s"]})
