@@ -31,7 +31,7 @@ def _help(quick: bool, folder: Path) -> Work:
         assert "train" in a and "compensate" in a
         return "help names the commands"
 
-    return Work(lambda: timed(_HELP), lambda: timed("import typer, rich"), check)
+    return Work(lambda: timed(_HELP), lambda: timed("import click, rich"), check)
 
 
 COMMAND_JOBS = (
@@ -40,7 +40,7 @@ COMMAND_JOBS = (
         "help",
         "fogml --help, from starting Python to its end",
         "fogml --help",
-        "starting Python and importing typer and rich",
+        "starting Python and importing click and rich",
         _help,
         limit_s=0.3,
     ),

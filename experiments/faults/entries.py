@@ -2,36 +2,56 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-import typer
-
-from fogml.cli import options
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
 
 NAME = "only"
-COMMAND = {NAME: ("experiments.faults.entries", "An entry point without a job.")}
-app = typer.Typer(**options.APP_SETTINGS)
+COMMAND = {NAME: ("experiments.faults.entries:COMMANDS", "An entry point without a job.")}
 
 
-@app.command()
-def read(path: str, repair: Annotated[bool, typer.Option("--repair")] = False) -> None:
+class ReadSettings(Settings):
+    """Read a run."""
+
+    job: ClassVar[str] = "experiments.faults.entries:read"
+    path: Annotated[str, argument("RUN", "The run.")]
+    repair: Annotated[bool, option("Repair it.", "--repair")] = False
+
+
+class LoadSettings(Settings):
+    """Load a model."""
+
+    job: ClassVar[str] = "experiments.faults.entries:load"
+    folder: Annotated[str, argument("DIR", "The model's folder.")]
+
+
+class FeaturesSettings(Settings):
+    """Read a feature text."""
+
+    job: ClassVar[str] = "experiments.faults.entries:features"
+    text: Annotated[str, argument("TEXT", "The text.")]
+
+
+COMMANDS = {"read": ReadSettings, "load": LoadSettings, "features": FeaturesSettings}
+
+
+def read(settings: ReadSettings, _: Any) -> None:
     """Read a run."""
     from fogml.cli.runs import open_run
 
-    open_run(path, repair=repair)
+    open_run(settings.path, repair=settings.repair)
 
 
-@app.command()
-def load(folder: str) -> None:
+def load(settings: LoadSettings, _: Any) -> None:
     """Load a model."""
     from fogml.models.saved import load_model
 
-    load_model(folder)
+    load_model(settings.folder)
 
 
-@app.command()
-def features(text: str) -> None:
+def features(settings: FeaturesSettings, _: Any) -> None:
     """Read a feature text."""
     from fogml.features.parse import parse_features
 
-    parse_features(text)
+    parse_features(settings.text)

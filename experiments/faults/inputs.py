@@ -641,14 +641,11 @@ _COUNTS = {"workers", "threads", "trials", "count", "number", "batch", "jobs"}
 
 
 def option(rng: Random, world: World) -> Case:
-    import typer
-
     from fogml.cli.main import app
 
     name = rng.choice(list(SOUND_COMMANDS))
-    group: Any = typer.main.get_command(app)
-    command = group.get_command(None, name.split()[0])
-    for word in name.split()[1:]:
+    command: Any = app
+    for word in name.split():
         command = command.get_command(None, word)
     words = list(SOUND_COMMANDS[name])
     known = [

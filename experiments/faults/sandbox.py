@@ -116,18 +116,16 @@ class Sandbox:
     @contextlib.contextmanager
     def catching(self) -> Iterator[None]:
         """Catch what is written to the standard streams, by whatever library."""
-        import typer
-
         import fogml.cli.main as main
         import fogml.runs.reading as reading
 
         own = sys.stdout, sys.stderr
         saved = {number: os.dup(number) for number in (1, 2)}
-        read_runs, get_command, place = reading.read_runs, typer.main.get_command, tempfile.tempdir
+        read_runs, get_command, place = reading.read_runs, main.Group.get_command, tempfile.tempdir
 
         main.COMMANDS |= COMMAND
         # Commands are declared anew for each process: here they are once for all.
-        typer.main.get_command = functools.cache(typer.main.get_command)
+        main.Group.get_command = functools.cache(get_command)
         # Where reports of what nobody expected go.
         self.reports.mkdir(exist_ok=True)
         tempfile.tempdir = str(self.reports)
@@ -144,7 +142,7 @@ class Sandbox:
         try:
             yield
         finally:
-            reading.read_runs, typer.main.get_command = read_runs, get_command
+            reading.read_runs, main.Group.get_command = read_runs, get_command
             tempfile.tempdir = place
             del main.COMMANDS[NAME]
             sys.stdout, sys.stderr = own

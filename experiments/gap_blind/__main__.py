@@ -23,11 +23,8 @@ from typing import Any
 
 from fogml.blind.folders import DIAGNOSIS
 from fogml.blind.scoring.marks_file import MARKS, read_marks
+from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
 from fogml.cli.blind_job import (
-    MakeSettings,
-    MergeSettings,
-    RunSettings,
-    ScoreSettings,
     make_and_tell,
     merge_and_write,
     run_and_tell,

@@ -25,7 +25,8 @@ from fogml.blind.scoring.marks_file import MARKS, read_marks, write_marks
 from fogml.blind.scoring.statistics import proportion
 from fogml.blind.seeds import record_use
 from fogml.blind.truth import read_truth
-from fogml.cli.blind_job import MakeSettings, RunSettings, make_and_tell, run_and_tell
+from fogml.cli.blind import MakeSettings, RunSettings
+from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.words import MISSING, plural

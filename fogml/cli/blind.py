@@ -3,222 +3,184 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-import typer
+from pydantic import BeforeValidator
 
+from fogml.blind.folders import DIAGNOSIS, BlindFolder
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
+from fogml.errors import InputError
 
-app = typer.Typer(
-    **options.APP_SETTINGS,
-    no_args_is_help=True,
-    help="The check on withheld effects: make cases, answer them, score.",
-)
+WANTED = "wanted"
 
-Folder = Annotated[str | None, typer.Argument(metavar="DIR", help="The suite's folder.")]
+
+def _gates(value: Any) -> Any:
+    """``["figure=value", "wanted", ...]`` as flags give them, or a mapping as YAML does."""
+    if not isinstance(value, list):
+        return value
+    from fogml.blind.score import wanted_gates
+
+    gates: dict[str, float] = wanted_gates() if WANTED in value else {}
+    for text in value:
+        if text == WANTED:
+            continue
+        name, _, number = str(text).partition("=")
+        try:
+            gates[name.strip()] = float(number)
+        except ValueError:
+            raise ValueError(f"'{text}' is no gate; write FIGURE=VALUE, or '{WANTED}'") from None
+    return gates
+
+
+Methods = Annotated[list[str], option("Score these alone; may be repeated.", "--method", metavar="NAME")]
 Final = Annotated[
-    bool | None,
-    typer.Option("--final", help="Use a final seed; the use is recorded in the ledger and the page."),
+    bool, option("Use a final seed; the use is recorded in the ledger and the page.", "--final")
 ]
-Ledger = Annotated[
-    str | None, typer.Option("--ledger", metavar="FILE", help="(experiments/gap_blind/final_uses.json)")
-]
-Workers = Annotated[int | None, typer.Option("--workers", help="Processes (2).")]
+Ledger = Annotated[str, option("Where uses of final seeds are kept.", metavar="FILE", writes=True)]
+LEDGER = "experiments/gap_blind/final_uses.json"
 
 
-@app.command()
-def make(
-    directory: Folder = None,
-    count: Annotated[int | None, typer.Option("--count", "-n", help="Cases (1000).")] = None,
-    first: Annotated[
-        int | None, typer.Option("--first", metavar="N", help="Number of the first one (1).")
-    ] = None,
-    sample: Annotated[
-        float | None, typer.Option("--sample", metavar="SECONDS", help="Interval (10).")
-    ] = None,
-    kinds: Annotated[
-        list[str] | None, typer.Option("--kind", help="Only cases of this kind; may be repeated.")
-    ] = None,
-    least_d_prime: Annotated[
-        float | None,
-        typer.Option("--least-d-prime", metavar="D", help="Only strata of d' that begin there or above."),
-    ] = None,
-    d_prime: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--d-prime", metavar="LOW-HIGH", help="Draw d' within these bounds instead; may be repeated."
-        ),
-    ] = None,
-    reality: Annotated[
-        str | None,
-        typer.Option(
-            "--reality",
-            metavar="NAME",
-            help="first (default), second, third, mix for all in turn, or same-twin for a twin's own runs.",
-        ),
-    ] = None,
-    leave_one_out: Annotated[
-        bool | None,
-        typer.Option("--leave-one-out", help="Only cases with an effect left out, each effect in turn."),
-    ] = None,
-    relatives_stay: Annotated[
-        bool | None,
-        typer.Option(
-            "--relatives-stay/--relatives-out",
-            help="Keep relatives of an effect that is left out among the candidates.",
-        ),
-    ] = None,
-    workers: Workers = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class SuiteSettings(Settings):
+    """What every job on a suite takes."""
+
+    directory: Annotated[str | None, argument("DIR", "The suite's folder.", reads=True)] = None
+
+    def folder(self) -> BlindFolder:
+        """The suite.
+
+        Raises
+        ------
+        InputError
+            If none is named.
+        """
+        if not self.directory:
+            raise InputError("no folder is given; name the suite's folder")
+        return BlindFolder(Path(self.directory))
+
+
+class MakeSettings(SuiteSettings):
     """Make cases from a reality that is not the twin, and their truth apart from them.
 
     Seeds from 1000000 on are kept for final figures. An interrupted call goes on where it was.
     """
-    from fogml.cli.blind_job import MakeSettings, make_and_tell
 
-    flags = {
-        "directory": directory,
-        "count": count,
-        "first": first,
-        "sample": sample,
-        "kinds": kinds,
-        "least_d_prime": least_d_prime,
-        "d_prime": d_prime,
-        "reality": reality,
-        "leave_one_out": leave_one_out,
-        "relatives_stay": relatives_stay,
-        "workers": workers,
-        "seed": seed,
-    }
-    make_and_tell(MakeSettings.gather(config, flags), Terminal(as_json, quiet))
-
-
-@app.command()
-def run(
-    directory: Folder = None,
-    methods: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--method",
-            help="diagnosis (default), families, a baseline, 'baselines', or module:function; repeatable.",
+    job: ClassVar[str] = "fogml.cli.blind_job:make_and_tell"
+    count: Annotated[int, option("Cases.", "--count", "-n")] = 1000
+    first: Annotated[int, option("Number of the first one.")] = 1
+    sample: Annotated[float, option("Interval.", metavar="SECONDS")] = 10.0
+    kinds: Annotated[
+        list[str], option("Only cases of this kind; may be repeated.", "--kind", metavar="KIND")
+    ] = []
+    least_d_prime: Annotated[float, option("Only strata of d' that begin there or above.", metavar="D")] = 0.0
+    d_prime: Annotated[
+        list[str],
+        option("Draw d' within these bounds instead; may be repeated.", metavar="LOW-HIGH"),
+    ] = []
+    reality: Annotated[
+        str,
+        option(
+            "first, second, third, mix for all in turn, or same-twin for a twin's own runs.", metavar="NAME"
         ),
-    ] = None,
-    code: Annotated[
-        str | None, typer.Option("--code", metavar="FOLDER", help="Where module:function lies.")
-    ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="What the answers are called.")] = None,
-    workers: Workers = None,
-    threads: Annotated[int | None, typer.Option("--threads", help="Threads of each process (1).")] = None,
-    limit: Annotated[
-        float | None, typer.Option("--limit", metavar="SECONDS", help="Time that a case may take (600).")
-    ] = None,
-    shard: Annotated[
-        str | None, typer.Option("--shard", metavar="I/N", help="Every N-th case from the I-th on.")
-    ] = None,
-    retry: Annotated[bool | None, typer.Option("--retry", help="Try failed cases again.")] = None,
-    cost: Annotated[
-        float | None,
-        typer.Option(
-            "--cost-of-false-name",
-            metavar="RATIO",
-            help="Of 'families': a false name costs so many times what a missed one does (1).",
+    ] = "first"
+    leave_one_out: Annotated[
+        bool,
+        option("Only cases with an effect left out, each effect in turn.", "--leave-one-out"),
+    ] = False
+    relatives_stay: Annotated[
+        bool,
+        option(
+            "Keep relatives of an effect that is left out among the candidates.",
+            "--relatives-stay/--relatives-out",
         ),
-    ] = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    ] = False
+    workers: options.Workers = 2
+
+    @property
+    def bounds(self) -> tuple[tuple[float, float], ...]:
+        """Bounds of d' as numbers."""
+        found = []
+        for text in self.d_prime:
+            low, _, high = text.partition("-")
+            try:
+                found.append((float(low), float(high)))
+            except ValueError:
+                raise InputError(f"d' '{text}': write LOW-HIGH, e.g. 20-60") from None
+        return tuple(found)
+
+
+class RunSettings(SuiteSettings):
     """Answer the cases that have no answer yet, in sealed processes that see a case's files alone."""
-    from fogml.cli.blind_job import RunSettings, run_and_tell
 
-    flags = {
-        "directory": directory,
-        "methods": methods,
-        "code": code,
-        "name": name,
-        "workers": workers,
-        "threads": threads,
-        "limit": limit,
-        "shard": shard,
-        "retry": retry,
-        "cost_of_false_name": cost,
-        "seed": seed,
-    }
-    run_and_tell(RunSettings.gather(config, flags), Terminal(as_json, quiet))
-
-
-@app.command()
-def score(
-    directory: Folder = None,
+    job: ClassVar[str] = "fogml.cli.blind_job:run_and_tell"
     methods: Annotated[
-        list[str] | None, typer.Option("--method", help="Score these alone; may be repeated.")
-    ] = None,
-    gates: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--gate", metavar="FIGURE=VALUE", help="Limit on a figure of the diagnosis; 'wanted' for all."
+        list[str],
+        option(
+            "diagnosis, families, a baseline, 'baselines', or module:function; repeatable.",
+            "--method",
+            metavar="NAME",
         ),
-    ] = None,
-    final: Final = None,
-    ledger: Ledger = None,
-    workers: Workers = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="Folder for what is written (DIR).")] = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+    ] = [DIAGNOSIS]
+    code: Annotated[str | None, option("Where module:function lies.", metavar="FOLDER", reads=True)] = None
+    name: Annotated[str | None, option("What the answers are called.", metavar="NAME")] = None
+    workers: options.Workers = 2
+    threads: Annotated[int, option("Threads of each process.")] = 1
+    limit: Annotated[float, option("Time that a case may take.", metavar="SECONDS")] = 600.0
+    shard: Annotated[str, option("Every N-th case from the I-th on.", metavar="I/N")] = "1/1"
+    retry: Annotated[bool, option("Try failed cases again.", "--retry")] = False
+    cost_of_false_name: Annotated[
+        float | None,
+        option(
+            "Of 'families': a false name costs so many times what a missed one does (1).", metavar="RATIO"
+        ),
+    ] = None
+
+    @property
+    def part(self) -> tuple[int, int]:
+        """The shard as numbers."""
+        i, slash, n = self.shard.partition("/")
+        if not (slash and i.strip().isdigit() and n.strip().isdigit()):
+            raise InputError(f"shard '{self.shard}': write I/N, e.g. 2/8")
+        return int(i), int(n)
+
+
+class ScoreSettings(SuiteSettings):
     """Score every method's answers against the truth; exit status 1 where a gate is not met.
 
     Writes score.json, score.html and marks.json.gz; fogml blind merge makes one page of several of those.
     """
-    from fogml.cli.blind_job import ScoreSettings, score_and_write
 
-    flags = {
-        "directory": directory,
-        "methods": methods,
-        "gates": gates,
-        "final": final,
-        "ledger": ledger,
-        "workers": workers,
-        "out": str(out) if out else None,
-        "seed": seed,
-    }
-    if not score_and_write(ScoreSettings.gather(config, flags), Terminal(as_json, quiet)):
-        raise typer.Exit(1)
+    job: ClassVar[str] = "fogml.cli.blind_job:score_and_write"
+    methods: Methods = []
+    gates: Annotated[
+        dict[str, float],
+        BeforeValidator(_gates),
+        option("Limit on a figure of the diagnosis; 'wanted' for all.", "--gate", metavar="FIGURE=VALUE"),
+    ] = {}
+    final: Final = False
+    ledger: Ledger = LEDGER
+    workers: options.Workers = 2
+    out: Annotated[
+        str | None,
+        option("Folder for what is written; the suite's if none.", "--out", "-o", metavar="DIR", writes=True),
+    ] = None
 
 
-@app.command()
-def merge(
-    marks: Annotated[
-        list[str] | None, typer.Argument(metavar="MARKS...", help="Files marks.json.gz of a suite's parts.")
-    ] = None,
-    final: Final = None,
-    ledger: Ledger = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class MergeSettings(Settings):
     """Make one score of a suite's parts, which may have been made, answered and scored anywhere.
 
     Writes score.json, score.html and marks.json.gz. Cases that were made by kind or strength count in the
     figures of their kind alone.
     """
-    from fogml.cli.blind_job import MergeSettings, merge_and_write
 
-    flags = {
-        "marks": marks,
-        "final": final,
-        "ledger": ledger,
-        "out": str(out) if out else None,
-        "seed": seed,
-    }
-    merge_and_write(MergeSettings.gather(config, flags), Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.blind_job:merge_and_write"
+    marks: Annotated[
+        list[str], argument("MARKS...", "Files marks.json.gz of a suite's parts.", reads=True)
+    ] = []
+    final: Final = False
+    ledger: Ledger = LEDGER
+    out: options.FolderIfNamed = None
+
+
+COMMANDS = {"make": MakeSettings, "run": RunSettings, "score": ScoreSettings, "merge": MergeSettings}

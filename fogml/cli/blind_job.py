@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
-from pydantic import field_validator
-
-from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.folders import DIAGNOSIS
+from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
 from fogml.cli.blind_reports import draw_reports, link_reports
-from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -22,117 +20,6 @@ if TYPE_CHECKING:
 LEDGER = "experiments/gap_blind/final_uses.json"
 _WANTED = "wanted"
 _BASELINES = "baselines"
-
-
-class SuiteSettings(Settings):
-    """What every job on a suite takes."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("directory",)
-    directory: str | None = None
-
-    def folder(self) -> BlindFolder:
-        """The suite.
-
-        Raises
-        ------
-        InputError
-            If none is named.
-        """
-        if not self.directory:
-            raise InputError("no folder is given; name the suite's folder")
-        return BlindFolder(Path(self.directory))
-
-
-class MakeSettings(SuiteSettings):
-    """Settings of ``fogml blind make``."""
-
-    count: int = 1000
-    first: int = 1
-    sample: float = 10.0
-    kinds: list[str] = []
-    least_d_prime: float = 0.0
-    d_prime: list[str] = []
-    reality: str = "first"
-    leave_one_out: bool = False
-    relatives_stay: bool = False
-    workers: int = 2
-
-    @property
-    def bounds(self) -> tuple[tuple[float, float], ...]:
-        """Bounds of d' as numbers."""
-        found = []
-        for text in self.d_prime:
-            low, _, high = text.partition("-")
-            try:
-                found.append((float(low), float(high)))
-            except ValueError:
-                raise InputError(f"d' '{text}': write LOW-HIGH, e.g. 20-60") from None
-        return tuple(found)
-
-
-class RunSettings(SuiteSettings):
-    """Settings of ``fogml blind run``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("directory", "code")
-    methods: list[str] = [DIAGNOSIS]
-    code: str | None = None
-    name: str | None = None
-    workers: int = 2
-    threads: int = 1
-    limit: float = 600.0
-    shard: str = "1/1"
-    retry: bool = False
-    cost_of_false_name: float | None = None
-
-    @property
-    def part(self) -> tuple[int, int]:
-        """The shard as numbers."""
-        i, slash, n = self.shard.partition("/")
-        if not (slash and i.strip().isdigit() and n.strip().isdigit()):
-            raise InputError(f"shard '{self.shard}': write I/N, e.g. 2/8")
-        return int(i), int(n)
-
-
-class ScoreSettings(SuiteSettings):
-    """Settings of ``fogml blind score``."""
-
-    written_keys: ClassVar[tuple[str, ...]] = ("out", "ledger")
-    methods: list[str] = []
-    gates: dict[str, float] = {}
-    final: bool = False
-    ledger: str = LEDGER
-    workers: int = 2
-    out: str | None = None
-
-    @field_validator("gates", mode="before")
-    @classmethod
-    def _from_flags(cls, value: Any) -> Any:
-        """``["figure=value", "wanted", ...]`` as flags give them, or a mapping as YAML does."""
-        if not isinstance(value, list):
-            return value
-        from fogml.blind.score import wanted_gates
-
-        gates: dict[str, float] = wanted_gates() if _WANTED in value else {}
-        for text in value:
-            if text == _WANTED:
-                continue
-            name, _, number = str(text).partition("=")
-            try:
-                gates[name.strip()] = float(number)
-            except ValueError:
-                raise ValueError(f"'{text}' is no gate; write FIGURE=VALUE, or '{_WANTED}'") from None
-        return gates
-
-
-class MergeSettings(Settings):
-    """Settings of ``fogml blind merge``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("marks",)
-    written_keys: ClassVar[tuple[str, ...]] = ("out", "ledger")
-    marks: list[str] = []
-    final: bool = False
-    ledger: str = LEDGER
-    out: str | None = None
 
 
 def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import ClassVar
 
-from pydantic import field_validator
-
+from fogml.cli.compare import CompareSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings, Repairing
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import check_settings, floor_words, noise_run
 from fogml.errors import InputError
@@ -20,28 +17,6 @@ from fogml.validation.report_json import comparison_json
 from fogml.validation.strict import hold_strict
 
 _OWN_CHOICE = ("auto", "polynomial", "rbf")
-
-
-class CompareSettings(LimitSettings):
-    """Settings of ``fogml compare``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test", "noise")
-    runs: list[str] = []
-    test: list[str] = []
-    leave_one_out: bool = False
-    models: list[str] = ["all"]
-    features: str | None = None
-    repair: Repairing = False
-    strict: bool = False
-    any_unit: bool = False
-    out: str = "compare-results"
-
-    @field_validator("models", mode="before")
-    @classmethod
-    def _from_text(cls, value: object) -> object:
-        if isinstance(value, str):
-            return [name.strip() for name in value.split(",") if name.strip()]
-        return value
 
 
 def compare_and_write(settings: CompareSettings, terminal: Terminal) -> bool:

@@ -2,46 +2,26 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
-
-import typer
+from typing import Annotated, ClassVar
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
 
-app = typer.Typer(**options.APP_SETTINGS)
 
-
-@app.command()
-def compensate(
-    run: Annotated[str | None, typer.Argument(metavar="RUN", help="The run to compensate.")] = None,
-    model: Annotated[str | None, typer.Option("--model", help="Folder of the model: DIR/model.")] = None,
-    any_unit: options.AnyUnit = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    out: Annotated[Path | None, typer.Option("--out", "-o", help="File to write: .csv or .parquet.")] = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class CompensateSettings(Settings):
     """Apply a model to a run of any length, in bounded memory.
 
     The file written holds the run's columns and 'drift [deg/h]', 'gyro_compensated [deg/h]' and
     'flag': 0 good, 1 outside what the model was trained on, 2 window not full (the static part).
     """
-    from fogml.cli.compensate_job import CompensateSettings, compensate_and_write
 
-    settings = CompensateSettings.gather(
-        config,
-        {
-            "run": run,
-            "model": model,
-            "any_unit": any_unit,
-            "repair": options.repairing(repair, repair_anyway),
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    compensate_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.compensate_job:compensate_and_write"
+    run: Annotated[
+        str | None,
+        argument("RUN", "The run to compensate.", reads=True, known=options.SHIPPED_RUNS),
+    ] = None
+    model: Annotated[str | None, option("Folder of the model: DIR/model.", metavar="DIR", reads=True)] = None
+    any_unit: options.AnyUnit = False
+    repair: options.Repair = False
+    out: options.FileToWrite = None

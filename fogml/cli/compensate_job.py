@@ -6,13 +6,13 @@ from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.cli.compensate import CompensateSettings
 from fogml.cli.runs import open_blocks
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, Work
 from fogml.errors import InputError
 from fogml.runs.run import Run
@@ -22,17 +22,6 @@ if TYPE_CHECKING:
 
 FLAGS = ("good", "outside_training", "window_not_full")
 """What the flags 0, 1 and 2 mean."""
-
-
-class CompensateSettings(Settings):
-    """Settings of ``fogml compensate``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("run", "model")
-    run: str | None = None
-    model: str | None = None
-    any_unit: bool = False
-    repair: Repairing = False
-    out: str | None = None
 
 
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:

@@ -2,28 +2,18 @@
 
 from __future__ import annotations
 
-import typer
+from typing import ClassVar
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
-
-app = typer.Typer(**options.APP_SETTINGS)
+from fogml.cli.settings import Settings
 
 
-@app.command()
-def demo(
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class DemoSettings(Settings):
     """Train and judge on a real recording that ships, then say what to open.
 
     Trains on the up leg of a chamber cycle and judges on the last down leg, three axes. Writes
     x/, y/ and z/, each as 'train' does, and index.html.
     """
-    from fogml.cli.demo_job import DemoSettings, demo_and_write
 
-    settings = DemoSettings.gather(config, {"out": str(out) if out else None, "seed": seed})
-    demo_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.demo_job:demo_and_write"
+    out: options.Folder = "demo-results"

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fogml.cli.demo import DemoSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import SHIPPED, Settings
+from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal, number
 from fogml.cli.train_job import TrainSettings, fit_and_judge, write_results
 from fogml.outputs import whole_folder
@@ -19,12 +20,6 @@ TRAINING_LEG, TEST_LEG = 2, 3
 AVERAGED_ROWS = 20
 CUBIC = "cubic in T"
 """What autopilots fit (ArduPilot and PX4), shown beside the default."""
-
-
-class DemoSettings(Settings):
-    """Settings of ``fogml demo``."""
-
-    out: str = "demo-results"
 
 
 def demo_and_write(settings: DemoSettings, terminal: Terminal) -> None:

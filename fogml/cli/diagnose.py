@@ -2,82 +2,50 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar, Literal
 
-import typer
+from pydantic import Field
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
 
-app = typer.Typer(**options.APP_SETTINGS)
 
-
-@app.command()
-def diagnose(
-    runs: Annotated[list[str] | None, typer.Argument(metavar="RUN...", help="Runs to fit on.")] = None,
-    held_out: Annotated[
-        list[str] | None,
-        typer.Option("--held-out", metavar="RUN", help="Run for the final figure; may be repeated."),
-    ] = None,
-    noise: Annotated[
-        str | None, typer.Option("--noise", metavar="RUN", help="Static run of the unit, for its noise.")
-    ] = None,
-    twin: Annotated[
-        str | None, typer.Option("--twin", metavar="TWIN", help="Twin file, or one that ships (nominal).")
-    ] = None,
-    without: Annotated[
-        list[str] | None,
-        typer.Option("--without", metavar="EFFECT", help="Effect that is no candidate; may be repeated."),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method",
-            metavar="METHOD",
-            help="'diagnosis', or 'families': each effect in whatever form its family has (diagnosis).",
-        ),
-    ] = None,
-    cost: Annotated[
-        float | None,
-        typer.Option(
-            "--cost-of-false-name",
-            metavar="RATIO",
-            help="Of 'families': a false name costs so many times what a missed one does (1).",
-        ),
-    ] = None,
-    rehearse: Annotated[
-        bool | None,
-        typer.Option("--rehearse", help="Of 'families': what these runs would name of each candidate."),
-    ] = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class DiagnoseSettings(Settings):
     """Where the gap between twin and recordings lies, which effect causes it, how far it closes.
 
     Writes gap.json, gap.html, twin.yaml (the twin with the effect added), diagnose.config.yaml and, where a
     further run would tell more, next-run.yaml (its programme, for fogml simulate).
     """
-    from fogml.cli.diagnose_job import DiagnoseSettings, diagnose_and_write
 
-    settings = DiagnoseSettings.gather(
-        config,
-        {
-            "runs": runs,
-            "held_out": held_out,
-            "noise": noise,
-            "twin": twin,
-            "without": without,
-            "method": method,
-            "cost_of_false_name": cost,
-            "rehearse": rehearse,
-            "repair": options.repairing(repair, repair_anyway),
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    diagnose_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.diagnose_job:diagnose_and_write"
+    runs: Annotated[
+        list[str], argument("RUN...", "Runs to fit on.", reads=True, known=options.SHIPPED_RUNS)
+    ] = []
+    held_out: Annotated[
+        list[str],
+        option("Run for the final figure; may be repeated.", metavar="RUN", reads=True),
+    ] = []
+    noise: Annotated[
+        str | None, option("Static run of the unit, for its noise.", metavar="RUN", reads=True)
+    ] = None
+    twin: options.Twin = "nominal"
+    without: Annotated[
+        list[str],
+        option("Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS),
+    ] = []
+    method: Annotated[
+        Literal["diagnosis", "families"],
+        option("Families: each effect in whatever form its family has."),
+    ] = "diagnosis"
+    cost_of_false_name: Annotated[
+        float | None,
+        option(
+            "Of 'families': a false name costs so many times what a missed one does (1).", metavar="RATIO"
+        ),
+    ] = Field(None, gt=0.0)
+    rehearse: Annotated[
+        bool, option("Of 'families': what these runs would name of each candidate.", "--rehearse")
+    ] = False
+    repair: options.Repair = False
+    out: options.Folder = "diagnosis"

@@ -3,41 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar, Literal
+from typing import Any
 
-from pydantic import Field
-
+from fogml.cli.diagnose import DiagnoseSettings
 from fogml.cli.runs import open_run, open_runs
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import as_model
 from fogml.gap.result import FAMILIES, Diagnosis
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
-from fogml.twin.twin_file import load_twin, twin_names
+from fogml.twin.twin_file import load_twin
 
 NEXT_RUN = "next-run.yaml"
 """The programme of a run that would tell more, for ``fogml simulate``."""
-
-
-class DiagnoseSettings(Settings):
-    """Settings of ``fogml diagnose``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "held_out", "noise", "twin")
-    runs: list[str] = []
-    held_out: list[str] = []
-    noise: str | None = None
-    twin: str = "nominal"
-    without: list[str] = []
-    method: Literal["diagnosis", "families"] = "diagnosis"
-    cost_of_false_name: float | None = Field(None, gt=0.0)
-    rehearse: bool = False
-    repair: Repairing = False
-    out: str = "diagnosis"
-
-    def _ships(self, key: str, value: str) -> bool:
-        return super()._ships(key, value) or (key == "twin" and value in twin_names())
 
 
 def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis:

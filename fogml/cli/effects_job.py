@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.cli.settings import Settings
+from fogml.cli.effects import EffectsSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.outputs import whole_folder
 from fogml.twin.effect import Effect
@@ -15,13 +15,6 @@ from fogml.twin.registry import effect, effects
 
 _WIDTH = 100
 _TERMINAL_PROGRAMMES = ("multi-point-cycle", "joint-staircase", "separating")
-
-
-class EffectsSettings(Settings):
-    """Settings of ``fogml effects``."""
-
-    effect: str | None = None
-    out: str | None = None
 
 
 def show_effects(settings: EffectsSettings, terminal: Terminal) -> None:

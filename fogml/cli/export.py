@@ -2,73 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, ClassVar
 
-import typer
+from pydantic import BeforeValidator, PlainSerializer
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
-
-app = typer.Typer(**options.APP_SETTINGS)
-
-
-class TrainRunsCommand(typer.core.TyperCommand):
-    """A command whose ``--train`` takes every value up to the next option."""
-
-    def parse_args(self, ctx: typer.Context, args: list[str]) -> list[str]:  # type: ignore[override]
-        return super().parse_args(ctx, options.spread_values(args, "--train"))
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
 
 
-@app.command(cls=TrainRunsCommand)
-def export(
-    model: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="MODEL...", help="Folder of the model; of tables, up to three axes."),
-    ] = None,
-    to: Annotated[
-        str | None, typer.Option("--to", help="c, onnx, json, mat; segments, px4 or ardupilot.")
-    ] = None,
-    dtype: Annotated[
-        str | None, typer.Option("--dtype", help="float64, float32, float16, int8, q15 or q31.")
-    ] = None,
-    byte_budget: Annotated[
-        int | None,
-        typer.Option("--bytes", metavar="N", help="Leave out centres until the weights fit N bytes."),
-    ] = None,
-    with_pipeline: Annotated[
-        bool | None,
-        typer.Option("--with-pipeline/--features-only", help="ONNX from the temperatures' window."),
-    ] = None,
-    tolerance: Annotated[
-        float | None,
-        typer.Option("--tolerance", metavar="DEG/H", help="Largest difference from the model allowed."),
-    ] = None,
-    breakpoints: Annotated[
-        int | None,
-        typer.Option("--breakpoints", metavar="K", help="Of segments; as few as the tolerance allows."),
-    ] = None,
-    matrix: Annotated[
-        str | None,
-        typer.Option(
-            "--matrix", metavar="FILE", help="3 x 3 matrix (YAML) that three axes are multiplied by."
-        ),
-    ] = None,
-    sample_s: Annotated[
-        float | None,
-        typer.Option("--sample-s", metavar="SECONDS", help="Sample interval on board (that of training)."),
-    ] = None,
-    train: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--train", metavar="RUN...", help="The model's training runs, to prune and to judge on."
-        ),
-    ] = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+def _several(value: object) -> object:
+    return [value] if isinstance(value, str) else value
+
+
+def _one_as_text(value: list[str]) -> str | list[str]:
+    return value[0] if len(value) == 1 else value
+
+
+class ExportJobSettings(Settings):
     """Write a model's compact form, once it has been compared with the model.
 
     Writes fogml_model.* and export.json. C code takes raw temperatures sample by sample; it is
@@ -78,23 +29,43 @@ def export(
     Segments are a table of bias and scale factor over one temperature (CSV, JSON, C); px4 and
     ardupilot are parameter files with a cubic. Both hold what the model says at rest.
     """
-    from fogml.cli.export_job import ExportJobSettings, export_and_write
 
-    settings = ExportJobSettings.gather(
-        config,
-        {
-            "model": model,
-            "to": to,
-            "dtype": dtype,
-            "bytes": byte_budget,
-            "with_pipeline": with_pipeline,
-            "tolerance": tolerance,
-            "breakpoints": breakpoints,
-            "matrix": matrix,
-            "sample_s": sample_s,
-            "train": train,
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
+    job: ClassVar[str] = "fogml.cli.export_job:export_and_write"
+    model: Annotated[
+        list[str],
+        BeforeValidator(_several),
+        PlainSerializer(_one_as_text),
+        argument("MODEL...", "Folder of the model; of tables, up to three axes.", reads=True),
+    ] = []
+    to: Annotated[str, option("c, onnx, json, mat; segments, px4 or ardupilot.", metavar="FORMAT")] = "c"
+    dtype: Annotated[str | None, option("float64, float32, float16, int8, q15 or q31.", metavar="TYPE")] = (
+        None
     )
-    export_and_write(settings, Terminal(as_json, quiet))
+    bytes: Annotated[int | None, option("Leave out centres until the weights fit N bytes.")] = None
+    with_pipeline: Annotated[
+        bool, option("ONNX from the temperatures' window.", "--with-pipeline/--features-only")
+    ] = False
+    tolerance: Annotated[
+        float | None, option("Largest difference from the model allowed.", metavar="DEG/H")
+    ] = None
+    sample_s: Annotated[
+        float | None, option("Sample interval on board; that of training if none.", metavar="SECONDS")
+    ] = None
+    breakpoints: Annotated[
+        int | None, option("Of segments; as few as the tolerance allows.", metavar="K")
+    ] = None
+    matrix: Annotated[
+        str | None,
+        option("3 x 3 matrix (YAML) that three axes are multiplied by.", metavar="FILE", reads=True),
+    ] = None
+    train: Annotated[
+        list[str],
+        option(
+            "The model's training runs, to prune and to judge on.",
+            metavar="RUN...",
+            spread=True,
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
+    ] = []
+    out: options.Folder = "export-results"

@@ -3,48 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from pydantic import field_serializer, field_validator
-
+from fogml.cli.export import ExportJobSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import Settings, absolute
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
-
-
-class ExportJobSettings(Settings):
-    """Settings of ``fogml export``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("model", "train", "matrix")
-    model: list[str] = []
-    to: str = "c"
-    dtype: str | None = None
-    bytes: int | None = None
-    with_pipeline: bool = False
-    tolerance: float | None = None
-    sample_s: float | None = None
-    breakpoints: int | None = None
-    matrix: str | None = None
-    train: list[str] = []
-    out: str = "export-results"
-
-    def in_full(self) -> ExportJobSettings:
-        """The settings with every path in full."""
-        lists = {key: [absolute(path) for path in getattr(self, key)] for key in ("model", "train")}
-        matrix = None if self.matrix is None else absolute(self.matrix)
-        return self.model_copy(update={**lists, "matrix": matrix, "out": absolute(self.out)})
-
-    @field_serializer("model")
-    def _one_as_text(self, value: list[str]) -> str | list[str]:
-        return value[0] if len(value) == 1 else value
-
-    @field_validator("model", mode="before")
-    @classmethod
-    def _one_or_several(cls, value: object) -> object:
-        return [value] if isinstance(value, str) else value
 
 
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:

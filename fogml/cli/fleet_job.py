@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from pydantic import field_validator
-
+from fogml.cli.fleet import FleetSettings
 from fogml.cli.fleet_unit import UnitWork
-from fogml.cli.settings import LimitSettings, Repairing, named_values
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
-from fogml.fleet.constants import FORM
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
@@ -24,41 +21,6 @@ from fogml.runs.sources import sources_stamp
 from fogml.strict_json import read_json
 
 _SHOWN = 40
-
-
-class FleetSettings(LimitSettings):
-    """Settings of ``fogml fleet``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("manifest", "prior", "noise")
-    manifest: str | None = None
-    model: str = "auto"
-    features: str | None = None
-    parameters: dict[str, Any] = {}
-    models: list[str] = ["all"]
-    form: str = FORM
-    prior: str | None = None
-    twin: str = "nominal"
-    workers: int = 1
-    cluster: str | None = None
-    device: str | None = None
-    batch: int = 64
-    repair: Repairing = False
-    strict: bool = False
-    any_unit: bool = False
-    out: str = "fleet-results"
-
-    @field_validator("parameters", mode="before")
-    @classmethod
-    def _set_by_flags(cls, value: object) -> object:
-        return named_values(value) if isinstance(value, list) else value
-
-    def for_units(self) -> dict[str, Any]:
-        """What units' results depend on."""
-        left_out = {"manifest", "prior", "workers", "cluster", "device", "batch", "out"}
-        values = self.model_dump(mode="json", exclude=left_out)
-        if self.device is not None:
-            values["parameters"] = {**self.parameters, "device": self.device}
-        return values
 
 
 def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:

@@ -4,29 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import ClassVar
 
+from fogml.cli.import_ import ImportSettings
 from fogml.cli.runs import most_dropped
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.outputs import whole_folder
-
-
-class ImportSettings(Settings):
-    """Settings of ``fogml import``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("file", "profile")
-    file: str | None = None
-    profile: str | None = None
-    axis: str | None = None
-    repair: Repairing = False
-    out: str | None = None
-
-    def _ships(self, key: str, value: str) -> bool:
-        from fogml.runs.profiles import profile_names
-
-        return super()._ships(key, value) or (key == "profile" and value in profile_names())
 
 
 def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:

@@ -2,42 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
+from typing import Annotated, ClassVar
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import argument
+from fogml.cli.settings import Settings
 
-app = typer.Typer(**options.APP_SETTINGS)
 
-
-@app.command()
-def inspect(
-    runs: Annotated[list[str] | None, typer.Argument(metavar="RUN...", help="Runs to look into.")] = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    strict: options.Strict = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class InspectSettings(Settings):
     """Say what is in a run: columns, span, gaps, soaks and ramps, faults.
 
     With --out, writes inspect.json, inspect.html and inspect.config.yaml.
     """
-    from fogml.cli.inspect_job import InspectSettings, inspect_and_write
 
-    settings = InspectSettings.gather(
-        config,
-        {
-            "runs": runs,
-            "repair": options.repairing(repair, repair_anyway),
-            "strict": strict,
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    inspect_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.inspect_job:inspect_and_write"
+    runs: Annotated[
+        list[str], argument("RUN...", "Runs to look into.", reads=True, known=options.SHIPPED_RUNS)
+    ] = []
+    repair: options.Repair = False
+    strict: options.Strict = False
+    out: options.FolderIfNamed = None

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
+from fogml.cli.inspect import InspectSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
@@ -16,16 +16,6 @@ from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
 from fogml.validation.inspection import inspection_json
 from fogml.validation.strict import hold_strict
-
-
-class InspectSettings(Settings):
-    """Settings of ``fogml inspect``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs",)
-    runs: list[str] = []
-    repair: Repairing = False
-    strict: bool = False
-    out: str | None = None
 
 
 def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:

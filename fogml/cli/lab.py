@@ -2,235 +2,149 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-import typer
+from pydantic import BeforeValidator, Field
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
-
-app = typer.Typer(**options.APP_SETTINGS, no_args_is_help=True)
-
-
-@app.callback()
-def lab() -> None:
-    """Procedures of a laboratory: misalignment, tests on a rate table, north seeking."""
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
 
 
-@app.command()
-def misalignment(
-    file: Annotated[
-        str | None,
-        typer.Argument(
-            metavar="FILE",
-            help="Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
-        ),
-    ] = None,
-    cross_tilt: Annotated[
-        bool | None,
-        typer.Option(
-            "--cross-tilt/--no-cross-tilt",
-            help="Fit a constant over the tilts for a fixture tilted across (where the data show one).",
-        ),
-    ] = None,
-    state_angles: Annotated[
-        str | None,
-        typer.Option(
-            "--state-angles",
-            metavar="DEG,...",
-            help="Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
-            "(0,180,270,90), where FILE has no column state_angle [deg].",
-        ),
-    ] = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+def _state_angles(value: Any) -> Any:
+    return options.number_list(value, "0,180,270,90") if isinstance(value, str) else value
+
+
+def _order(value: Any) -> Any:
+    return options.number_list(value, "0,90,180,270") if isinstance(value, str) else value
+
+
+def _transients(value: Any) -> Any:
+    """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
+    if not isinstance(value, list):
+        return value
+    pairs = [options.number_list(item, "0.2,600") if isinstance(item, str) else item for item in value]
+    if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
+        raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
+    return [tuple(pair) for pair in pairs]
+
+
+class MisalignmentSettings(Settings):
     """Scale factor and input-axis misalignment, decoupled over four mounting states.
 
     In state 2 the gyro is turned clockwise in its mounting plane, seen from +z, by 180 deg, for state 3 by 90
     deg more, for state 4 by 180 deg more; other turns are stated. Turns the data contradict are an error.
     With --out, writes misalignment.json, misalignment.html and lab-misalignment.config.yaml.
     """
-    from fogml.cli.lab_misalignment_job import MisalignmentSettings, misalignment_and_write
 
-    settings = MisalignmentSettings.gather(
-        config,
-        {
-            "file": file,
-            "cross_tilt": cross_tilt,
-            "state_angles": state_angles,
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    misalignment_and_write(settings, Terminal(as_json, quiet))
-
-
-@app.command()
-def rate(
-    runs: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="RUN...", help="Runs on a rate table, with the column rate as commanded."),
-    ] = None,
-    twin: Annotated[
-        str | None, typer.Option("--twin", metavar="NAME|FILE", help="Test a twin in place of recorded runs.")
-    ] = None,
-    greatest: Annotated[
-        float | None,
-        typer.Option("--greatest", metavar="DEG/S", help="With --twin: greatest rate tested (500)."),
-    ] = None,
-    noise: Annotated[
+    job: ClassVar[str] = "fogml.cli.lab_misalignment_job:misalignment_and_write"
+    file: Annotated[
+        str | None,
+        argument(
+            "FILE",
+            "Table with state, tilt [deg], rate [deg/s], output [unit], and segment or time.",
+            reads=True,
+        ),
+    ] = None
+    cross_tilt: Annotated[
         bool | None,
-        typer.Option("--noise/--no-noise", help="With --twin: its noise too; else its effects alone."),
-    ] = None,
-    settle: Annotated[
-        float | None,
-        typer.Option("--settle", metavar="S", help="Left out at the begin of each rate (2 samples)."),
-    ] = None,
-    answers: Annotated[
-        float | None,
-        typer.Option("--answers", metavar="SHARE", help="Share of the expected output that counts (0.5)."),
-    ] = None,
-    dead: Annotated[
-        float | None,
-        typer.Option("--dead", metavar="SHARE", help="Share of the expected change that is dead (0.1)."),
-    ] = None,
-    range_error: Annotated[
-        float | None,
-        typer.Option("--range-error", metavar="SHARE", help="Deviation that ends the range (0.01)."),
-    ] = None,
-    small: Annotated[
-        float | None,
-        typer.Option("--small", metavar="SHARE", help="Of the greatest rate: rates about zero (0.02)."),
-    ] = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+        option(
+            "Fit a constant over the tilts for a fixture tilted across (where the data show one).",
+            "--cross-tilt/--no-cross-tilt",
+        ),
+    ] = None
+    state_angles: Annotated[
+        list[float] | None,
+        BeforeValidator(_state_angles),
+        option(
+            "Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
+            "(0,180,270,90), where FILE has no column state_angle [deg].",
+            metavar="DEG,...",
+            as_text=True,
+        ),
+    ] = None
+    out: options.FolderIfNamed = None
+
+
+class RateSettings(Settings):
     """Scale factor, range, threshold, dead zone, resolution, bandwidth, slew, temperature sensitivity.
 
     From runs that hold any of the tests, or of a twin (--twin; synthetic). With --out, writes rate.json,
     rate.html and lab-rate.config.yaml.
     """
-    from fogml.cli.lab_rate_job import RateSettings, rate_and_write
 
-    settings = RateSettings.gather(
-        config,
-        {
-            "runs": runs,
-            "twin": twin,
-            "greatest": greatest,
-            "noise": noise,
-            "settle": settle,
-            "answers": answers,
-            "dead": dead,
-            "range_error": range_error,
-            "small": small,
-            "repair": options.repairing(repair, repair_anyway),
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
+    job: ClassVar[str] = "fogml.cli.lab_rate_job:rate_and_write"
+    runs: Annotated[
+        list[str],
+        argument("RUN...", "Runs on a rate table, with the column rate as commanded.", reads=True),
+    ] = []
+    twin: Annotated[
+        str | None,
+        option(
+            "Test a twin in place of recorded runs.", metavar="NAME|FILE", reads=True, known=options.TWINS
+        ),
+    ] = None
+    greatest: Annotated[float, option("With --twin: greatest rate tested.", metavar="DEG/S")] = Field(
+        500.0, gt=0.0, le=1e4
     )
-    rate_and_write(settings, Terminal(as_json, quiet))
-
-
-@app.command()
-def north(
-    positions: Annotated[
-        str | None,
-        typer.Option(
-            "--positions", metavar="FILE", help="A run with a column position, 1 to 4, or the table's angle."
-        ),
-    ] = None,
-    azimuth: Annotated[
-        float | None, typer.Option("--azimuth", metavar="DEG", help="Simulate a seek at this azimuth.")
-    ] = None,
-    latitude: Annotated[float | None, typer.Option("--latitude", metavar="DEG", help="Latitude.")] = None,
-    dwell: Annotated[float | None, typer.Option("--dwell", metavar="S", help="In a position (60).")] = None,
-    transfer: Annotated[
-        float | None, typer.Option("--transfer", metavar="S", help="Time to the next position (0).")
-    ] = None,
-    drift: Annotated[
-        float | None, typer.Option("--drift", metavar="DEG/H/H", help="Linear drift of the bias.")
-    ] = None,
-    transient: Annotated[
-        list[str] | None,
-        typer.Option("--transient", metavar="DEG/H,S", help="Exponential from power-on; may be repeated."),
-    ] = None,
-    start: Annotated[
-        float | None, typer.Option("--start", metavar="S", help="Begin of the seek after power-on (0).")
-    ] = None,
-    random_walk: Annotated[
-        float | None, typer.Option("--noise", metavar="DEG/SQRT(H)", help="Angle random walk, for se.")
-    ] = None,
-    sense: Annotated[
-        str | None, typer.Option("--sense", metavar="cw|ccw", help="Way the positions are taken (cw).")
-    ] = None,
-    order: Annotated[
-        str | None, typer.Option("--order", metavar="DEG,...", help="Angles of the positions (0,90,180,270).")
-    ] = None,
-    way: Annotated[
-        str | None,
-        typer.Option(
-            "--way", metavar="NAME", help="plain, drift-observing, palindrome, coarse-fine (plain)."
-        ),
-    ] = None,
-    method: Annotated[
-        str | None,
-        typer.Option(
-            "--method", metavar="NAME", help="With --positions: auto, plain, drift-observing (auto)."
-        ),
-    ] = None,
+    noise: Annotated[
+        bool, option("With --twin: its noise too; else its effects alone.", "--noise/--no-noise")
+    ] = False
     settle: Annotated[
-        float | None,
-        typer.Option("--settle", metavar="S", help="With --positions: left out at each begin (0)."),
-    ] = None,
-    coarse: Annotated[
-        float | None, typer.Option("--coarse", metavar="S", help="Time in a coarse position (6).")
-    ] = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+        float | None, option("Left out at the begin of each rate (2 samples).", metavar="S")
+    ] = Field(None, ge=0.0)
+    answers: Annotated[float, option("Share of the expected output that counts.", metavar="SHARE")] = Field(
+        0.5, gt=0.0, lt=1.0
+    )
+    dead: Annotated[float, option("Share of the expected change that is dead.", metavar="SHARE")] = Field(
+        0.1, gt=0.0, lt=1.0
+    )
+    range_error: Annotated[float, option("Deviation that ends the range.", metavar="SHARE")] = Field(
+        0.01, gt=0.0, lt=1.0
+    )
+    small: Annotated[float, option("Of the greatest rate: rates about zero.", metavar="SHARE")] = Field(
+        0.02, gt=0.0, le=1.0
+    )
+    repair: options.Repair = False
+    out: options.FolderIfNamed = None
+
+
+class NorthSettings(Settings):
     """North from several positions, and what a drift does to it: the error, and where it is nothing.
 
     Either from a recorded run (--positions) or simulated (--azimuth and --latitude). With --out, writes
     north.json, north.html and lab-north.config.yaml.
     """
-    from fogml.cli.lab_north_job import NorthSettings, north_and_write
 
-    settings = NorthSettings.gather(
-        config,
-        {
-            "positions": positions,
-            "azimuth": azimuth,
-            "latitude": latitude,
-            "dwell": dwell,
-            "transfer": transfer,
-            "drift": drift,
-            "transients": transient,
-            "start": start,
-            "noise": random_walk,
-            "sense": sense,
-            "order": order,
-            "way": way,
-            "method": method,
-            "settle": settle,
-            "coarse": coarse,
-            "repair": options.repairing(repair, repair_anyway),
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    north_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.lab_north_job:north_and_write"
+    positions: Annotated[
+        str | None,
+        option("A run with a column position, 1 to 4, or the table's angle.", metavar="FILE", reads=True),
+    ] = None
+    azimuth: Annotated[float | None, option("Simulate a seek at this azimuth.", metavar="DEG")] = None
+    latitude: Annotated[float | None, option("Latitude.", metavar="DEG")] = None
+    dwell: Annotated[float, option("In a position.", metavar="S")] = 60.0
+    transfer: Annotated[float, option("Time to the next position.", metavar="S")] = 0.0
+    drift: Annotated[float, option("Linear drift of the bias.", metavar="DEG/H/H")] = 0.0
+    transients: Annotated[
+        list[Annotated[tuple[float, float], Field(strict=False)]],
+        BeforeValidator(_transients),
+        option("Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,S"),
+    ] = []
+    start: Annotated[float, option("Begin of the seek after power-on.", metavar="S")] = 0.0
+    noise: Annotated[float, option("Angle random walk, for se.", metavar="DEG/SQRT(H)")] = 0.0
+    sense: Annotated[str, option("Way the positions are taken.", metavar="cw|ccw")] = "cw"
+    order: Annotated[
+        list[float],
+        BeforeValidator(_order),
+        option("Angles of the positions.", metavar="DEG,...", as_text=True),
+    ] = [0.0, 90.0, 180.0, 270.0]
+    way: Annotated[str, option("plain, drift-observing, palindrome, coarse-fine.", metavar="NAME")] = "plain"
+    method: Annotated[str, option("With --positions: auto, plain, drift-observing.", metavar="NAME")] = "auto"
+    settle: Annotated[float, option("With --positions: left out at each begin.", metavar="S")] = 0.0
+    coarse: Annotated[float, option("Time in a coarse position.", metavar="S")] = 6.0
+    repair: options.Repair = False
+    out: options.FolderIfNamed = None
+
+
+COMMANDS = {"misalignment": MisalignmentSettings, "rate": RateSettings, "north": NorthSettings}

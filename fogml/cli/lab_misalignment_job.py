@@ -3,32 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar
+from typing import Any
 
-from pydantic import field_validator
-
+from fogml.cli.lab import MisalignmentSettings
 from fogml.cli.lab_outputs import say_where, tell
-from fogml.cli.settings import Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json
 from fogml.lab.misalignment_input import read_measurements
 from fogml.lab.misalignment_json import misalignment_json
-
-
-class MisalignmentSettings(Settings):
-    """Settings of ``fogml lab misalignment``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("file",)
-    file: str | None = None
-    cross_tilt: bool | None = None
-    state_angles: list[float] | None = None
-    out: str | None = None
-
-    @field_validator("state_angles", mode="before")
-    @classmethod
-    def _angles_from_text(cls, value: Any) -> Any:
-        return number_list(value, "0,180,270,90") if isinstance(value, str) else value
 
 
 def misalignment_and_write(settings: MisalignmentSettings, terminal: Terminal) -> None:

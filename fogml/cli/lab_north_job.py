@@ -2,60 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, ClassVar
+from typing import Any
 
-from pydantic import Field, field_validator
-
+from fogml.cli.lab import NorthSettings
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Repairing, Settings, number_list
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json
-from fogml.lab.north import DEFAULT_ORDER, Drift, Scheme, check_sense, horizontal_rate
+from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.report.words import duration
 
 WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
-
-
-class NorthSettings(Settings):
-    """Settings of ``fogml lab north``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("positions",)
-    positions: str | None = None
-    azimuth: float | None = None
-    latitude: float | None = None
-    dwell: float = 60.0
-    transfer: float = 0.0
-    drift: float = 0.0
-    transients: list[Annotated[tuple[float, float], Field(strict=False)]] = []
-    start: float = 0.0
-    noise: float = 0.0
-    sense: str = "cw"
-    order: list[float] = list(DEFAULT_ORDER)
-    way: str = "plain"
-    method: str = "auto"
-    settle: float = 0.0
-    coarse: float = 6.0
-    repair: Repairing = False
-    out: str | None = None
-
-    @field_validator("order", mode="before")
-    @classmethod
-    def _order_from_text(cls, value: Any) -> Any:
-        return number_list(value, "0,90,180,270") if isinstance(value, str) else value
-
-    @field_validator("transients", mode="before")
-    @classmethod
-    def _transients_from_text(cls, value: Any) -> Any:
-        """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
-        if not isinstance(value, list):
-            return value
-        pairs = [number_list(item, "0.2,600") if isinstance(item, str) else item for item in value]
-        if any(not isinstance(pair, list | tuple) or len(pair) != 2 for pair in pairs):
-            raise ValueError("a transient is an amplitude in deg/h and a time constant in s; write 0.2,600")
-        return [tuple(pair) for pair in pairs]
 
 
 def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:

@@ -2,41 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
-from pydantic import Field
-
+from fogml.cli.lab import RateSettings
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json
 from fogml.lab.rate_json import rate_json
 from fogml.lab.rate_tests import Criteria
 from fogml.lab.rate_words import result_rows
-
-
-class RateSettings(Settings):
-    """Settings of ``fogml lab rate``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "twin")
-    runs: list[str] = []
-    twin: str | None = None
-    greatest: float = Field(500.0, gt=0.0, le=1e4)
-    noise: bool = False
-    settle: float | None = Field(None, ge=0.0)
-    answers: float = Field(0.5, gt=0.0, lt=1.0)
-    dead: float = Field(0.1, gt=0.0, lt=1.0)
-    range_error: float = Field(0.01, gt=0.0, lt=1.0)
-    small: float = Field(0.02, gt=0.0, le=1.0)
-    repair: Repairing = False
-    out: str | None = None
-
-    def _ships(self, key: str, value: str) -> bool:
-        from fogml.twin.twin_file import twin_names
-
-        return super()._ships(key, value) or (key == "twin" and value in twin_names())
 
 
 def rate_and_write(settings: RateSettings, terminal: Terminal) -> None:

@@ -8,82 +8,135 @@ file. 130, 143: interrupted, terminated.
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
-from importlib import import_module
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from typing import Any
 
-import typer
-from typer.core import TyperGroup
+import click
 
 from fogml import __version__
+from fogml.cli.given import load
 from fogml.errors import FogmlError, printable
 from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
 from fogml.processes import end_as_interrupted, quiet_libraries
 
 COMMANDS = {
-    "demo": ("fogml.cli.demo", "Train and judge on a real recording that ships, then say what to open."),
-    "import": ("fogml.cli.import_", "Bring a logger's file into the run format."),
-    "inspect": ("fogml.cli.inspect", "Say what is in a run: columns, span, gaps, soaks and ramps, faults."),
-    "train": ("fogml.cli.train", "Fit a drift model on some runs and judge it on others."),
-    "compare": ("fogml.cli.compare", "Judge every model and baseline on the same split, in one table."),
-    "compensate": ("fogml.cli.compensate", "Apply a model to a run of any length, in bounded memory."),
-    "export": ("fogml.cli.export", "Write a model's compact form, once it has been compared with the model."),
-    "noise": ("fogml.cli.noise", "Allan deviation and the IEEE 952 noise terms with intervals."),
-    "sweep": ("fogml.cli.sweep", "Search features, models and sizes on held-out parts of the training runs."),
+    "demo": (
+        ".demo:DemoSettings",
+        "Train and judge on a real recording that ships, then say what to open.",
+    ),
+    "import": (".import_:ImportSettings", "Bring a logger's file into the run format."),
+    "inspect": (
+        ".inspect:InspectSettings",
+        "Say what is in a run: columns, span, gaps, soaks and ramps, faults.",
+    ),
+    "train": (".train:TrainSettings", "Fit a drift model on some runs and judge it on others."),
+    "compare": (
+        ".compare:CompareSettings",
+        "Judge every model and baseline on the same split, in one table.",
+    ),
+    "compensate": (
+        ".compensate:CompensateSettings",
+        "Apply a model to a run of any length, in bounded memory.",
+    ),
+    "export": (
+        ".export:ExportJobSettings",
+        "Write a model's compact form, once it has been compared with the model.",
+    ),
+    "noise": (
+        ".noise:NoiseSettings",
+        "Allan deviation and the IEEE 952 noise terms with intervals.",
+    ),
+    "sweep": (
+        ".sweep:SweepSettings",
+        "Search features, models and sizes on held-out parts of the training runs.",
+    ),
     "lab": (
-        "fogml.cli.lab",
+        ".lab:COMMANDS",
         "Procedures of a laboratory: misalignment, tests on a rate table, north seeking.",
     ),
     "fleet": (
-        "fogml.cli.fleet",
+        ".fleet:FleetSettings",
         "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",
     ),
-    "effects": ("fogml.cli.effects", "The catalogue of effects that a twin can have, or the card of one."),
-    "simulate": ("fogml.cli.simulate", "A synthetic run from a programme and a twin."),
-    "replay": ("fogml.cli.replay", "A twin's output for a run's inputs, or what one effect changes."),
+    "effects": (
+        ".effects:EffectsSettings",
+        "The catalogue of effects that a twin can have, or the card of one.",
+    ),
+    "simulate": (".simulate:SimulateSettings", "A synthetic run from a programme and a twin."),
+    "replay": (
+        ".replay:ReplaySettings",
+        "A twin's output for a run's inputs, or what one effect changes.",
+    ),
     "diagnose": (
-        "fogml.cli.diagnose",
+        ".diagnose:DiagnoseSettings",
         "Where the gap between twin and recordings lies, which effect causes it, how far it closes.",
     ),
     "plan": (
-        "fogml.cli.plan",
+        ".plan:PlanSettings",
         "Programmes that make wanted parameters identifiable, with expected standard errors.",
     ),
-    "blind": ("fogml.cli.blind", "The check on withheld effects: make cases, answer them, score."),
-    "docs": ("fogml.cli.docs", "The documentation, without a network: list, read, or write as one page."),
+    "blind": (".blind:COMMANDS", "The check on withheld effects: make cases, answer them, score."),
+    "docs": (".docs:DocsSettings", "The documentation, without a network: list, read, or write as one page."),
 }
-"""Name of each command: its module, and its help in one line."""
+"""Name of each command: where its settings are, and its help in one line."""
 
 DONE, LIMIT_NOT_MET, BAD_INPUT, UNEXPECTED, INTERRUPTED = 0, 1, 2, 3, 130
 
 
-class LazyGroup(TyperGroup):
-    """A group whose commands load when they are called."""
+class Group(click.Group):
+    """A group whose commands load when they are called.
+
+    Parameters
+    ----------
+    commands
+        By name: where a command's settings are, or those of a group's commands, and its help in one line.
+    """
+
+    def __init__(self, commands: Mapping[str, tuple[str, str]], **more: Any) -> None:
+        super().__init__(
+            **more, no_args_is_help=True, context_settings={"help_option_names": ["-h", "--help"]}
+        )
+        self.known = commands
 
     def list_commands(self, ctx: Any) -> list[str]:
-        return list(COMMANDS)
+        return list(self.known)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
-        if cmd_name not in COMMANDS:
+        if cmd_name not in self.known:
             return None
-        module = import_module(COMMANDS[cmd_name][0])
-        command = typer.main.get_command(module.app)
-        command.name = cmd_name
-        return command
+        from fogml.cli.command import SettingsCommand
+
+        place, text = self.known[cmd_name]
+        found = load(place)
+        if not isinstance(found, dict):
+            return SettingsCommand(cmd_name, found)
+        module = place.partition(":")[0]
+        return Group(
+            {
+                name: (f"{module}:{settings.__name__}", (settings.__doc__ or "").partition("\n")[0])
+                for name, settings in found.items()
+            },
+            name=cmd_name,
+            help=text,
+        )
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in COMMANDS.items()])
+            formatter.write_dl([(name, text) for name, (_, text) in self.known.items()])
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        if args and not args[0].startswith("-") and args[0] not in COMMANDS:
+        if args and not args[0].startswith("-") and args[0] not in self.known:
             from difflib import get_close_matches
 
-            near = get_close_matches(args[0], COMMANDS, n=1)
-            hint = f" Did you mean '{near[0]}'?" if near else f" Commands are {', '.join(COMMANDS)}."
+            near = get_close_matches(args[0], self.known, n=1)
+            hint = f" Did you mean '{near[0]}'?" if near else f" Commands are {', '.join(self.known)}."
             fail(f"no such command '{args[0]}'.{hint}")
         return super().resolve_command(ctx, args)
+
+
+class Program(Group):
+    """The program: errors become one message and an exit status."""
 
     def main(self, args: Sequence[str] | None = None, *more: Any, **named: Any) -> Any:
         """As click's, with the last net: what nobody expected is one line, and not the status of a limit."""
@@ -92,7 +145,7 @@ class LazyGroup(TyperGroup):
         except Exception as error:
             from fogml.cli.unexpected import report_unexpected
 
-            typer.echo(report_unexpected(error, sys.argv[1:] if args is None else args), err=True)
+            click.echo(report_unexpected(error, sys.argv[1:] if args is None else args), err=True)
             sys.exit(UNEXPECTED)
 
     def invoke(self, ctx: Any) -> Any:
@@ -116,20 +169,20 @@ class LazyGroup(TyperGroup):
         except MemoryError:
             fail("not enough memory for this; close other programs or use a shorter run")
         except KeyboardInterrupt as interrupt:
-            raise typer.Exit(_interrupted(interrupt)) from None
+            raise click.exceptions.Exit(_interrupted(interrupt)) from None
 
 
 def fail(message: str) -> None:
     """Print one message on stderr and end with exit status 2."""
-    typer.echo(f"fogml: {terminal_text(message)}", err=True)
-    raise typer.Exit(BAD_INPUT) from None
+    click.echo(f"fogml: {terminal_text(message)}", err=True)
+    raise click.exceptions.Exit(BAD_INPUT) from None
 
 
 def _interrupted(interrupt: KeyboardInterrupt) -> int:
     """Say what an interrupt leaves behind; the exit status."""
     # Jobs of many units keep those that were finished, and go on from there.
     told = "what is finished is kept, nothing is half written; run the same command again"
-    typer.echo(f"fogml: interrupted: {told}", err=True)
+    click.echo(f"fogml: interrupted: {told}", err=True)
     return getattr(interrupt, "status", INTERRUPTED)
 
 
@@ -139,30 +192,45 @@ def _system_message(error: OSError) -> str:
     return f"{place}{error.strerror or error}{remedy}"
 
 
-app = typer.Typer(
-    cls=LazyGroup,
-    add_completion=False,
-    rich_markup_mode=None,
-    pretty_exceptions_enable=False,
-    no_args_is_help=True,
-    context_settings={"help_option_names": ["-h", "--help"]},
-)
-
-
-def _print_version(wanted: bool) -> None:
+def _print_version(ctx: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        typer.echo(f"fogml {__version__}")
-        raise typer.Exit()
+        click.echo(f"fogml {__version__}")
+        ctx.exit()
 
 
-@app.callback()
-def fogml(
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and end."),
-    ] = False,
-) -> None:
-    """Temperature drift models for fibre-optic gyros: train on one chamber run, judge on another."""
+def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None) -> None:
+    if shell is not None:
+        from click.shell_completion import get_completion_class
+
+        maker = get_completion_class(shell)
+        assert maker is not None
+        click.echo(maker(ctx.command, {}, "fogml", "_FOGML_COMPLETE").source())
+        ctx.exit()
+
+
+app = Program(
+    COMMANDS,
+    name="fogml",
+    help="Temperature drift models for fibre-optic gyros: train on one chamber run, judge on another.",
+    params=[
+        click.Option(
+            ["--version"],
+            is_flag=True,
+            is_eager=True,
+            expose_value=False,
+            callback=_print_version,
+            help="Print the version and end.",
+        ),
+        click.Option(
+            ["--completion"],
+            type=click.Choice(["bash", "zsh", "fish"]),
+            is_eager=True,
+            expose_value=False,
+            callback=_print_completion,
+            help="Print the script that completes commands, options and names in a shell, and end.",
+        ),
+    ],
+)
 
 
 def main() -> None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
+from fogml.cli.noise import NoiseSettings
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -15,16 +15,6 @@ from fogml.outputs import whole_folder
 from fogml.report.words import duration
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.run import Run
-
-
-class NoiseSettings(Settings):
-    """Settings of ``fogml noise``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("run",)
-    run: str | list[str] | None = None
-    overlapping: bool = True
-    repair: Repairing = False
-    out: str | None = None
 
 
 def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:

@@ -1,114 +1,142 @@
-"""Options that several commands share, and values after ``--test``."""
+"""Settings that several commands share, each declared once."""
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
-import typer
-from typer.core import TyperCommand
+from pydantic import BeforeValidator, field_validator
 
-Config = Annotated[
-    Path | None, typer.Option("--config", help="YAML file with any of these settings; flags override it.")
-]
-Seed = Annotated[int | None, typer.Option("--seed", help="Seed of everything random (0).")]
-Json = Annotated[bool, typer.Option("--json", help="Print the result alone, as JSON.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but errors and what --json asks.")]
-Out = Annotated[Path | None, typer.Option("--out", "-o", help="Folder for the results.")]
+from fogml.cli.given import argument, option
+from fogml.cli.settings import Settings
+from fogml.errors import quoted
+from fogml.yaml_text import parse_yaml
+
+
+def named_values(texts: list[Any]) -> dict[str, Any]:
+    """``["name=value", ...]`` as flags give them, each value read as YAML reads it.
+
+    Raises
+    ------
+    ValueError
+        If one is not of that form.
+    """
+    values = {}
+    for text in texts:
+        name, equals, value = str(text).partition("=")
+        if not (equals and name.strip()):
+            raise ValueError(f"{quoted(text)} sets nothing; write NAME=VALUE, e.g. centres=16")
+        values[name.strip()] = parse_yaml(value, quoted(text))
+    return values
+
+
+def number_list(text: str, example: str) -> list[float]:
+    """Numbers of a text with commas.
+
+    Raises
+    ------
+    ValueError
+        With an example, if one is no number.
+    """
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise ValueError(f"{quoted(text)} is no list of numbers; write e.g. {example}") from None
+
+
+def names_list(value: object) -> object:
+    """Names of a text with commas between, as flags give them; a list as it stands."""
+    if isinstance(value, str):
+        return [name.strip() for name in value.split(",") if name.strip()]
+    return value
+
+
+def _by_name(value: object) -> object:
+    return named_values(value) if isinstance(value, list) else value
+
+
+Repairing = bool | Literal["anyway"]
+"""Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
 Repair = Annotated[
-    bool | None,
-    typer.Option(
+    Repairing,
+    option(
+        "Mend clocks and drop up to 2 % of faulty rows; what was done is in every result.\n"
+        "Repair, however many rows that drops.",
         "--repair/--no-repair",
-        help="Mend clocks and drop up to 2 % of faulty rows; what was done is in every result.",
+        "--repair-anyway=anyway",
     ),
 ]
-RepairAnyway = Annotated[
-    bool | None, typer.Option("--repair-anyway", help="Repair, however many rows that drops.")
+EFFECTS = "fogml.twin.registry:effects"
+TWINS = "fogml.twin.twin_file:twin_names"
+SHIPPED_RUNS = "fogml.cli.runs:shipped_places"
+Runs = Annotated[list[str], argument("RUN...", "Training runs.", reads=True, known=SHIPPED_RUNS)]
+Tests = Annotated[
+    list[str],
+    option(
+        "Runs to judge on; takes several, may be repeated.",
+        "--test",
+        metavar="RUN...",
+        spread=True,
+        reads=True,
+        known=SHIPPED_RUNS,
+    ),
 ]
+Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:MODEL_NAMES")]
+Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".')]
+Parameters = Annotated[
+    dict[str, Any], option("Parameter of the model; may be repeated.", "--set"), BeforeValidator(_by_name)
+]
+Averaging = Annotated[float, option("Averaging time of the figures.", metavar="SECONDS")]
 Strict = Annotated[
-    bool | None,
-    typer.Option("--strict/--no-strict", help="Make warnings on the runs' temperatures and rates errors."),
+    bool, option("Make warnings on the runs' temperatures and rates errors.", "--strict/--no-strict")
 ]
 AnyUnit = Annotated[
-    bool | None,
-    typer.Option("--any-unit/--same-unit", help="Allow a run of another unit or axis than the model's."),
+    bool, option("Allow a run of another unit or axis than the model's.", "--any-unit/--same-unit")
 ]
-Averaging = Annotated[
-    float | None, typer.Option("--averaging", metavar="SECONDS", help="Averaging time of the figures (100).")
+Workers = Annotated[int, option("Processes on this machine.")]
+Twin = Annotated[
+    str,
+    option("Twin file, or one that ships.", metavar="TWIN", reads=True, known=TWINS),
 ]
-Noise = Annotated[
-    str | None,
-    typer.Option("--noise", metavar="RUN", help="Static run of the unit: its noise makes the floor."),
-]
-Features = Annotated[str | None, typer.Option("--features", help='Feature text, e.g. "T, dT, T*dT".')]
-DesignIndex = Annotated[
-    float | None,
-    typer.Option("--design-index", metavar="DEG/H", help="Greatest rms allowed after compensation."),
-]
-Limits = Annotated[
-    list[str] | None,
-    typer.Option("--limit", metavar="NAME=VALUE", help="Limit on another figure; may be repeated."),
-]
-TurnOnBand = Annotated[
-    float | None,
-    typer.Option(
-        "--turn-on-band",
-        metavar="DEG/H",
-        help="Tell the time from power-on until the bias stays this near to its settled value.",
-    ),
-]
-Tests = Annotated[
-    list[str] | None,
-    typer.Option("--test", metavar="RUN...", help="Runs to judge on; takes several, may be repeated."),
+_FOLDER = option("Folder for the results.", "--out", "-o", metavar="DIR", writes=True)
+Folder = Annotated[str, _FOLDER]
+FolderIfNamed = Annotated[str | None, _FOLDER]
+FileToWrite = Annotated[
+    str | None, option("File to write: .csv or .parquet.", "--out", "-o", metavar="FILE", writes=True)
 ]
 
 
-def repairing(repair: bool | None, anyway: bool | None) -> bool | str | None:
-    """The setting ``repair`` of its two flags."""
-    return "anyway" if anyway else repair
+class LimitSettings(Settings):
+    """Settings of a command that judges."""
 
+    averaging: Averaging = 100.0
+    design_index: Annotated[
+        float | None, option("Greatest rms allowed after compensation.", metavar="DEG/H")
+    ] = None
+    limits: Annotated[dict[str, float], option("Limit on another figure; may be repeated.", "--limit")] = {}
+    turn_on_band: Annotated[
+        float | None,
+        option(
+            "Tell the time from power-on until the bias stays this near to its settled value.",
+            metavar="DEG/H",
+        ),
+    ] = None
+    noise: Annotated[
+        str | None, option("Static run of the unit: its noise makes the floor.", metavar="RUN", reads=True)
+    ] = None
 
-APP_SETTINGS: dict[str, Any] = {
-    "add_completion": False,
-    "rich_markup_mode": None,
-    "pretty_exceptions_enable": False,
-    "context_settings": {"help_option_names": ["-h", "--help"]},
-}
-"""How each command's own typer application is made."""
-
-
-class TestRunsCommand(TyperCommand):
-    """A command whose ``--test`` takes every value up to the next option."""
-
-    __test__ = False  # not a test case, whatever its name
-
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        return super().parse_args(ctx, spread_values(args, "--test"))
-
-
-def spread_values(arguments: list[str], option: str) -> list[str]:
-    """The arguments with ``option a b`` written as ``option a option b``.
-
-    Values end at the next argument that begins with a dash.
-    """
-    spread: list[str] = []
-    inside = False
-    for position, argument in enumerate(arguments):
-        if argument == "--":
-            return [*spread, *arguments[position:]]
-        if argument.startswith("-") and argument != "-":
-            inside = argument == option
-            if inside and not _value_follows(arguments, position):
-                spread.append(option)
-            elif not inside:
-                spread.append(argument)
-        elif inside:
-            spread += [option, argument]
-        else:
-            spread.append(argument)
-    return spread
-
-
-def _value_follows(arguments: list[str], position: int) -> bool:
-    following = arguments[position + 1 : position + 2]
-    return bool(following) and (following[0] == "-" or not following[0].startswith("-"))
+    @field_validator("limits", mode="before")
+    @classmethod
+    def _from_flags(cls, value: Any) -> Any:
+        """``["name=value", ...]`` as flags give them, or a mapping as YAML does."""
+        if not isinstance(value, list):
+            return value
+        limits: dict[str, float] = {}
+        for text in value:
+            name, equals, number = str(text).partition("=")
+            try:
+                limits[name.strip()] = float(number)
+            except ValueError:
+                equals = ""
+            if not equals:
+                raise ValueError(f"{quoted(text)} is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
+        return limits

@@ -2,101 +2,74 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any, ClassVar
 
-import typer
+from pydantic import BeforeValidator, Field
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import option
+from fogml.cli.settings import Settings
 
-app = typer.Typer(**options.APP_SETTINGS)
+
+def _groups(value: Any) -> Any:
+    """``["a,b", ...]`` as flags give them, or lists as YAML does."""
+    return [options.names_list(group) for group in value] if isinstance(value, list) else value
 
 
-@app.command()
-def plan(
-    want: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--want",
-            metavar="EFFECT|CONSTANT",
-            help="Effect, nominal constant (k1), or EFFECT.PARAMETER to be known; may be repeated.",
-        ),
-    ] = None,
-    separate: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--separate",
-            metavar="A,B",
-            help="Effects to be told apart; one alone is to be shown; repeatable.",
-        ),
-    ] = None,
-    hours: Annotated[
-        float | None, typer.Option("--hours", metavar="HOURS", help="Longest time of a run (24).")
-    ] = None,
-    criterion: Annotated[
-        str | None,
-        typer.Option(
-            "--criterion",
-            metavar="D|A",
-            help="D: volume of the confidence ellipsoid (default); A: mean square of the standard errors.",
-        ),
-    ] = None,
-    number: Annotated[
-        int | None, typer.Option("--runs", metavar="N", help="How many runs, planned in turn (1).")
-    ] = None,
-    twin: Annotated[
-        str | None, typer.Option("--twin", metavar="TWIN", help="Twin file, or one that ships (nominal).")
-    ] = None,
-    coldest: Annotated[
-        float | None, typer.Option("--coldest", metavar="DEGC", help="Lowest temperature (-40).")
-    ] = None,
-    hottest: Annotated[
-        float | None, typer.Option("--hottest", metavar="DEGC", help="Highest temperature (60).")
-    ] = None,
-    input_axis: Annotated[
-        str | None,
-        typer.Option(
-            "--input-axis",
-            metavar="WAY",
-            help="up, down, north ...: the mounting; up or north is tried else.",
-        ),
-    ] = None,
-    latitude: Annotated[
-        float | None, typer.Option("--latitude", metavar="DEG", help="Of the lab (39.9).")
-    ] = None,
-    power_steps: Annotated[
-        bool | None,
-        typer.Option("--power-steps/--no-power-steps", help="Whether the unit's power may be switched."),
-    ] = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+def _capital(value: Any) -> Any:
+    return value.upper() if isinstance(value, str) else value
+
+
+def _usual_latitude() -> float:
+    from fogml.twin.simulate import DEFAULT_FACTS
+
+    return DEFAULT_FACTS.latitude or 0.0
+
+
+class PlanSettings(Settings):
     """Programmes that make wanted parameters identifiable, with expected standard errors.
 
     Searches rates, limits, soaks, a minor loop, table rates, power steps, fan and yaw. Writes
     programme.yaml for fogml simulate, plan.json, plan.html and plan.config.yaml.
     """
-    from fogml.cli.plan_job import PlanSettings, plan_and_write
 
-    settings = PlanSettings.gather(
-        config,
-        {
-            "want": want,
-            "separate": separate,
-            "hours": hours,
-            "criterion": criterion,
-            "runs": number,
-            "twin": twin,
-            "coldest": coldest,
-            "hottest": hottest,
-            "input_axis": input_axis,
-            "latitude": latitude,
-            "power_steps": power_steps,
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
+    job: ClassVar[str] = "fogml.cli.plan_job:plan_and_write"
+    want: Annotated[
+        list[str],
+        option(
+            "Effect, nominal constant (k1), or EFFECT.PARAMETER to be known; may be repeated.",
+            metavar="EFFECT|CONSTANT",
+            known=options.EFFECTS,
+        ),
+    ] = []
+    separate: Annotated[
+        list[list[str]],
+        BeforeValidator(_groups),
+        option(
+            "Effects to be told apart; one alone is to be shown; repeatable.",
+            metavar="A,B",
+            known=options.EFFECTS,
+        ),
+    ] = []
+    hours: Annotated[float, option("Longest time of a run.", metavar="HOURS")] = 24.0
+    criterion: Annotated[
+        str,
+        BeforeValidator(_capital),
+        option(
+            "D: volume of the confidence ellipsoid; A: mean square of the standard errors.", metavar="D|A"
+        ),
+    ] = "D"
+    runs: Annotated[int, option("How many runs, planned in turn.")] = 1
+    twin: options.Twin = "nominal"
+    coldest: Annotated[float, option("Lowest temperature.", metavar="DEGC")] = -40.0
+    hottest: Annotated[float, option("Highest temperature.", metavar="DEGC")] = 60.0
+    input_axis: Annotated[
+        str | None, option("up, down, north ...: the mounting; up or north is tried else.", metavar="WAY")
+    ] = None
+    latitude: Annotated[float, option("Of the lab (39.9).", metavar="DEG")] = Field(
+        default_factory=_usual_latitude
     )
-    plan_and_write(settings, Terminal(as_json, quiet))
+    power_steps: Annotated[
+        bool, option("Whether the unit's power may be switched.", "--power-steps/--no-power-steps")
+    ] = True
+    out: options.Folder = "plan"

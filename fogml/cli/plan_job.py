@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from pydantic import Field, field_validator
-
-from fogml.cli.settings import Settings
+from fogml.cli.plan import PlanSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.gap.plan import plan_runs
 from fogml.gap.plan_json import plan_values, programme_file, simulation_file
@@ -16,45 +14,8 @@ from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.simulate import DEFAULT_FACTS
-from fogml.twin.twin_file import load_twin, twin_names
+from fogml.twin.twin_file import load_twin
 from fogml.yaml_text import yaml_text
-
-
-class PlanSettings(Settings):
-    """Settings of ``fogml plan``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("twin",)
-    want: list[str] = []
-    separate: list[list[str]] = []
-    hours: float = Field(24.0, allow_inf_nan=False)
-    criterion: str = "D"
-    runs: int = 1
-    twin: str = "nominal"
-    coldest: float = Field(-40.0, allow_inf_nan=False)
-    hottest: float = Field(60.0, allow_inf_nan=False)
-    input_axis: str | None = None
-    latitude: float = DEFAULT_FACTS.latitude or 0.0
-    power_steps: bool = True
-    out: str = "plan"
-
-    @field_validator("separate", mode="before")
-    @classmethod
-    def _from_text(cls, value: Any) -> Any:
-        """``["a,b", ...]`` as flags give them, or lists as YAML does."""
-        if not isinstance(value, list):
-            return value
-        return [
-            [part.strip() for part in group.split(",") if part.strip()] if isinstance(group, str) else group
-            for group in value
-        ]
-
-    @field_validator("criterion", mode="before")
-    @classmethod
-    def _capital(cls, value: Any) -> Any:
-        return value.upper() if isinstance(value, str) else value
-
-    def _ships(self, key: str, value: str) -> bool:
-        return super()._ships(key, value) or (key == "twin" and value in twin_names())
 
 
 def plan_and_write(settings: PlanSettings, terminal: Terminal) -> Plan:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
+from fogml.cli.replay import ReplaySettings
 from fogml.cli.runs import open_run
-from fogml.cli.settings import Repairing, Settings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import check_finite
@@ -20,23 +20,6 @@ from fogml.twin.replay_after import replay_after
 from fogml.twin.truth import Truth, read_truth
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_names
-
-
-class ReplaySettings(Settings):
-    """Settings of ``fogml replay``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("twin", "run", "truth", "after")
-    twin: str | None = None
-    run: str | None = None
-    only: str | None = None
-    truth: str | None = None
-    after: list[str] = []
-    storage_temperature: float = 25.0
-    repair: Repairing = False
-    out: str | None = None
-
-    def _ships(self, key: str, value: str) -> bool:
-        return super()._ships(key, value) or (key == "twin" and value in twin_names())
 
 
 def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:

@@ -4,11 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fogml.cli.settings import SHIPPED, Repairing
+from fogml.cli.options import Repairing
+from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.runs.findings import FIRST_OF_ALL
 from fogml.runs.run import Run
+
+
+def shipped_places() -> list[str]:
+    """The shipped runs as a command names them."""
+    from fogml.runs.shipped import shipped_names
+
+    return [SHIPPED + name for name in shipped_names()]
 
 
 def open_run(path: str, *, repair: Repairing = False) -> Run:

@@ -5,37 +5,47 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from difflib import get_close_matches
+from inspect import get_annotations
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationInfo, field_validator
 
 from fogml import __version__
+from fogml.cli.given import Given, option
 from fogml.errors import InputError, quoted
 from fogml.outputs import sole_writer, whole_file
-from fogml.yaml_text import parse_yaml, read_yaml, yaml_text
+from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
 """What a run's path begins with when it names a recording that ships."""
 
 
-Repairing = bool | Literal["anyway"]
-"""Whether faulty rows are repaired, and ``anyway`` if however many that drops."""
-
-
 class Settings(BaseModel):
-    """What every command takes. Unknown keys are errors."""
+    """What every command takes. Unknown keys are errors.
+
+    A setting is declared once: its type, default and checks, and as `Given` how it stands on a command line.
+    """
 
     model_config = ConfigDict(
         extra="forbid", frozen=True, strict=True, allow_inf_nan=False, protected_namespaces=()
     )
+    job: ClassVar[str] = ""
+    """``module:function`` that does the job, of settings and terminal; False: a limit was not met."""
+    config_argument: ClassVar[str] = ""
+    """Help of the configuration file as an argument; where there is none, it goes after ``--config``."""
     path_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files to read."""
-    written_keys: ClassVar[tuple[str, ...]] = ("out",)
+    written_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files or folders to write."""
-    config_option: ClassVar[str] = "--config "
-    """What stands before a configuration file on the command line."""
-    seed: int = Field(0, ge=0, lt=1 << 32)
+    seed: Annotated[int, option("Seed of everything random.")] = Field(0, ge=0, lt=1 << 32)
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **more: Any) -> None:
+        super().__pydantic_init_subclass__(**more)
+        given = given_settings(cls)
+        cls.path_keys = tuple(key for key, one in given.items() if one.reads)
+        cls.written_keys = tuple(key for key, one in given.items() if one.writes)
 
     @field_validator("*")
     @classmethod
@@ -68,7 +78,7 @@ class Settings(BaseModel):
 
     def in_full(self) -> Self:
         """The settings with every path in full, to be run from anywhere; what ships keeps its name."""
-        keys = [key for key in (*self.path_keys, *self.written_keys) if key in type(self).model_fields]
+        keys = (*self.path_keys, *self.written_keys)
         return self.model_copy(update={key: self._in_full(key, getattr(self, key)) for key in keys})
 
     def _in_full(self, key: str, value: Any) -> Any:
@@ -78,7 +88,7 @@ class Settings(BaseModel):
 
     def _ships(self, key: str, value: str) -> bool:
         """Whether a value of a path's setting names something that ships rather than a file."""
-        return value.startswith(SHIPPED)
+        return value.startswith(SHIPPED) or value in given_settings(type(self))[key].known_names()
 
     def as_written(self) -> dict[str, Any]:
         """The values of a configuration file."""
@@ -94,7 +104,8 @@ class Settings(BaseModel):
         name
             Name of the file; that of `config_file` if None.
         """
-        again = f"fogml {command} {self.config_option}{name or config_file(command)}"
+        option = "" if self.config_argument else "--config "
+        again = f"fogml {command} {option}{name or config_file(command)}"
         head = f"# fogml {__version__}: run it again with  {again}\n"
         return head + yaml_text(self.as_written())
 
@@ -118,67 +129,16 @@ class Settings(BaseModel):
             yield
 
 
+def given_settings(settings: type[Settings]) -> dict[str, Given]:
+    """How settings stand on a command line, by name: a class's own first, then what it shares."""
+    fields = settings.model_fields
+    names = [name for cls in settings.__mro__ for name in get_annotations(cls) if name in fields]
+    return {name: given for name in names for given in fields[name].metadata if isinstance(given, Given)}
+
+
 def config_file(command: str) -> str:
     """Name of the file that a command's settings are written to: two commands may share a folder."""
     return f"{command.replace(' ', '-')}.config.yaml"
-
-
-class LimitSettings(Settings):
-    """Settings of a command that judges."""
-
-    averaging: float = 100.0
-    design_index: float | None = None
-    limits: dict[str, float] = {}
-    turn_on_band: float | None = None
-    noise: str | None = None
-
-    @field_validator("limits", mode="before")
-    @classmethod
-    def _from_flags(cls, value: Any) -> Any:
-        """``["name=value", ...]`` as flags give them, or a mapping as YAML does."""
-        if not isinstance(value, list):
-            return value
-        limits: dict[str, float] = {}
-        for text in value:
-            name, equals, number = str(text).partition("=")
-            try:
-                limits[name.strip()] = float(number)
-            except ValueError:
-                equals = ""
-            if not equals:
-                raise ValueError(f"{quoted(text)} is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
-        return limits
-
-
-def named_values(texts: list[Any]) -> dict[str, Any]:
-    """``["name=value", ...]`` as flags give them, each value read as YAML reads it.
-
-    Raises
-    ------
-    ValueError
-        If one is not of that form.
-    """
-    values = {}
-    for text in texts:
-        name, equals, value = str(text).partition("=")
-        if not (equals and name.strip()):
-            raise ValueError(f"{quoted(text)} sets nothing; write NAME=VALUE, e.g. centres=16")
-        values[name.strip()] = parse_yaml(value, quoted(text))
-    return values
-
-
-def number_list(text: str, example: str) -> list[float]:
-    """Numbers of a text with commas.
-
-    Raises
-    ------
-    ValueError
-        With an example, if one is no number.
-    """
-    try:
-        return [float(part) for part in text.split(",")]
-    except ValueError:
-        raise ValueError(f"{quoted(text)} is no list of numbers; write e.g. {example}") from None
 
 
 def read_config(path: Path) -> dict[str, Any]:

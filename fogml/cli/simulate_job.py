@@ -2,101 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from contextlib import ExitStack
-from datetime import datetime
 from pathlib import Path
-from typing import Any, ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator
-
-from fogml.cli.settings import Settings, absolute
+from fogml.cli.simulate import SimulateSettings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.between_runs import Storage
-from fogml.twin.programme import Programme, load_programme, programme_names
-from fogml.twin.simulate import DEFAULT_COLUMNS, default_facts, simulate_to_file, world_of, write_world
+from fogml.twin.programme import Programme, load_programme
+from fogml.twin.simulate import default_facts, simulate_to_file, world_of, write_world
 from fogml.twin.timeline import timeline
 from fogml.twin.twin import Twin
-from fogml.twin.twin_file import load_twin, twin_names
-
-
-class StorageSettings(BaseModel):
-    """Where the unit is between its runs: air [degC], humidity [%], and whether it stays on."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    temperature: float = 25.0
-    humidity: float = 50.0
-    power: Literal["on", "off"] = "off"
-
-    @field_validator("power", mode="before")
-    @classmethod
-    def _as_word(cls, value: Any) -> Any:
-        return {True: "on", False: "off"}.get(value, value) if isinstance(value, bool) else value
-
-
-class SimulatedRun(BaseModel):
-    """One of several runs of a unit; what it does not state is the file's."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
-    programme: str | list[Any] | dict[str, Any]
-    started: datetime
-    out: str
-    truth: str | None = None
-    sample_s: float | None = None
-    columns: list[str] | None = None
-    facts: dict[str, Any] | None = None
-
-
-class SimulateSettings(Settings):
-    """Settings of ``fogml simulate``: a file of schema ``fogml.simulate/1``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("programme", "twin")
-    written_keys: ClassVar[tuple[str, ...]] = ("out", "truth")
-    config_option: ClassVar[str] = ""
-    schema_: Literal["fogml.simulate/1"] = Field("fogml.simulate/1", alias="schema")
-    sample_s: float = 1.0
-    programme: str | list[Any] | dict[str, Any] | None = None
-    twin: str | dict[str, Any] = "nominal"
-    columns: list[str] = list(DEFAULT_COLUMNS)
-    facts: dict[str, Any] | None = None
-    out: str | None = None
-    truth: str | None = None
-    runs: list[SimulatedRun] = []
-    storage: StorageSettings = StorageSettings()
-
-    @classmethod
-    def gather(cls, config: Path | None, flags: Mapping[str, Any]) -> Self:
-        """As `Settings.gather`; programmes of runs are meant from where the file lies, too."""
-        found = super().gather(config, flags)
-        if config is None:
-            return found
-        runs = []
-        for run in found.runs:
-            near = config.parent / run.programme if isinstance(run.programme, str) else None
-            runs.append(run.model_copy(update={"programme": str(near)}) if near and near.is_file() else run)
-        return found.model_copy(update={"runs": runs})
-
-    def in_full(self) -> Self:
-        """The settings with every path in full."""
-        full = super().in_full()
-        runs = []
-        for run in full.runs:
-            written = {key: absolute(value) for key in ("out", "truth") if (value := getattr(run, key))}
-            if isinstance(run.programme, str) and run.programme not in programme_names():
-                written["programme"] = absolute(run.programme)
-            runs.append(run.model_copy(update=written))
-        return full.model_copy(update={"runs": runs})
-
-    def _ships(self, key: str, value: str) -> bool:
-        # A programme written out as a list of sentences names no file.
-        known = {"programme": programme_names, "twin": twin_names}.get(key, tuple)()
-        return super()._ships(key, value) or value in known or isinstance(getattr(self, key), list)
-
-    def as_written(self) -> dict[str, Any]:
-        """The values of a configuration file."""
-        return self.model_dump(mode="json", by_alias=True, exclude_none=True)
+from fogml.twin.twin_file import load_twin
 
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:

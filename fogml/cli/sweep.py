@@ -2,68 +2,69 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, ClassVar, Literal
 
-import typer
+from pydantic import BeforeValidator, Field, ValidationError
 
 from fogml.cli import options
-from fogml.cli.terminal import Terminal
+from fogml.cli.given import option
+from fogml.cli.settings import Settings
+from fogml.tuning.space import Space
 
-app = typer.Typer(**options.APP_SETTINGS)
+
+def _understood(value: Any) -> Space:
+    """The space; a fault names its place."""
+    try:
+        return value if isinstance(value, Space) else Space.model_validate(value)
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
+        reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
+        raise ValueError(f"{place}: {reason}" if place else reason) from None
 
 
-@app.command(cls=options.TestRunsCommand)
-def sweep(
-    sweep: Annotated[
-        Path | None, typer.Argument(metavar="CONFIG", help="YAML file of schema fogml.sweep/1.")
-    ] = None,
-    runs: Annotated[
-        list[str] | None, typer.Option("--run", metavar="RUN", help="Training run; may be repeated.")
-    ] = None,
-    test: options.Tests = None,
-    trials: Annotated[int | None, typer.Option("--trials", help="Trials to finish (50).")] = None,
-    workers: Annotated[int | None, typer.Option("--workers", help="Processes on this machine (1).")] = None,
-    storage: Annotated[
-        str | None,
-        typer.Option(
-            "--storage", metavar="URL", help="Database of the study, e.g. postgresql://user@host/db."
-        ),
-    ] = None,
-    name: Annotated[str | None, typer.Option("--name", help="Name of the study in its storage.")] = None,
-    averaging: options.Averaging = None,
-    repair: options.Repair = None,
-    repair_anyway: options.RepairAnyway = None,
-    out: options.Out = None,
-    seed: options.Seed = None,
-    config: options.Config = None,
-    as_json: options.Json = False,
-    quiet: options.Quiet = False,
-) -> None:
+class SweepSettings(Settings):
     """Search features, models and sizes on held-out parts of the training runs.
 
     The same command goes on with a study that was interrupted, and with --storage joins it from
     another machine. Writes best.yaml (a configuration of fogml train), sweep.json, sweep.html and
     sweep.config.yaml; the study itself is kept in --out unless --storage names a database.
     """
-    from fogml.cli.sweep_job import SweepSettings, sweep_and_write
-    from fogml.errors import InputError
 
-    if sweep is not None and config is not None:
-        raise InputError("CONFIG and --config are the same file; give one of them")
-    settings = SweepSettings.gather(
-        sweep or config,
-        {
-            "runs": runs,
-            "test": test,
-            "trials": trials,
-            "workers": workers,
-            "storage": storage,
-            "name": name,
-            "averaging": averaging,
-            "repair": options.repairing(repair, repair_anyway),
-            "out": str(out) if out else None,
-            "seed": seed,
-        },
-    )
-    sweep_and_write(settings, Terminal(as_json, quiet))
+    job: ClassVar[str] = "fogml.cli.sweep_job:sweep_and_write"
+    config_argument: ClassVar[str] = "YAML file of schema fogml.sweep/1."
+    schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
+    name: Annotated[str, option("Name of the study in its storage.", metavar="NAME")] = "sweep"
+    runs: Annotated[
+        list[str],
+        option(
+            "Training run; may be repeated.",
+            "--run",
+            metavar="RUN",
+            reads=True,
+            known=options.SHIPPED_RUNS,
+        ),
+    ] = []
+    test: options.Tests = []
+    space: Annotated[Space, BeforeValidator(_understood)]
+    objectives: Annotated[list[str], BeforeValidator(options.names_list)] = ["rms"]
+    folds: Literal["auto", "time", "runs"] = "auto"
+    fold_count: int = 5
+    trials: Annotated[int, option("Trials to finish.")] = 50
+    sampler: str = "tpe"
+    prune: bool = True
+    workers: options.Workers = 1
+    storage: Annotated[
+        str | None, option("Database of the study, e.g. postgresql://user@host/db.", metavar="URL")
+    ] = None
+    heartbeat_s: float = 10.0
+    averaging: options.Averaging = 100.0
+    repair: options.Repair = False
+    out: options.Folder = "sweep-results"
+
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file; a password is never written."""
+        from fogml.tuning.storage import without_password
+
+        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        return values if self.storage is None else {**values, "storage": without_password(self.storage)}

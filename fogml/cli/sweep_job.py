@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Any
 
-from pydantic import Field, field_validator
-
+from fogml.cli.options import Repairing
 from fogml.cli.runs import open_legs, open_runs
-from fogml.cli.settings import Repairing, Settings
+from fogml.cli.sweep import SweepSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
 from fogml.tuning.plan import OBJECTIVES, Plan, run_identity
-from fogml.tuning.space import Space
 from fogml.yaml_text import parse_yaml
 
 if TYPE_CHECKING:
@@ -25,74 +23,23 @@ if TYPE_CHECKING:
     from fogml.validation.results import Judgement
 
 
-class SweepSettings(Settings):
-    """Settings of ``fogml sweep``: a file of schema ``fogml.sweep/1``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test")
-    config_option: ClassVar[str] = ""
-    schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
-    name: str = "sweep"
-    runs: list[str] = []
-    test: list[str] = []
-    space: Space
-    objectives: list[str] = ["rms"]
-    folds: Literal["auto", "time", "runs"] = "auto"
-    fold_count: int = 5
-    trials: int = 50
-    sampler: str = "tpe"
-    prune: bool = True
-    workers: int = 1
-    storage: str | None = None
-    heartbeat_s: float = 10.0
-    averaging: float = 100.0
-    repair: Repairing = False
-    out: str = "sweep-results"
-
-    @field_validator("objectives", mode="before")
-    @classmethod
-    def _from_text(cls, value: object) -> object:
-        if isinstance(value, str):
-            return [name.strip() for name in value.split(",") if name.strip()]
-        return value
-
-    @field_validator("space", mode="before")
-    @classmethod
-    def _understood(cls, value: Any) -> Space:
-        """The space; a fault names its place."""
-        from pydantic import ValidationError
-
-        try:
-            return value if isinstance(value, Space) else Space.model_validate(value)
-        except ValidationError as error:
-            first = error.errors()[0]
-            place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
-            reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
-            raise ValueError(f"{place}: {reason}" if place else reason) from None
-
-    def as_written(self) -> dict[str, Any]:
-        """The values of a configuration file; a password is never written."""
-        from fogml.tuning.storage import without_password
-
-        values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
-        return values if self.storage is None else {**values, "storage": without_password(self.storage)}
-
-    def plan(self, runs: list[Run]) -> Plan:
-        """What workers are told."""
-        return Plan(
-            name=self.name,
-            read=partial(_read, tuple(self.runs), self.repair, [run_identity(run) for run in runs]),
-            space=self.space,
-            objectives=tuple(self.objectives),
-            folds=self.folds,
-            fold_count=self.fold_count,
-            trials=self.trials,
-            sampler=self.sampler,
-            prune=self.prune,
-            seed=self.seed,
-            storage=self.storage,
-            folder=self.out,
-            heartbeat_s=self.heartbeat_s,
-        )
+def plan_of(settings: SweepSettings, runs: list[Run]) -> Plan:
+    """What workers are told."""
+    return Plan(
+        name=settings.name,
+        read=partial(_read, tuple(settings.runs), settings.repair, [run_identity(run) for run in runs]),
+        space=settings.space,
+        objectives=tuple(settings.objectives),
+        folds=settings.folds,
+        fold_count=settings.fold_count,
+        trials=settings.trials,
+        sampler=settings.sampler,
+        prune=settings.prune,
+        seed=settings.seed,
+        storage=settings.storage,
+        folder=settings.out,
+        heartbeat_s=settings.heartbeat_s,
+    )
 
 
 def _read(paths: tuple[str, ...], repair: Repairing, identities: list[Any]) -> list[Run]:
@@ -118,7 +65,7 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
     test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else []
     with terminal.work("sweeping", total=settings.trials) as work:
         study = run_sweep(
-            settings.plan(runs),
+            plan_of(settings, runs),
             settings.workers,
             lambda done, what: work.reached(done, settings.trials, f"tried {what}"),
         )

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Protocol
 
-import typer
+import click
 
 from fogml.escaping import terminal_text, visible
 from fogml.json_files import json_text
@@ -48,12 +48,12 @@ class Terminal:
     def note(self, text: str) -> None:
         """A line on stderr."""
         if not self.quiet:
-            typer.echo(terminal_text(text), err=True)
+            click.echo(terminal_text(text), err=True)
 
     def say(self, text: str) -> None:
         """A line on stdout for people."""
         if not (self.quiet or self.as_json):
-            typer.echo(terminal_text(text))
+            click.echo(terminal_text(text))
 
     def markdown(self, text: str) -> None:
         """Markdown on stdout for people, as headings, lists and tables."""
@@ -67,7 +67,7 @@ class Terminal:
     def result(self, values: Any) -> None:
         """The result on stdout, where JSON is asked for."""
         if self.as_json:
-            typer.echo(json_text(values, "result", ascii_only=True))
+            click.echo(json_text(values, "result", ascii_only=True))
 
     def table(self, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
         """A table on stdout for people: the first column left, the others right."""
@@ -159,7 +159,7 @@ class _Lines:
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
             text = f"{what}: {self._done / self._total:.0%}, about {left:.0f} s left"
-        typer.echo(terminal_text(text), err=True)
+        click.echo(terminal_text(text), err=True)
 
 
 @contextmanager

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
-from pydantic import field_validator
-
+from fogml.cli.options import LimitSettings
 from fogml.cli.runs import open_runs
-from fogml.cli.settings import LimitSettings, Repairing, named_values
 from fogml.cli.terminal import Terminal, Work, number
+from fogml.cli.train import TrainSettings
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import whole_folder
@@ -28,26 +27,9 @@ if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 
-class TrainSettings(LimitSettings):
-    """Settings of ``fogml train``."""
-
-    path_keys: ClassVar[tuple[str, ...]] = ("runs", "test", "noise")
-    runs: list[str] = []
-    test: list[str] = []
-    model: str = "auto"
-    features: str | None = None
-    parameters: dict[str, Any] = {}
-    train_again: bool = False
-    navigation: float | None = None
-    repair: Repairing = False
-    strict: bool = False
-    any_unit: bool = False
-    out: str = "train-results"
-
-    @field_validator("parameters", mode="before")
-    @classmethod
-    def _set_by_flags(cls, value: object) -> object:
-        return named_values(value) if isinstance(value, list) else value
+def train(settings: TrainSettings, terminal: Terminal) -> bool:
+    """As `train_and_write`; whether every limit is met."""
+    return train_and_write(settings, terminal).met
 
 
 def train_and_write(settings: TrainSettings, terminal: Terminal) -> Judgement:

@@ -7,7 +7,7 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from fogml import __version__
 from fogml.errors import FogmlError, InputError
@@ -15,6 +15,7 @@ from fogml.fleet.manifest import Unit
 from fogml.json_files import write_json
 from fogml.outputs import NO_ROOM, whole_file
 from fogml.runs.sources import run_sources, sources_stamp
+from fogml.strict import Strict, strictly
 from fogml.strict_json import read_json
 
 OUTCOME_SCHEMA, OUTCOME = "fogml.outcome/1", "outcome.json"
@@ -25,6 +26,41 @@ UnitJob = Callable[[Unit, Path], Mapping[str, Any]]
 
 It has to be importable by name: other processes and machines call it.
 """
+
+
+class Worst(Strict, extra="ignore"):
+    """The run that was judged worst of a unit: its name, averaging time [s] and rms [deg/h]."""
+
+    run: str = ""
+    averaging_s: float | None = None
+    before: float | None = None
+    after: float | None = None
+    floor: float | None = None
+    outside_training: float | None = None
+
+
+class Found(Strict, extra="ignore"):
+    """What the fleet wants of a unit's results."""
+
+    model: str = ""
+    met: bool | None = None
+    verdict: str = ""
+    effects: list[str] = []
+    notes: list[str] = []
+    worst: Worst | None = None
+    constants: dict[str, Any] | None = None
+
+
+class Outcome(Strict, extra="ignore"):
+    """What is kept of a unit that was done."""
+
+    unit: str
+    axis: str
+    job: str
+    folder: str
+    status: Literal["done"]
+    fingerprint: str
+    found: Found
 
 
 @dataclass(frozen=True)
@@ -119,18 +155,14 @@ def run_task(task: Task) -> dict[str, Any]:
 def finished(task: Task, fingerprint: str | None = None) -> dict[str, Any] | None:
     """The outcome of a unit that was done before with the same runs and settings; None if it was not.
 
-    Units that failed are tried again.
+    Units that failed are tried again, and so are those whose outcome no job has written.
     """
     try:
-        outcome = read_json(task.folder / OUTCOME, "run the fleet again")
-    except InputError:
-        return None
-    if not isinstance(outcome, dict) or outcome.get("status") != DONE:
-        return None
-    try:
-        return outcome if outcome.get("fingerprint") == (fingerprint or task.fingerprint()) else None
-    except InputError:
-        return None  # the job tells which file can't be read
+        values = read_json(task.folder / OUTCOME, "run the fleet again")
+        outcome = strictly(Outcome, values)
+        return values if outcome.fingerprint == (fingerprint or task.fingerprint()) else None
+    except (InputError, ValueError):
+        return None  # what else is wrong with it the job tells
 
 
 def lost(task: Task, reason: str) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import yaml
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from fogml.blind.code_state import code_state
 from fogml.blind.folders import BlindFolder

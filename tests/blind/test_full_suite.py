@@ -17,7 +17,7 @@ from fogml.blind.plan import plans
 from fogml.blind.scoring.marks_file import write_marks
 from fogml.blind.scoring.table import ENOUGH, FIGURES
 from fogml.blind.seeds import is_final, uses
-from fogml.cli.blind_job import MakeSettings
+from fogml.cli.blind import MakeSettings
 from tests.blind.test_parts import marks_of
 
 CONFIG = yaml.safe_load((full.HERE / "config.yaml").read_text(encoding="utf-8"))

@@ -10,7 +10,8 @@ import pytest
 from fogml.blind.folders import BlindFolder
 from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
 from fogml.blind.sealing import own_roots
-from fogml.cli.blind_job import RunSettings, run_and_tell
+from fogml.cli.blind import RunSettings
+from fogml.cli.blind_job import run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from fogml.blind.baselines.abstain import abstain
 from fogml.blind.baselines.forward import bic, bic_fixed_nominal

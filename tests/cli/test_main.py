@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import errno
+import json
+import os
 import signal
 import subprocess
 import sys
-from importlib import import_module
-from types import SimpleNamespace
 
+import click
 import pytest
-import typer
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 import fogml
-from fogml.cli import main
+from fogml.cli import command, main
+from fogml.cli.settings import given_settings
 from fogml.errors import InputError
 from fogml.processes import Terminated
 
@@ -22,10 +23,19 @@ runner = CliRunner()
 
 
 def use_command(monkeypatch, action):
-    """Make ``fogml train`` do something else."""
-    app = typer.Typer()
-    app.command("train")(action)
-    monkeypatch.setattr(main, "import_module", lambda name: SimpleNamespace(app=app))
+    """Make every command do something else."""
+    monkeypatch.setattr(command, "load", lambda place: lambda settings, terminal: action())
+
+
+def every_command():
+    """Words and command of each, those of groups too."""
+    context = click.Context(main.app)
+    for name in main.COMMANDS:
+        found = main.app.get_command(context, name)
+        if isinstance(found, main.Group):
+            yield from (([name, part], found.get_command(context, part)) for part in found.known)
+        else:
+            yield [name], found
 
 
 def run_program(*arguments: str, **options):
@@ -50,21 +60,74 @@ def test_help_lists_every_command():
 
 @pytest.mark.parametrize("name", main.COMMANDS)
 def test_the_line_in_the_list_is_the_command_s_own(name):
-    module, line = main.COMMANDS[name]
-    command = typer.main.get_command(import_module(module).app)
-    assert command.help.splitlines()[0] == line
+    found = main.app.get_command(click.Context(main.app), name)
+    assert found.help.splitlines()[0] == main.COMMANDS[name][1]
 
 
-@pytest.mark.parametrize("name", main.COMMANDS)
-def test_every_command_has_help_and_the_common_options(name):
-    command = typer.main.get_command(import_module(main.COMMANDS[name][0]).app)
-    for words in [[name, part] for part in getattr(command, "commands", ())] or [[name]]:
-        result = runner.invoke(main.app, [*words, "--help"])
-        assert result.exit_code == 0
-        # A blind suite's folder is named first, and holds everything.
-        own_folder = words in (["blind", "make"], ["blind", "run"])
-        for option in ("--config", "--seed", "--json", "--quiet", *(() if own_folder else ("--out",))):
-            assert option in result.stdout
+@pytest.mark.parametrize(("words", "found"), list(every_command()))
+def test_every_command_has_help_and_the_common_options(words, found):
+    result = runner.invoke(main.app, [*words, "--help"])
+    assert result.exit_code == 0
+    # A blind suite's folder is named first, and holds everything.
+    own_folder = words in (["blind", "make"], ["blind", "run"])
+    for option in ("--config", "--seed", "--json", "--quiet", *(() if own_folder else ("--out",))):
+        assert option in result.stdout
+
+
+@pytest.mark.parametrize(("words", "found"), list(every_command()))
+def test_every_option_is_a_setting_with_help_and_in_the_schema(words, found):
+    schema = json.loads(runner.invoke(main.app, [*words, "--schema"]).stdout)
+    for key, given in given_settings(found.settings).items():
+        assert schema["properties"][key]["description"] == given.help
+    settings = set(found.settings.model_fields)
+    for param in found.params:
+        assert param.help
+        assert param.name.partition("__")[0] in settings | {"config", "as_json", "quiet", "schema"}
+
+
+def completions(words, begun):
+    context = main.app.make_context("fogml", [*words, "--help"], resilient_parsing=True)
+    found = main.app
+    for word in words[:2]:
+        if isinstance(found, main.Group):
+            found = found.get_command(context, word)
+    param = next(p for p in found.params if words[-1] in p.opts or p.metavar == words[-1])
+    return {item.value for item in param.shell_complete(click.Context(found), begun)}
+
+
+@pytest.mark.parametrize(
+    ("words", "begun", "name"),
+    [
+        (["train", "--model"], "poly", "polynomial"),
+        (["train", "RUN..."], "shipped:ring", "shipped:ring-laser-x"),
+        (["diagnose", "--twin"], "nom", "nominal"),
+        (["diagnose", "--without"], "shupe_m", "shupe_mohr"),
+        (["import", "--profile"], "therm", "thermal-cycle-mems"),
+        (["lab", "rate", "--twin"], "tac", "tactical"),
+    ],
+)
+def test_names_complete_in_a_shell(words, begun, name):
+    assert name in completions(words, begun)
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_a_shell_gets_its_script(shell):
+    script = runner.invoke(main.app, ["--completion", shell]).stdout
+    assert f"_FOGML_COMPLETE={shell}_complete" in script
+
+
+def test_bash_completes_commands_and_names(tmp_path):
+    words = [("fogml tr", 1, "train"), ("fogml train --model poly", 3, "polynomial")]
+    for line, position, wanted in words:
+        found = run_program(
+            env={
+                **os.environ,
+                "_FOGML_COMPLETE": "bash_complete",
+                "COMP_WORDS": line,
+                "COMP_CWORD": str(position),
+            }
+        )
+        assert wanted in [text.partition(",")[2] for text in found.stdout.split()]
 
 
 def test_help_loads_nothing_heavy():
@@ -134,7 +197,7 @@ def test_an_interrupt_is_status_130(monkeypatch):
     ],
 )
 def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp_path, error, told):
-    def action(out: str = typer.Option("")):
+    def action():
         raise error
 
     use_command(monkeypatch, action)
@@ -150,7 +213,7 @@ def test_what_nobody_expected_is_one_line_a_report_and_status_3(monkeypatch, tmp
 
 
 def test_a_report_that_finds_no_room_beside_the_output_goes_to_the_temporary_files(monkeypatch, tmp_path):
-    def action(out: str = typer.Option("")):
+    def action():
         raise AssertionError("a defect")
 
     use_command(monkeypatch, action)

@@ -9,14 +9,14 @@ import pytest
 import yaml
 
 from fogml.cli import settings as settings_module
-from fogml.cli.compensate_job import CompensateSettings
-from fogml.cli.import_job import ImportSettings
-from fogml.cli.lab_north_job import NorthSettings
-from fogml.cli.options import spread_values
-from fogml.cli.replay_job import ReplaySettings
+from fogml.cli.command import spread_values
+from fogml.cli.compensate import CompensateSettings
+from fogml.cli.import_ import ImportSettings
+from fogml.cli.lab import NorthSettings
+from fogml.cli.replay import ReplaySettings
 from fogml.cli.settings import Settings
-from fogml.cli.simulate_job import SimulateSettings
-from fogml.cli.train_job import TrainSettings
+from fogml.cli.simulate import SimulateSettings
+from fogml.cli.train import TrainSettings
 from fogml.errors import InputError
 from fogml.yaml_text import parse_yaml
 

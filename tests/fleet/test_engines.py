@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import json
 import os
 import signal
 import subprocess
@@ -30,6 +31,27 @@ def test_units_that_are_done_are_not_done_again(tmp_path):
     (tmp_path / "1a.csv").write_text((tmp_path / "1a.csv").read_text() + "9999,1,20\n")
     run_tasks(tasks(tmp_path, 4, quick))
     assert noted(tmp_path / "out").count("done FOG-001") == 2
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("found", 0.03),
+        ("found", {"worst": [1.0]}),
+        ("found", {"worst": {"after": "small"}}),
+        ("found", {"met": "yes"}),
+        ("found", {"notes": "none"}),
+        ("found", {"constants": 3}),
+        ("axis", 1),
+        ("unit", None),
+    ],
+)
+def test_an_outcome_that_no_job_has_written_is_made_again(tmp_path, key, value):
+    (sound,) = run_tasks(tasks(tmp_path, 1, quick))
+    path = tmp_path / "out" / "FOG-000-x" / OUTCOME
+    path.write_text(json.dumps(sound | {key: value}))
+    assert run_tasks(tasks(tmp_path, 1, quick)) == [sound]
+    assert json.loads(path.read_text()) == sound
 
 
 @pytest.mark.parametrize("workers", [1, 2])

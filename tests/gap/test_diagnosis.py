@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
+from click.testing import CliRunner
 
 from fogml.cli.main import app
 from fogml.errors import InputError

@@ -155,7 +155,7 @@ def test_every_parametric_name_is_known():
     ],
 )
 def test_commands_tell_before_they_read(command):
-    from typer.testing import CliRunner
+    from click.testing import CliRunner
 
     from fogml.cli.main import app
 

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from fogml.cli.sweep_job import SweepSettings
-from fogml.cli.train_job import TrainSettings
+from fogml.cli.sweep import SweepSettings
+from fogml.cli.sweep_job import plan_of
+from fogml.cli.train import TrainSettings
 from fogml.features.parse import parse_features
 from fogml.models.names import make_model
 from fogml.validation.limits import check_limits
@@ -31,4 +32,4 @@ SWEEPS = sorted((Path(__file__).parents[2] / "configs" / "sweeps").glob("*.yaml"
 @pytest.mark.parametrize("path", SWEEPS, ids=lambda path: path.stem)
 def test_sweep_configuration(path: Path) -> None:
     settings = SweepSettings.model_validate(read_yaml(path))
-    settings.plan([]).check()
+    plan_of(settings, []).check()

@@ -1,0 +1,69 @@
+"""How a setting is given on a command line: said once, beside its type and its default."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Given:
+    """Words and ways of a setting, to stand in its annotation.
+
+    Attributes
+    ----------
+    help
+        What it is, in one sentence.
+    metavar
+        What is shown in place of its value; of its type by default.
+    names
+        Options; ``--`` and the setting's name by default. A switch names both ways, ``--on/--off``; an option
+        that gives a value of its own stands as ``--option=value``.
+    argument
+        Given by its place rather than by an option.
+    spread
+        The option takes every value up to the next option.
+    as_text
+        A list is given as one text with commas, which the settings take apart.
+    reads, writes
+        It names a file or folder that is read, or written.
+    known
+        ``module:names`` of what ships or is built in, listed or given by a function; such a name is no file.
+    """
+
+    help: str
+    metavar: str | None = None
+    names: tuple[str, ...] = ()
+    argument: bool = False
+    spread: bool = False
+    as_text: bool = False
+    reads: bool = False
+    writes: bool = False
+    known: str | None = None
+
+    def known_names(self) -> Sequence[str]:
+        """Names of what ships or is built in."""
+        names = load(self.known) if self.known else ()
+        return names() if callable(names) else names
+
+    def __get_pydantic_json_schema__(self, core_schema: Any, handler: Any) -> dict[str, Any]:
+        """The setting's JSON schema, with its help."""
+        return {**handler(core_schema), "description": self.help}
+
+
+def load(place: str) -> Any:
+    """The object that ``module:name`` names; a module that begins with a dot is of the command line's."""
+    module, _, name = place.partition(":")
+    return getattr(import_module(module, __package__), name)
+
+
+def option(help: str, *names: str, **more: Any) -> Given:
+    """A setting given by an option; `more` as of `Given`."""
+    return Given(help, names=names, **more)
+
+
+def argument(metavar: str, help: str, **more: Any) -> Given:
+    """A setting given by its place; `more` as of `Given`."""
+    return Given(help, metavar, argument=True, **more)
