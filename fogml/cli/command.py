@@ -47,10 +47,14 @@ class SettingsCommand(click.Command):
         self.given = given_settings(settings)
         words = [param for key, given in self.given.items() for param in _params(settings, key, given)]
         if settings.config_argument:
-            place = {"required": False, "type": Place(None)}
-            words.insert(
-                0, click.Argument(["config" + _OWN], metavar="CONFIG", help=settings.config_argument, **place)
+            place = click.Argument(
+                ["config" + _OWN],
+                type=Place(None),
+                metavar="CONFIG",
+                help=settings.config_argument,
+                required=False,
             )
+            words.insert(0, place)
         super().__init__(
             name,
             context_settings=HELP_NAMES,
