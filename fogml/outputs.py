@@ -54,8 +54,7 @@ def whole_file(path: str | Path) -> Iterator[Path]:
 def whole_files(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
     """As `whole_file`, for several files of one folder that appear together."""
     for path in map(Path, paths):
-        if path.is_dir():
-            raise InputError(f"{path}: is a folder, a file was expected; choose another name")
+        check_is_no_folder(path)
     shown = Path(paths[0]).parent
     home = Path(os.path.realpath(shown))
     with _staging(home, shown) as staging:
@@ -63,6 +62,18 @@ def whole_files(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
         with staging.named(Path(paths[0]), shown):
             yield partials
             staging.move_in(home)
+
+
+def check_is_no_folder(path: Path) -> None:
+    """Check that a file can have this name.
+
+    Raises
+    ------
+    InputError
+        If a folder has it.
+    """
+    if path.is_dir():
+        raise InputError(f"{path}: is a folder, a file was expected; choose another name")
 
 
 @contextmanager

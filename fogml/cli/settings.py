@@ -14,7 +14,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 from fogml import __version__
 from fogml.cli.given import Given, option
 from fogml.errors import InputError, quoted
-from fogml.outputs import sole_writer, whole_file
+from fogml.outputs import check_is_no_folder, sole_writer, whole_file
 from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
@@ -121,8 +121,9 @@ class Settings(BaseModel):
         Raises
         ------
         InputError
-            If another process writes the file.
+            If it is a folder, or another process writes the file.
         """
+        check_is_no_folder(out)
         name = f"{out.stem}.{config_file(command)}"
         with sole_writer(out), whole_file(out.with_name(name)) as config:
             config.write_text(self.in_full().yaml(command, name), encoding="utf-8")

@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from fogml.errors import InputError, quoted
+from fogml.errors import FogmlError, InputError, first_line, quoted
 from fogml.features.features import Features
 from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
@@ -77,12 +77,23 @@ def refit(regressor: Any, table: TrainingTable) -> Any:
 
 
 def predict_rows(regressor: Any, columns: FloatArray) -> FloatArray:
-    """Values for columns that are finite float64, shape (n,)."""
+    """Values for columns that are finite float64, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If another's regressor can't be applied to them.
+    """
     if hasattr(regressor, "predict_unchecked"):
         return np.asarray(regressor.predict_unchecked(columns))
     # Kernel methods hold a value for each row and each training row; so few rows at a time.
     starts = range(0, len(columns), _PREDICTED_ROWS)
-    values = [np.asarray(regressor.predict(columns[start : start + _PREDICTED_ROWS])) for start in starts]
+    try:
+        values = [np.asarray(regressor.predict(columns[start : start + _PREDICTED_ROWS])) for start in starts]
+    except (FogmlError, MemoryError):
+        raise
+    except Exception as error:  # others' code raises whatever its parameters lead to
+        raise InputError(f"the regressor can't be applied to these runs: {first_line(error)}") from None
     return np.concatenate(values).reshape(-1) if values else np.empty(0)
 
 

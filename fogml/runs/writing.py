@@ -261,5 +261,7 @@ def check_side_file(path: str | Path, facts: Facts) -> Path | None:
 def _checked_suffix(path: Path) -> str:
     suffix = path.suffix.lower()
     if suffix not in SUFFIXES:
-        raise InputError(f"{path.name}: format '{suffix}' is not known; use one of {', '.join(SUFFIXES)}")
+        raise InputError(
+            f"{path.name or path}: format '{suffix}' is not known; use one of {', '.join(SUFFIXES)}"
+        )
     return suffix

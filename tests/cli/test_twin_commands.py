@@ -233,3 +233,11 @@ def test_faulty_runs_are_refused(tmp_path, invoke, change, message):
     result = invoke("simulate", config, status=2)
     assert message in result.stderr
     assert not (tmp_path / "a.csv").exists()
+
+
+@pytest.mark.parametrize("option", ["--out", "--truth"])
+def test_the_root_is_no_file_to_write(invoke, tmp_path, option):
+    other = {"--out": "--truth", "--truth": "--out"}[option]
+    words = ("simulate", "--programme", "four-positions", option, "/", other, tmp_path / "run.csv")
+    assert re.match("fogml: /: (is a folder|format '' is not known)", invoke(*words, status=2).stderr)
+    assert not list(tmp_path.iterdir())

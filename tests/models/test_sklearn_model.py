@@ -96,3 +96,9 @@ def test_whatever_an_estimator_raises_is_told(train):
     model = SklearnModel("sklearn.neural_network.MLPRegressor", options=options, max_rows=60)
     with pytest.raises(InputError, match=r"MLPRegressor: can't be fitted to these runs: ufunc"):
         model.fit(train)
+
+
+def test_what_only_applying_an_estimator_tells_is_told(train):
+    model = SklearnModel("sklearn.neighbors.KNeighborsRegressor", options={"n_jobs": 0})
+    with pytest.raises(InputError, match="can't be applied to these runs: n_jobs == 0"):
+        model.fit(train)
