@@ -65,13 +65,7 @@ def whole_files(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
 
 
 def check_is_no_folder(path: Path) -> None:
-    """Check that a file can have this name.
-
-    Raises
-    ------
-    InputError
-        If a folder has it.
-    """
+    """Raise `InputError` if a folder has the name of a file to write."""
     if path.is_dir():
         raise InputError(f"{path}: is a folder, a file was expected; choose another name")
 

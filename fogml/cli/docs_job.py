@@ -4,19 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from fogml.cli.docs import DocsSettings
 from fogml.cli.options_page import options_page
-from fogml.cli.settings import Settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 from fogml.report.manual import manual_folder, manual_page, page_names, page_text, title_of
-
-
-class DocsSettings(Settings):
-    """Settings of ``fogml docs``."""
-
-    page: str | None = None
-    out: str | None = None
 
 
 def show_docs(settings: DocsSettings, terminal: Terminal) -> None:

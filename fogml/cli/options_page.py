@@ -8,12 +8,9 @@ from typing import Any
 
 def options_page() -> str:
     """Markdown: for each command what it does, and its arguments and options in a table."""
-    import typer
-
     from fogml.cli.main import app
 
-    group = typer.main.get_command(app)
-    return "\n".join(part for name, command in _commands(group, "fogml") for part in _section(name, command))
+    return "\n".join(part for name, command in _commands(app, "fogml") for part in _section(name, command))
 
 
 def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:

@@ -45,9 +45,9 @@ def manual_folder() -> Path:
     )
 
 
-def page_names(folder: Path) -> list[str]:
-    """Stems of the pages, in the order of the list on the first."""
-    text = (folder / _FIRST).read_text(encoding="utf-8")
+def page_names(folder: Path | None = None) -> list[str]:
+    """Stems of a folder's pages (of `manual_folder` if None), in the order of the list on the first."""
+    text = ((folder or manual_folder()) / _FIRST).read_text(encoding="utf-8")
     fences = re.findall(r"^```\{toctree\}\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
     lines = [line.strip() for fence in fences for line in fence.splitlines()]
     return [Path(_FIRST).stem, *(line for line in lines if line and not line.startswith(":"))]

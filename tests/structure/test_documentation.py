@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.main import get_command
 
 import fogml
 from experiments.guide_commands.__main__ import NEEDS_NETWORK, ROOT, blocks_of, files_of, lines_of, pages
@@ -23,7 +22,7 @@ CODE = Path(fogml.__file__).parent
 PAGES = pages()
 TEXTS = {path: path.read_text(encoding="utf-8") for path in [*PAGES, *(ROOT / "docs").glob("*.md")]}
 README = TEXTS[ROOT / "README.md"]
-GROUP: Any = get_command(app)
+GROUP: Any = app
 SHELL = [(path, line) for path in PAGES for line in lines_of(path)]
 WRITTEN = {"--out", "-o", "--truth"}
 """Options whose value a command makes."""
