@@ -84,7 +84,7 @@ class Place(click.Path):
     """A file or folder, or a name that stands for what ships."""
 
     def __init__(self, given: Given | None) -> None:
-        super().__init__()
+        super().__init__(readable=False)  # what reads it says what is wrong
         self.given = given
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> Any:
@@ -134,7 +134,9 @@ def _params(settings: type[Settings], key: str, given: Given) -> list[click.Para
     if bool in types:
         names = _names(key, given)
         stand = {name: name.split("=") for name in names if "=" in name}
-        ways = [click.Option([key, *(name for name in names if name not in stand)], default=None)]
+        ways = [
+            click.Option([key, *(name for name in names if name not in stand)], is_flag=True, default=None)
+        ]
         ways[0].help = _told(given.help, field, names[0])
         for option, own in stand.values():
             text = given.help.partition("\n")[2]
