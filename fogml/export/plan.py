@@ -25,6 +25,10 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 
+SHORTEST_STEP_S, LONGEST_STEP_S = 1e-6, 86_400.0
+"""Sample intervals on board [s]: the clock counts microseconds; no unit is read more seldom than daily."""
+
+
 @dataclass(frozen=True, eq=False)
 class Limits:
     """The trained box, and how atoms level off beyond it.
@@ -144,8 +148,11 @@ class Plan:
         """
         model._check_fitted()
         interval = float(model.card_.sample_s if sample_s is None else sample_s)
-        if not (np.isfinite(interval) and interval > 0.0):
-            raise InputError(f"export: a sample interval of {interval} s; state one with --sample-s")
+        if not SHORTEST_STEP_S <= interval <= LONGEST_STEP_S:
+            raise InputError(
+                f"export: a sample interval of {interval:g} s; state one of {SHORTEST_STEP_S:g} to "
+                f"{LONGEST_STEP_S:g} s with --sample-s"
+            )
         compact = model.compact()
         if model.features_ is None:
             return cls(compact, (), (), (), (), Limits.none(), interval)

@@ -283,3 +283,10 @@ def test_foreign_text_stays_a_comment_of_c(model_of, tmp_path):
 def test_a_number_that_a_type_does_not_hold_is_told(value):
     with pytest.raises(InputError, match="float32 does not hold"):
         literal(value, "float32")
+
+
+@pytest.mark.parametrize("sample_s", [0.0, -1.0, 1e-300, 1e308, np.inf, np.nan])
+def test_a_sample_interval_that_no_unit_has_is_refused(sample_s: float) -> None:
+    model = make_model("polynomial", "T").fit([training_run()])
+    with pytest.raises(InputError, match=r"a sample interval of .* s; state one of 1e-06 to 86400 s"):
+        Plan.of(model, sample_s)

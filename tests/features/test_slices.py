@@ -92,3 +92,18 @@ def test_slices_of_a_file_are_checked():
         Slices.from_dict(values | {"inputs": [values["inputs"][0] | {"atom": "dT_in"}]}, features.atoms)
     with pytest.raises(InputError, match="width"):
         Slices.from_dict(values | {"width": 0.0}, features.atoms)
+
+
+def test_of_some_of_the_atoms_it_says_what_it_says_of_all():
+    rng = np.random.default_rng(3)
+    features = Features("T, dT, T_out, power")
+    atoms = np.column_stack([rng.uniform(0.0, 50.0, 2000), *rng.normal(size=(3, 2000)) * [[1], [20], [4]]])
+    learn_box(features, [atoms])
+    places = [0, 3, 1]
+    beyond = np.column_stack([rng.uniform(0.0, 50.0, 300), 1.5 * rng.normal(size=(300, 3)) * [1, 20, 4]])
+    # The input made of T_out is gone: held at a trained value it says nothing.
+    calm = beyond.copy()
+    calm[:, 2] = calm[:, 0] + np.median(atoms[:, 2] - atoms[:, 0])
+    fewer = features.slices.of_atoms(places)
+    assert np.array_equal(fewer.outside(beyond[:, places]), features.slices.outside(calm))
+    assert features.slices.of_atoms([1, 3]) is None and features.slices.of_atoms([0]) is None
