@@ -1,8 +1,8 @@
 """Prediction intervals from what a model leaves on parts of the training runs it did not see.
 
 Training rows are averaged over ``averaging_s``, cut into folds of time (whole runs where there
-are three or more), and for each fold the model is fitted to the others. The interval's
-half-width at a level p is the conformal quantile of the n absolute residuals: the
+are three or more: `half_widths_of_runs`), and for each fold the model is fitted to the others. Of
+folds of time the half-width at a level p is the conformal quantile of the n absolute residuals: the
 ceil((n + 1) p)-th smallest (Vovk, Gammerman & Shafer 2005; the cross-conformal form is
 Barber et al., "Predictive inference with the jackknife+", Ann. Statist. 49, 2021).
 
@@ -16,7 +16,7 @@ distance: twice as wide at one tenth of the box's span.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Annotated, Any
 
@@ -129,3 +129,31 @@ def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: st
         raise InputError("no residuals to tell a prediction interval from; the training runs are too short")
     ranks = [min(math.ceil((count + 1) * level), count) for level in LEVELS]
     return Intervals(float(averaging_s), tuple(float(sizes[rank - 1]) for rank in ranks), count, folds)
+
+
+def half_widths_of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
+    r"""Half-widths at `LEVELS` [deg/h] from sizes of what is left on each of K runs left out.
+
+    What is left on a run is mostly shifted as a whole, so K runs are K observations. At a level
+    :math:`p \le K/(K+1)` the half-width is conformal: the quantile of what is left where each run holds the
+    share 1/(K + 1) and the rest lies at infinity (hierarchical conformal prediction: Lee, Barber & Willett,
+    "Distribution-free inference with hierarchical data", 2023). Above, it is Student's quantile with K
+    degrees of freedom times the rms of the runs.
+    """
+    from scipy.stats import t as student
+
+    count, levels = len(lefts), np.array(LEVELS)
+    rms = float(np.sqrt(np.mean([np.mean(left**2) for left in lefts])))
+    conformal = quantiles_of_parts(lefts, np.minimum(levels * (count + 1) / count, 1.0))
+    normal = rms * student.ppf(0.5 + levels / 2.0, count)
+    half = np.where(levels <= count / (count + 1), conformal, normal)
+    return np.asarray(np.maximum.accumulate(half))
+
+
+def quantiles_of_parts(lefts: Sequence[FloatArray], levels: FloatArray) -> FloatArray:
+    """Quantiles of what is left on parts [deg/h], each part counting alike."""
+    sizes = np.concatenate(lefts)
+    shares = np.concatenate([np.full(len(left), 1.0 / (len(left) * len(lefts))) for left in lefts])
+    order = np.argsort(sizes)
+    places = np.searchsorted(np.cumsum(shares[order]), levels - 1e-9)
+    return np.asarray(sizes[order][np.minimum(places, len(sizes) - 1)])

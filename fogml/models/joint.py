@@ -3,7 +3,7 @@
 The output D, as recorded, and temperatures give the rate in one linear model (patent
 CN105333888A), here with an intercept and with Earth rate in the reference y [deg/h]::
 
-    y = (a0 + a1 T + a2 T^2) D + b0 + b1 T + b2 (T_in - T_out) + b3 dT (+ b4 T dT)
+    y = (a0 + a1 T + a2 T^2) D + b0 + b1 T + b2 (T_in - T_out) + b3 dT (+ b4 T dT) (+ further features)
 
 It is solved by QR on centred, scaled columns. The patent's own form has six columns, neither
 intercept nor Earth rate, and the difference of block means ``diff(T)`` in place of the rate dT;
@@ -35,6 +35,7 @@ from fogml.models.box import distance_outside, learn_box
 from fogml.models.card import TrainingCard, checked_runs, hash_ahead, training_card
 from fogml.models.coefficient_errors import noise_covariance
 from fogml.models.compact import Compact, affine
+from fogml.models.feature_model import resolve_features
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.out_of_fold import interval_table, out_of_fold_intervals
@@ -57,6 +58,7 @@ class _Saved(Strict):
     product: bool
     rate_window_s: float = Field(gt=0.0)
     gradient: bool
+    features: str | None = None
     regressor: dict[str, Any]
 
 
@@ -74,6 +76,9 @@ class JointModel(DriftModel):
         With a column T*dT; not in the patent's form.
     rate_window_s
         Window of the temperature's rate or difference [s]; the patent's 2**n samples.
+    features
+        Text of further features that the bias depends on, such as ``lag(T, 1200 s), play(T, 4 degC)``;
+        not in the patent's form.
 
     Attributes
     ----------
@@ -86,7 +91,14 @@ class JointModel(DriftModel):
     form: ClassVar[str] = "joint"
     features_: Features
 
-    def __init__(self, patent: bool = False, product: bool = False, rate_window_s: float = 64.0) -> None:
+    def __init__(
+        self,
+        patent: bool = False,
+        product: bool = False,
+        rate_window_s: float = 64.0,
+        features: str | None = None,
+    ) -> None:
+        self.features = features
         self.patent = patent
         self.product = product
         self.rate_window_s = rate_window_s
@@ -121,7 +133,9 @@ class JointModel(DriftModel):
         )
         if not group[0].earth_known and not self.patent:
             notes.append("Earth rate is not known: the intercept holds that of the training attitude")
-        self.features_ = parse_features(self._feature_text())
+        self.features_ = self._own_features()
+        if self.features is not None:
+            resolve_features(self.features, group)
         rows = [self._rows(run) for run in group]
         _check_turns(group, rows)
         learn_box(self.features_, [part.atoms[:, 1:] for part in rows])
@@ -206,6 +220,7 @@ class JointModel(DriftModel):
             "product": self.product,
             "rate_window_s": float(self.rate_window_s),
             "gradient": self.gradient_,
+            "features": self.features,
         }
         return {**own, "regressor": values}, arrays
 
@@ -215,16 +230,16 @@ class JointModel(DriftModel):
     ) -> JointModel:
         """The model that `to_saved` gave."""
         saved = strictly(_Saved, values, "model")
-        model = cls(saved.patent, saved.product, saved.rate_window_s)
+        model = cls(saved.patent, saved.product, saved.rate_window_s, saved.features)
         model.gradient_ = saved.gradient
-        model.features_ = parse_features(model._feature_text())
+        model.features_ = model._own_features()
         model.features_.set_box(card.box, card.slices)
         model.regressor_ = LinearRegressor.from_saved(saved.regressor, arrays)
         if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
             raise InputError("coefficients and columns differ in number")
         return model
 
-    def _feature_text(self) -> str:
+    def _own_features(self) -> Features:
         terms = ["T"]
         if self.gradient_:
             terms.append("T_in-T_out")
@@ -232,7 +247,8 @@ class JointModel(DriftModel):
         terms.append(("diff(T)" if self.patent else "dT") + window)
         if self.product:
             terms.append(f"T*dT{window}")
-        return ", ".join(terms)
+        own = parse_features(", ".join(terms))
+        return own if self.features is None else own + parse_features(self.features)
 
     def _rows(self, run: Run) -> RunRows:
         atoms, used, _ = self.features_.atom_values(run)

@@ -67,7 +67,7 @@ def make_model(
         One of `MODEL_NAMES`, or a scikit-learn regressor by its dotted name.
     features
         Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
-        dotted names.
+        dotted names; for ``joint`` of those that the bias depends on besides its own.
     seed
         Seed of whatever is random.
     parameters
@@ -105,6 +105,10 @@ def make_model(
         from fogml.models.mixed_effects_model import MixedEffectsModel
 
         return MixedEffectsModel(None if features is None else _understood(features))
+    if name == "joint":
+        from fogml.models.joint import JointModel
+
+        return JointModel(features=None if features is None else _understood(features))
     if features is not None:
         raise InputError(
             f"model '{name}' has its own columns, so features can't be stated for it; "
@@ -112,10 +116,10 @@ def make_model(
         )
     if name in PRESETS:
         return _linear(name, PRESETS[name].features, {"ridge": 0.0})
-    if name in ("joint", "joint-patent"):
+    if name == "joint-patent":
         from fogml.models.joint import JointModel
 
-        return JointModel(patent=name == "joint-patent")
+        return JointModel(patent=True)
     from fogml.models.baselines import MeanModel, NoCompensation
 
     return MeanModel() if name == "mean" else NoCompensation()

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from fogml.models.folds import Fold, run_folds, time_folds
-from fogml.models.intervals import Intervals, intervals_from_residuals
+from fogml.models.intervals import Intervals, half_widths_of_runs, intervals_from_residuals
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.runs.run import FloatArray
 
@@ -15,6 +15,7 @@ AVERAGING_S = 100.0
 """Averaging time of the residuals [s] where the training runs are long enough."""
 _LEAST_AVERAGES = 60
 _RUNS_TO_LEAVE_OUT = 3
+WHOLE_RUNS = "whole runs"
 
 
 def interval_table(rows: Sequence[RunRows]) -> TrainingTable:
@@ -31,7 +32,7 @@ def interval_table(rows: Sequence[RunRows]) -> TrainingTable:
 def interval_folds(table: TrainingTable, guard_s: float = 0.0) -> tuple[list[Fold], str]:
     """Whole runs where there are three or more, else blocks of time; and the name of which."""
     if len(np.unique(table.run_index)) >= _RUNS_TO_LEAVE_OUT:
-        return run_folds(table), "whole runs"
+        return run_folds(table), WHOLE_RUNS
     return time_folds(table, guard_s=guard_s), "time blocks"
 
 
@@ -57,4 +58,7 @@ def out_of_fold_intervals(
     if not folds:
         folds, name = time_folds(table), "time blocks"
     residuals = [table.y[held] - predicted(table.take(fitted), table.take(held)) for fitted, held in folds]
+    if name == WHOLE_RUNS:
+        half = half_widths_of_runs([np.abs(left) for left in residuals])
+        return Intervals(table.averaging_s, tuple(half.tolist()), len(table), name)
     return intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)

@@ -22,10 +22,9 @@ from statistics import NormalDist
 
 import numpy as np
 from scipy.optimize import minimize
-from scipy.stats import t as student
 
 from fogml.models.combination import LEAST_WEIGHT, LeftOut
-from fogml.models.intervals import LEVELS, Intervals
+from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, quantiles_of_parts
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 
@@ -100,14 +99,10 @@ def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
 def intervals_of(
     parts: Sequence[LeftOut], weights: FloatArray, table: TrainingTable, both_ways: bool
 ) -> Intervals:
-    r"""Half-widths from what is left on runs left out; of one run on its parts, widened.
+    """Half-widths from what is left on runs left out; of one run on its parts, widened.
 
-    What is left on a run is mostly shifted as a whole, so K runs are K observations. At a level
-    :math:`p \le K/(K+1)` the half-width is conformal: the quantile of what is left where each run holds the
-    share 1/(K + 1) and the rest lies at infinity (hierarchical conformal prediction: Lee, Barber & Willett,
-    "Distribution-free inference with hierarchical data", 2023). Above it is Student's quantile with K degrees
-    of freedom times the rms of the runs. Of one run it is the widest of the kinds of its parts times
-    `UNSEEN_SHIFT`.
+    Of several runs they are those of `half_widths_of_runs`. Of one it is the widest of the kinds of its parts
+    times `UNSEEN_SHIFT`.
 
     There errors are taken relative to how the half-width grows outside the box, as a half or a direction left
     out lies outside of the rest; runs left out count as they are.
@@ -125,9 +120,12 @@ def intervals_of(
     kinds = list(dict.fromkeys(part.kind for part in parts))
     if "runs" in kinds:
         runs = [part for part in parts if part.kind == "runs"]
-        kinds, half = ["runs"], _of_runs([np.abs(part.told - part.predicted @ weights) for part in runs])
+        kinds, half = (
+            ["runs"],
+            half_widths_of_runs([np.abs(part.told - part.predicted @ weights) for part in runs]),
+        )
     else:
-        widest = [_quantiles(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
+        widest = [quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
         half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)
     if not both_ways or not parts:
         drift = float(table.y.std())
@@ -145,22 +143,3 @@ def _lefts(parts: Sequence[LeftOut], weights: FloatArray, kind: str) -> list[Flo
         for part in parts
         if part.kind == kind
     ]
-
-
-def _of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
-    """Half-widths at `LEVELS` from what is left on each of K runs [deg/h]."""
-    count, levels = len(lefts), np.array(LEVELS)
-    rms = float(np.sqrt(np.mean([np.mean(left**2) for left in lefts])))
-    conformal = _quantiles(lefts, np.minimum(levels * (count + 1) / count, 1.0))
-    normal = rms * student.ppf(0.5 + levels / 2.0, count)
-    half = np.where(levels <= count / (count + 1), conformal, normal)
-    return np.asarray(np.maximum.accumulate(half))
-
-
-def _quantiles(lefts: Sequence[FloatArray], levels: FloatArray) -> FloatArray:
-    """Quantiles of what is left on parts [deg/h], each part counting alike."""
-    sizes = np.concatenate(lefts)
-    shares = np.concatenate([np.full(len(left), 1.0 / (len(left) * len(lefts))) for left in lefts])
-    order = np.argsort(sizes)
-    places = np.searchsorted(np.cumsum(shares[order]), levels - 1e-9)
-    return np.asarray(sizes[order][np.minimum(places, len(sizes) - 1)])

@@ -11,6 +11,7 @@ from scipy.signal import lfilter
 from fogml.errors import InputError
 from fogml.models.joint import JointModel
 from fogml.models.linear import LinearRegressor
+from fogml.models.names import make_model
 from fogml.models.saved import load_model, save_model
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import Run
@@ -175,3 +176,21 @@ def test_saved_with_other_columns_is_refused(tmp_path):
     (tmp_path / "model" / "model.json").write_text(text.replace('"product": false', '"product": true'))
     with pytest.raises(InputError, match=r"model\.json"):
         load_model(tmp_path / "model")
+
+
+def test_memory_of_the_bias_stands_beside_the_scale_factor(tmp_path):
+    run = staircase(noise=0.05)
+    node = lagged(run.columns["T_in"], 1800.0) - run.columns["T_in"]
+    run = run.with_columns(gyro=run.gyro + 0.05 * node)
+    plain, joint = JointModel().fit(run), make_model("joint", "lag(T, 1800 s)").fit(run)
+    assert joint.column_names == [*plain.column_names, "lag(T, 1800 s)"]
+    coefficients = dict(zip(joint.column_names, joint.regressor_.coef_, strict=True))
+    # In the compensated rate the bias has the other sign; a scale error of 1e-4 is far below the tolerance.
+    assert coefficients["lag(T, 1800 s)"] == pytest.approx(-0.05, rel=0.02)
+    left = [np.std((m.compensate(run).compensated - run.reference_deg_h)[5000:]) for m in (plain, joint)]
+    assert left[1] < 1.1 * 0.05 < 0.5 * left[0]
+    save_model(joint, tmp_path / "model")
+    again = load_model(tmp_path / "model")
+    np.testing.assert_array_equal(again.compensate(run).compensated, joint.compensate(run).compensated)
+    with pytest.raises(InputError, match="joint-patent"):
+        make_model("joint-patent", "lag(T, 1800 s)")
