@@ -1,10 +1,13 @@
 """Train on one or two legs of the shipped thermal cycle (MEMS), judge on another: all pairings and axes.
 
-Run ``python -m experiments.thermal_cycle``; it writes ``results.json`` and ``results.md`` beside itself.
+Run ``python -m experiments.thermal_cycle``; it writes ``results.json`` and ``results.md`` beside itself. With
+``--models auto "mixed effects"`` these alone are run again, and the others' figures are kept.
 """
 
 from __future__ import annotations
 
+import argparse
+import json
 import warnings
 from collections.abc import Sequence
 from functools import partial
@@ -46,7 +49,11 @@ PAIRS = [(("1", "2"), "3"), (("1", "3"), "2"), (("2", "3"), "1")]
 AXES = "xyz"
 
 
-def results() -> list[dict]:
+WINDOWED = "M2"
+"""A model with the longest window of all, so that the rows judged are the same whichever models are run."""
+
+
+def results(models: Sequence[str]) -> list[dict]:
     """One entry per axis, pairing and model: figures of 20-row averages [deg/h].
 
     All models of a pairing are judged on the same rows.
@@ -55,16 +62,24 @@ def results() -> list[dict]:
     for axis in AXES:
         runs = {leg: shipped_run(f"thermal-cycle-{leg}-{axis}") for leg in LEGS}
         for train, test in (*SINGLE, *PAIRS):
-            rows += pairing(axis, train, test, [runs[leg] for leg in train], runs[test])
+            rows += pairing(axis, train, test, [runs[leg] for leg in train], runs[test], models)
     return rows
 
 
-def pairing(axis: str, train: Sequence[str], test: str, train_runs: list[Run], test_run: Run) -> list[dict]:
+def pairing(
+    axis: str,
+    train: Sequence[str],
+    test: str,
+    train_runs: list[Run],
+    test_run: Run,
+    models: Sequence[str],
+) -> list[dict]:
     """One entry for each model on one pairing of legs."""
     averaging_s = ROWS_PER_AVERAGE * test_run.sample_s
     makers = {
         label: Recurrent if name == "recurrent" else partial(make_model, name, features)
         for label, (name, features) in MODELS.items()
+        if label in models or label == WINDOWED
     }
     with warnings.catch_warnings():
         # The process may run into the bounds of its search; that is its result here.
@@ -86,19 +101,20 @@ def pairing(axis: str, train: Sequence[str], test: str, train_runs: list[Run], t
 
 def table(rows: list[dict], figure: str, pairings: Sequence[tuple[tuple[str, ...], str]]) -> str:
     """One figure as a Markdown table: a line per axis and pairing, a column per model, means below."""
+    models = models_in(rows)
     lines = [
-        "| axis | train → test | " + " | ".join(MODELS) + " | floor |",
-        "|---|---|" + "---:|" * (len(MODELS) + 1),
+        "| axis | train → test | " + " | ".join(models) + " | floor |",
+        "|---|---|" + "---:|" * (len(models) + 1),
     ]
-    columns: dict[str, list[float]] = {label: [] for label in MODELS}
+    columns: dict[str, list[float]] = {label: [] for label in models}
     for axis in AXES:
         for train, test in pairings:
             found = [r for r in rows if (r["axis"], r["train"], r["test"]) == (axis, "+".join(train), test)]
             values = {r["model"]: r[figure] for r in found}
-            for label in MODELS:
+            for label in models:
                 columns[label].append(values[label])
             least = min(values.values())
-            cells = [f"**{v:.1f}**" if v == least else f"{v:.1f}" for v in (values[m] for m in MODELS)]
+            cells = [f"**{v:.1f}**" if v == least else f"{v:.1f}" for v in (values[m] for m in models)]
             floor = np.median([r["floor"] for r in found])
             named = " + ".join(LEGS[leg] for leg in train)
             lines.append(f"| {axis} | {named} → {LEGS[test]} | {' | '.join(cells)} | {floor:.2f} |")
@@ -108,6 +124,11 @@ def table(rows: list[dict], figure: str, pairings: Sequence[tuple[tuple[str, ...
         cells = [f"**{v:.1f}**" if v == least else f"{v:.1f}" for v in told.values()]
         lines.append(f"| all | {what} of {len(columns['auto'])} | {' | '.join(cells)} | |")
     return "\n".join(lines)
+
+
+def models_in(rows: list[dict]) -> list[str]:
+    """The models that there are figures of, in order."""
+    return [label for label in MODELS if any(row["model"] == label for row in rows)]
 
 
 def _geometric_mean(values: Sequence[float]) -> float:
@@ -126,7 +147,7 @@ def summary(rows: list[dict]) -> str:
         for row in rows:
             if (row["train"], row["test"]) in names:
                 cases.setdefault((row["axis"], row["train"], row["test"]), {})[row["model"]] = row
-        for label in MODELS:
+        for label in models_in(rows):
             ratios = [case[label]["rms"] / case["mean"]["rms"] for case in cases.values()]
             best = [case[label]["rms"] / min(r["rms"] for r in case.values()) for case in cases.values()]
             worse = sum(c[label]["rms"] > c["mean"]["rms"] + c[label]["floor"] for c in cases.values())
@@ -185,7 +206,14 @@ memory can be told from temperature; `down` and `last down` together are one way
 
 def main() -> None:
     """Compute and write the results."""
-    rows = results()
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--models", nargs="+", choices=MODELS, default=list(MODELS))
+    chosen = parser.parse_args().models
+    rows = results(chosen)
+    again = {row["model"] for row in rows}
+    if missing := set(MODELS) - again:
+        before = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
+        rows += [row for row in before if row["model"] in missing]
     write_results(HERE, rows, page(rows))
 
 
