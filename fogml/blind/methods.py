@@ -17,6 +17,8 @@ Method = Callable[..., Any]
 _PACKAGE = "fogml.blind"
 FAMILIES = "families"
 """The diagnosis on families."""
+ABSTAIN = "abstain"
+"""The baseline that names nothing."""
 METHODS = {
     DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
     FAMILIES: f"{_PACKAGE}.methods:families",
@@ -26,7 +28,7 @@ METHODS = {
     "stlsq": f"{_PACKAGE}.baselines.sparse:stlsq",
     "random-forest": f"{_PACKAGE}.baselines.forest:random_forest",
     "gp-discrepancy": f"{_PACKAGE}.baselines.process:gp_discrepancy",
-    "abstain": f"{_PACKAGE}.baselines.abstain:abstain",
+    ABSTAIN: f"{_PACKAGE}.baselines.abstain:abstain",
 }
 """Name of each method to ``module:function``; all of them run sealed."""
 ORACLE = "oracle"

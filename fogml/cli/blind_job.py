@@ -118,6 +118,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     """Score a suite, write ``score.json``, its page and its marks; whether every gate is met."""
     from fogml.blind.score import gate, gather
     from fogml.blind.scoring.values import score_values
+    from fogml.report.blind_words import headline
 
     folder = settings.folder()
     methods = settings.methods or list(folder.methods())
@@ -128,7 +129,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
             folder, methods, ledger, lambda case: work.advance(doing=f"scored {case}"), settings.workers
         )
     values = score_values(marks, ledger)
-    judged = DIAGNOSIS if DIAGNOSIS in methods else methods[0]
+    judged = headline(methods)
     values["gates"] = gate(values, settings.gates, judged)
     if judged == DIAGNOSIS:
         draw_reports(folder, values["methods"][judged]["worst"], settings.seed, terminal)
@@ -143,6 +144,7 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     """Score the parts of a suite as one, write ``score.json``, its page and its marks."""
     from fogml.blind.scoring.merging import merged
     from fogml.blind.scoring.values import score_values
+    from fogml.report.blind_words import headline
 
     if not settings.out:
         raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
@@ -151,7 +153,7 @@ def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     out = Path(settings.out)
     link_reports(values, [Path(path).parent for path in settings.marks], out)
     _write(out, values, marks, settings.in_full().yaml("blind merge", "score.yaml"))
-    _tell(out, values, next(iter(marks.methods)), terminal)
+    _tell(out, values, headline(marks.methods), terminal)
 
 
 def _write(out: Path, values: Mapping[str, Any], marks: Marks, config: str) -> None:

@@ -6,13 +6,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fogml.report.blind_realities import by_form_table, by_reality_table, reality_words
-from fogml.report.blind_words import figure_text, kind_words, value_text, wanted_text
+from fogml.report.blind_words import figure_text, headline, kind_words, value_text, wanted_text
 from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, listed, number, percent, plural, stated
 
-_DIAGNOSIS = "diagnosis"
 _ORACLE = "oracle"
 _STRATA_DRAWN = ("one_exact", "two_exact", "unknown_wrong_name", "mixed_known_kept", "mixed_false_name")
 
@@ -26,7 +25,7 @@ def blind_page(values: Mapping[str, Any]) -> str:
         Schema ``fogml.blind_score/1``.
     """
     methods = values["methods"]
-    name = _DIAGNOSIS if _DIAGNOSIS in methods else next(iter(methods))
+    name = headline(methods)
     judged, rows = methods[name], methods[name]["rows"]
     by_key = {row["key"]: row for row in rows}
     areas = {m: {r["key"]: r["value"] for r in v["rows"]}["auroc"] for m, v in methods.items()}

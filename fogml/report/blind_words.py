@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
+from fogml.blind.folders import DIAGNOSIS
+from fogml.blind.methods import ABSTAIN, BASELINES
 from fogml.report.words import MISSING, number, percent, stated
 
 _KINDS = {
@@ -17,6 +19,13 @@ _KINDS = {
     "unknown_and_known": "unknown + known",
     "wrong_thermal": "wrong thermal structure",
 }
+
+
+def headline(methods: Iterable[str]) -> str:
+    """The method that a score is about: the diagnosis, else no baseline, else one that names something."""
+    there = list(methods)
+    asked = [DIAGNOSIS, *(m for m in there if m not in BASELINES), *(m for m in there if m != ABSTAIN)]
+    return next((method for method in asked if method in there), there[0])
 
 
 def kind_words(kind: str) -> str:

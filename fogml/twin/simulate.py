@@ -183,7 +183,7 @@ def write_world(
             truth_writer = stack.enter_context(BlockWriter(truth_path))
         # Writing takes as long as the rest: a block is written beside the next one's work.
         beside = stack.enter_context(ThreadPoolExecutor(max_workers=1))
-        pending = None
+        pending, left = None, len(world.timeline)
         for recorded, true in _blocks(world):
             if pending is not None:
                 pending.result()
@@ -191,7 +191,8 @@ def write_world(
                 pending = beside.submit(_write, writer, truth_writer, recorded, true, world.gyro_unit)
                 rows += len(recorded["time"])
             if progress is not None:
-                progress(min(BLOCK_ROWS, len(world.timeline)))
+                progress(min(BLOCK_ROWS, left))
+                left -= min(BLOCK_ROWS, left)
         if pending is not None:
             pending.result()
         if not rows:

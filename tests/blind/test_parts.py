@@ -18,6 +18,7 @@ from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import Kind, Truth
 from fogml.errors import InputError
 from fogml.report import blind_page
+from fogml.report.blind_words import headline
 from tests.blind.test_marks import answer, truth
 
 WHOLE = ("schema", "version", "seed", "cases", "mix", "kinds", "strata", "fit_runs", "turning", "methods")
@@ -205,3 +206,17 @@ def test_several_states_of_the_code_are_told() -> None:
     values = score_values(mixed)
     assert values["methods"]["diagnosis"]["code"] == [None, "1", "2"]
     assert "several states of the code: diagnosis (3)" in blind_page(values)
+
+
+@pytest.mark.parametrize(
+    ("methods", "first"),
+    [
+        (("abstain", "bic", "diagnosis", "oracle"), "diagnosis"),
+        (("abstain", "bic", "families"), "families"),
+        (("abstain", "my.module:answer"), "my.module:answer"),
+        (("abstain", "bic"), "bic"),
+        (("abstain",), "abstain"),
+    ],
+)
+def test_a_score_is_about_the_method_that_was_asked_for(methods: tuple[str, ...], first: str) -> None:
+    assert headline(methods) == headline(methods[::-1]) == first
