@@ -140,6 +140,12 @@ def coefficients_of(model: Mapping[str, Any]) -> list[tuple[str, float, float | 
     ]
 
 
+_OF_THE_OUTPUT = (
+    "D is the output as recorded, in deg/h or counts. The terms add up to the compensated output, so the "
+    "drift has the sign opposite to theirs."
+)
+
+
 def coefficients_table(model: Mapping[str, Any]) -> Table | None:
     """Coefficients with their standard errors, where the model tells them."""
     told = coefficients_of(model)
@@ -152,6 +158,7 @@ def coefficients_table(model: Mapping[str, Any]) -> Table | None:
             ("Standard error", "", "figure"),
         ),
         rows=tuple(Row((name, number(value, 5), number(error, 2))) for name, value, error in told),
+        caption=_OF_THE_OUTPUT if any(name == "D" for name, *_ in told) else "",
     )
 
 

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from fogml.report import words
 from fogml.report.axes import log_axis, rounded_up, time_unit
 from fogml.report.static_svg import ticks
+from fogml.report.tables import coefficients_table
 
 
 @pytest.mark.parametrize(
@@ -95,3 +96,12 @@ def test_ticks_are_round_and_within() -> None:
     # One alone would tell no size.
     assert ticks(-0.00403, 0.00403, 4) == [-0.004, -0.002, 0.0, 0.002, 0.004]
     assert all(f"{tick:g}" != "-0" for tick in ticks(-0.37, 0.21))
+
+
+def test_a_table_of_terms_of_the_output_says_what_they_add_up_to() -> None:
+    told = {"D": {"value": 1.0, "se": 1e-6}, "T": {"value": -0.01, "se": 1e-4}}
+    of_output, of_drift = (
+        coefficients_table({"coefficients": {name: told[name] for name in names}}) for names in ("DT", "T")
+    )
+    assert of_output is not None and "sign opposite" in of_output.caption
+    assert of_drift is not None and not of_drift.caption
