@@ -18,20 +18,22 @@ from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
+from scipy.special import expit
 
 from experiments.gap_blind.by_reality import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
-from fogml.blind.folders import DIAGNOSIS, BlindFolder
+from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
 from fogml.blind.methods import FAMILIES
 from fogml.blind.realities import SAME_TWIN
 from fogml.blind.scoring.by_reality import ALL, by_reality
 from fogml.blind.scoring.marks import Mark
-from fogml.gap.families.priors import Priors
 from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
 METHODS = (DIAGNOSIS, FAMILIES)
+LAPSES = 0.04
+"""Share of names that are right or false whatever the odds are."""
 
 
 def main() -> None:
@@ -48,7 +50,7 @@ def main() -> None:
     both = {m: [x for x in marks if _case(x) in shared] for m, marks in alone.items()}
     seeds = {x.truth.seed for marks in alone.values() for x in marks}
     if given.calibrate:
-        trust, doubt, count = fitted_map(alone[FAMILIES], Priors())
+        trust, doubt, count = fitted_map(names_of(suites))
         print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {sorted(seeds)}")
         return
     values: dict[str, Any] = {"seeds": sorted(seeds)}
@@ -61,24 +63,39 @@ def main() -> None:
     write_results(HERE, values, page(values))
 
 
-def fitted_map(marks: Sequence[Mark], priors: Priors) -> tuple[float, float, int]:
+def names_of(suites: Sequence[BlindFolder]) -> list[tuple[float, float, bool]]:
+    """Of each cause that is listed its log odds against something unknown and among known ones; if right."""
+    found = []
+    for suite in suites:
+        for mark in answered_marks(suite, FAMILIES):
+            path = suite.answers(FAMILIES) / mark.truth.case / "gap.json"
+            told = read_json(path) if path.is_file() else {"which": [], "suspected": []}
+            odds = {w["effect"]: w["log_odds"] for w in (*told["which"], *told["suspected"])}
+            for item in (*mark.items, *mark.suspected):
+                if given := odds[item.effect]:
+                    found.append((given["against_unknown"], given["among_known"], item.right))
+    return found
+
+
+def fitted_map(names: Sequence[tuple[float, float, bool]]) -> tuple[float, float, int]:
     """Trust and doubt by penalised likelihood of what was listed, and how many names that were.
 
-    The penalty holds the trust near 1 and the doubt near 0, a standard deviation of 1 and of 3, where names
-    are few.
+    Of `LAPSES` of the names nothing can be told by odds: no straight line bears one name that is false for
+    certain. The penalty holds the trust near 1 and the doubt near 0, a standard deviation of 1 and of 3,
+    where names are few.
     """
-    items = [item for m in marks for item in (*m.items, *m.suspected)]
-    right = np.array([item.right for item in items], dtype=np.float64)
-    chances = np.clip([item.probability for item in items], 1e-12, 1.0 - 1e-12)
-    odds = (np.log(chances / (1.0 - chances)) + priors.doubt) / priors.trust
+    told = np.array([(known, among) for known, among, _ in names])
+    right = np.array([r for *_, r in names], dtype=bool)
 
     def loss(given: np.ndarray) -> float:
         trust, doubt = np.exp(given[0]), given[1]
-        told = trust * odds - doubt
-        return float(np.sum(np.logaddexp(0.0, told) - right * told) + 0.5 * (given[0] ** 2 + doubt**2 / 9.0))
+        chances = expit(trust * told[:, 0] - doubt) * expit(trust * told[:, 1])
+        chances = 0.5 * LAPSES + (1.0 - LAPSES) * chances
+        lost = -np.log(np.where(right, chances, 1.0 - chances)).sum()
+        return float(lost + 0.5 * (given[0] ** 2 + doubt**2 / 9.0))
 
     found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
-    return float(np.exp(found[0])), float(found[1]), len(items)
+    return float(np.exp(found[0])), float(found[1]), len(right)
 
 
 def _drawn(marks: Sequence[Mark]) -> list[Mark]:

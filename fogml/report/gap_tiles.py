@@ -6,6 +6,7 @@ from fogml.gap.result import Diagnosis
 from fogml.report.gap_words import (
     cause_words,
     closed_words,
+    does_not_close,
     hardest,
     interval_words,
     probability_words,
@@ -24,7 +25,8 @@ _WORSE = 1.05
 def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
     """Verdict, cause, confidence, what is unknown, and what is closed."""
     kind = {"explained": "met", "no_gap": "met", "unknown": "missed", "partly_explained": "words missed"}
-    tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), kind.get(found.verdict, ""))]
+    told = "missed" if does_not_close(found) else kind.get(found.verdict, "")
+    tiles = [Tile("Verdict", verdict_words(found), "", _verdict_note(found), told)]
     tiles += [_cause_tile(found, names), _confidence_tile(found, names)]
     unknown = probability_words(found.unknown.probability)
     if found.verdict != "unknown":
@@ -34,6 +36,8 @@ def headline_tiles(found: Diagnosis, names: dict[str, str]) -> list[Tile]:
 
 
 def _verdict_note(found: Diagnosis) -> str:
+    if does_not_close(found):
+        return "and the gap does not close"
     return {
         "no_gap": "within the noise",
         "explained": "each effect alone in its class",
@@ -84,7 +88,7 @@ def _closed_tile(found: Diagnosis) -> Tile:
     if len(found.how_far) > 1:
         on = f"the least of {len(found.how_far)} held-out runs: {item.run}"
     if item.closed is None:
-        return Tile("Closed", MISSING, "", f"nothing to close: at the floor on {on}")
+        return Tile("Closed", MISSING, "", f"can't be told: at the floor within its noise on {on}")
     if not found.named:
         return Tile("Closed", "0 %", "", f"nothing was added; {on}")
     interval = f"90 %: {interval_words(*item.closed_ci90)}; " if item.closed_ci90 else ""
@@ -103,6 +107,12 @@ def warnings(found: Diagnosis, names: dict[str, str]) -> list[str]:
     elif not found.how_far:
         told.append("No run could be held out: every figure here is of data that the twin was fitted to.")
     for item in found.how_far:
+        if item.recalibrated > _WORSE * item.before:
+            told.append(
+                f"Constants as fitted make the replay of {item.run} worse than those that were given: "
+                f"{number(item.recalibrated)} deg/h after {number(item.before)}. Its runs may be of another "
+                "state of the unit."
+            )
         if found.named and item.after > _WORSE * item.recalibrated:
             told.append(
                 f"What was found makes the replay of {item.run} worse: {number(item.after)} deg/h where the "

@@ -92,11 +92,20 @@ def cause_words(found: Found, names: dict[str, str]) -> str:
     return " or ".join(told[: _LIKELY_MEMBERS - 1]) + f" or one of {len(told) - _LIKELY_MEMBERS + 1} more"
 
 
+def does_not_close(found: Diagnosis) -> str:
+    """The held-out run on which what was named closes nothing; empty where it closes some, or none tells."""
+    told = [item for item in found.how_far if item.closed is not None]
+    worst = min(told, key=lambda item: item.closed or 0.0, default=None)
+    return worst.run if worst is not None and found.named and (worst.closed or 0.0) <= 0.0 else ""
+
+
 def headline(found: Diagnosis) -> str:
     """The page's heading: verdict and cause in one line."""
     names = titles(found)
     named = [title_of(f.effect, names) for f in found.named]
     causes = " + ".join(named)
+    if run := does_not_close(found):
+        return f"Named, and the gap does not close on {run}: {causes}"
     match found.verdict:
         case "no_gap" if found.suspected:
             causes = " + ".join(cause_words(f, names) for f in found.suspected)

@@ -205,6 +205,13 @@ def test_doubts_are_warned_of() -> None:
     assert "Mind:" not in tiles(page("explained"))
 
 
+def test_a_name_that_closes_nothing_is_no_explanation() -> None:
+    worse = HowFar("c.csv", 100.0, 0.01, 0.02, 0.0205, 0.0075, -0.09, (-0.2, 0.02))
+    page = gap_page(diagnosis(how_far=(worse,)))
+    assert "Named, and the gap does not close on c.csv" in page and "<h1>Explained" not in page
+    assert "Constants as fitted make the replay of c.csv worse" in page
+
+
 def test_of_several_held_out_runs_the_worst_is_told() -> None:
     (far,) = diagnosis().how_far
     both = (far, replace(far, run="d.csv", closed=0.61, closed_ci90=(0.5, 0.7)))

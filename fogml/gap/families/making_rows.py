@@ -128,7 +128,8 @@ def _usable(run: Run) -> tuple[NDArray[np.bool_], dict[str, int]]:
     masked["outliers"] = len(outliers)
     usable[outliers] = False
     if not np.any(run.rate):
-        for extreme in (gyro.max(), gyro.min()):
+        held = gyro[usable]
+        for extreme in (held.max(), held.min()) if len(held) else ():
             at = np.concatenate([[0], (gyro == extreme).astype(np.int8), [0]])
             edges = np.flatnonzero(np.diff(at))
             for first, last in zip(edges[::2], edges[1::2]):

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
 
 POSSIBLE = 0.05
 """A candidate is possible from this probability on."""
+STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor"}
+"""Stages that causes without a card act on."""
 UNKNOWN_STAGE = "bias"
 """Stage that an unknown cause is booked on where its family says nothing of it."""
 
@@ -77,8 +79,8 @@ def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[s
         stage: str = UNKNOWN_STAGE
         if family.kind == "known":
             stage = effect(family.id).stage
-        elif family.kind == "plant" or family.id == "table":
-            stage = "thermal" if family.kind == "plant" else "rig"
+        else:
+            stage = STAGES.get(family.id, UNKNOWN_STAGE)
         total[stage] = total.get(stage, 0.0) + energy
     return total
 

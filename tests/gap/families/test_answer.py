@@ -1,5 +1,7 @@
 """Whole answers: nothing where nothing is missing, a twin's wrong size, dropped rows."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -23,6 +25,10 @@ def _run(twin, seed, sample_s=60.0, hot=50):
         "ramp to 25 degC at 0.5 degC/min",
         "soak at 25 degC for 1 h",
     ]
+    return _simulated(twin, steps, seed, sample_s)
+
+
+def _simulated(twin, steps, seed, sample_s=60.0):
     values = {"schema": "fogml.programme/1", "name": f"p{seed}", "steps": steps}
     programme = programme_from(values | {"start_temperature": "25 degC", "power": "on"}, "test")
     return simulate(programme, twin, sample_s=sample_s, seed=seed).run
@@ -39,8 +45,12 @@ def runs(tactical):
 
 
 def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
-    found = diagnose(TwinModel(tactical), runs[:2], runs[2:], plan=False)
+    quieter = replace(tactical, noise=replace(tactical.noise, N=0.5 * tactical.noise.N))
+    static = _simulated(quieter, ["soak at 25 degC for 6 h"], 9)
+    # White noise that differs from the static run's is no evidence of anything.
+    found = diagnose(TwinModel(tactical), runs[:2], runs[2:], noise=static, plan=False)
     assert found.verdict == "no_gap"
+    assert found.noise.coefficients["N"] == pytest.approx(tactical.noise.N, rel=0.1)
     assert not found.named
     errors = [abs(c.value - getattr(tactical.nominal, c.name)) / c.se for c in found.constants]
     assert max(errors) < 3.0
