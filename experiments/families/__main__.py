@@ -124,8 +124,8 @@ def page(values: Mapping[str, Any]) -> str:
         "",
         f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no final "
         "figures, and families were widened with failures among these cases in view. Each figure with its "
-        "95 % interval (Wilson's for shares) and what it rests on. Times are of the clock, on a machine that "
-        "many others used.",
+        "95 % interval (Wilson's for shares) and what it rests on. Times are of the clock where answers "
+        "were sealed, on a machine that many others used, and of the processor elsewhere.",
         "",
     ]
     if values["shared"]:

@@ -18,11 +18,12 @@ from fogml.gap.families.reports import (
     assumed,
     candidate_evidence,
     constants_of,
+    headline,
+    looks_like,
     noise_of,
     series_of,
     stage_energies,
 )
-from fogml.gap.families.words import headline, looks_like
 from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (

@@ -21,11 +21,10 @@ from fogml.gap.families.linear_gaussian import Posterior, log_evidence
 from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
 from fogml.gap.families.other_families import LINES
-from fogml.gap.families.places import Scene
+from fogml.gap.families.places import Scene, outstanding_lines
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search
-from fogml.gap.families.spectral_lines import outstanding_lines
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -10,12 +11,13 @@ from itertools import product
 import numpy as np
 
 from fogml.gap.families.frame import Columns, Field, Setting
-from fogml.gap.families.linear_gaussian import size_gains
-from fogml.gap.families.static_run import StaticRun
+from fogml.gap.families.linear_gaussian import LinearGaussian, size_gains
 from fogml.gap.families.unknown import unknown_families
+from fogml.gap.noise import UNIT_FACTOR
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
+from fogml.signals.whitening import Whitener
 
 SMOOTH = ("time_7200", "time_2400", "temperature_25", "past")
 """Unknowns beside which noise is judged before anything else is known."""
@@ -147,3 +149,50 @@ def _as_fit(
     covariance += np.diag(step**2 / 12.0)
     model = NoiseModel(*(float(x) for x in np.exp(mean)))
     return NoiseFit(model, covariance, prior, log_posterior, len(noises))
+
+
+MOST_ROWS = 1000
+FREE_DEG_H = 1e3
+"""Prior standard deviation of the run's own constant and of what goes with its temperature [deg/h]."""
+
+
+@dataclass(frozen=True, eq=False)
+class StaticRun:
+    """A static run as rows: when each ends [s], their values [deg/h] and what is free, shape (m, k)."""
+
+    end_s: FloatArray
+    values: FloatArray
+    free: FloatArray
+    row_s: float
+
+    @classmethod
+    def of(cls, run: Run) -> StaticRun:
+        """Means over even rows; those with few samples are left out."""
+        run = run.without_dropouts
+        values = run.gyro_deg_h
+        usable = np.isfinite(values) & np.isfinite(run.time)
+        time, values = run.time[usable], values[usable]
+        step = float(np.median(np.diff(time)))
+        width = max(1, -(-len(time) // MOST_ROWS))
+        row = np.floor((time - time[0] + 0.5 * step) / (width * step)).astype(np.intp)
+        counts = np.bincount(row)
+        full = counts >= max(0.5 * width, 1)
+        means = np.bincount(row, weights=values) / np.maximum(counts, 1)
+        free = [np.ones(len(counts))]
+        if run.temperature_columns:
+            warmth = run.temperature()[usable]
+            if np.isfinite(warmth).all() and np.ptp(warmth) > 0.05:
+                free.append(np.bincount(row, weights=warmth - warmth.mean()) / np.maximum(counts, 1))
+        ends = time[0] + (np.arange(len(counts)) + 1.0) * width * step
+        return cls(ends[full], means[full], FREE_DEG_H * np.column_stack(free)[full], width * step)
+
+    def log_likelihood(self, noise: NoiseModel) -> float:
+        """Of noise that is a factor of `UNIT_FACTOR` more or less from run to run."""
+        values = []
+        for off, weight in ((-1.0, 0.25), (0.0, 0.5), (1.0, 0.25)):
+            scale = UNIT_FACTOR**off
+            held = NoiseModel(noise.N, noise.B * scale, noise.K * scale)
+            whitener = Whitener(held, self.end_s, self.row_s)
+            model = LinearGaussian.of(whitener.whiten(self.values)).beside(whitener.whiten(self.free))
+            values.append(model.log_evidence - whitener.log_det + math.log(weight))
+        return float(np.logaddexp.reduce(values))

@@ -99,7 +99,7 @@ def judge(found: Inference) -> Judgement:
     weights = _weights(explanations)
     causes = []
     for f, members in alike.items():
-        held = float(sum(w for e, w in zip(explanations, weights) if set(members) & set(e.key)))
+        held = min(float(sum(w for e, w in zip(explanations, weights) if set(members) & set(e.key))), 1.0)
         near = [e for e in instead[f] if e.score > instead[f][0].score - priors.exchange]
         carried = carries(found, best) - max(carries(found, e) for e in near)
         own = sorted((m for m in best.members if m.family == f), key=lambda m: -m.size)
@@ -119,13 +119,15 @@ def judge(found: Inference) -> Judgement:
     causes.sort(key=lambda c: -c.probability)
 
     def weight(counts: Callable[[Explanation], bool]) -> float:
-        return float(sum(w for e, w in zip(explanations, weights) if counts(e)))
+        return min(float(sum(w for e, w in zip(explanations, weights) if counts(e))), 1.0)
 
     known_share = 1.0 - weight(lambda e: any(families[f].kind == "unknown" for f in e.key))
     for cause in causes:
         known_share *= 1.0 - cause.doubted
     nothing = weight(lambda e: all(families[f].kind == "plant" for f in e.key))
-    return Judgement(best, tuple(causes), nothing, 1.0 - known_share, explanations, weights)
+    # Sums of weights end beside 0 and 1 by rounding.
+    unknown = float(np.clip(1.0 - known_share, 0.0, 1.0))
+    return Judgement(best, tuple(causes), nothing, unknown, explanations, weights)
 
 
 def _weights(explanations: Sequence[Explanation]) -> FloatArray:

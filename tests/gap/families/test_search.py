@@ -50,6 +50,8 @@ def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
     priors = found.setting.priors
     (cause,) = judge(found).causes
     assert cause.evidence <= cause.known
+    judged = judge(found)
+    assert all(0.0 <= p <= 1.0 for p in (judged.unknown, judged.nothing, cause.evidence))
     known = 1.0 / (1.0 + np.exp(-priors.trusted(cause.odds)))
     among = 1.0 / (1.0 + np.exp(-priors.trust * cause.within))
     assert cause.probability == pytest.approx(known * among)
