@@ -76,8 +76,8 @@ class StaticCurve:
         low, high = middles[first] or (np.nan, np.nan)
         if not low < high:
             raise InputError(
-                f"export: the model tells no range of {first}; a table is over a temperature's trained range. "
-                f"Train with {first} itself among the features, or export it --to c"
+                f"export: the model tells no range of {first}, over which a table would be. Train with "
+                f"{first} itself among the features, or export it --to c"
             )
         temperature = np.linspace(low, high, count)
         held = {}
