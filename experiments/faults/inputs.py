@@ -700,9 +700,9 @@ def model(rng: Random, world: World) -> Case:
 
 KINDS = (
     Kind("CSV run", 460, csv_run),
-    Kind("Parquet run", 80, parquet_run),
-    Kind("HDF5 run", 2, hdf5_run),
-    Kind("MATLAB run", 2, mat_run),
+    Kind("Parquet run", 20, parquet_run),
+    Kind("HDF5 run", 4, hdf5_run),
+    Kind("MATLAB run", 4, mat_run),
     Kind("side file", 130, side_file),
     Kind("saved model", 120, model),
     Kind("settings of a command", 20, config),

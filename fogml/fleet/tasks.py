@@ -7,7 +7,9 @@ import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
+
+from pydantic import Field
 
 from fogml import __version__
 from fogml.errors import FogmlError, InputError
@@ -28,15 +30,20 @@ It has to be importable by name: other processes and machines call it.
 """
 
 
+Positive = Annotated[float, Field(gt=0.0)]
+Rms = Annotated[float, Field(ge=0.0, le=1e12)]
+"""Rms of a gyro [deg/h]; the bound is far above any rate that turns, and leaves an axis room for its ends."""
+
+
 class Worst(Strict, extra="ignore"):
     """The run that was judged worst of a unit: its name, averaging time [s] and rms [deg/h]."""
 
-    run: str = ""
-    averaging_s: float | None = None
-    before: float | None = None
-    after: float | None = None
-    floor: float | None = None
-    outside_training: float | None = None
+    run: str
+    averaging_s: Positive
+    before: Rms
+    after: Rms
+    floor: Rms | None = None
+    outside_training: Annotated[float, Field(ge=0.0, le=1.0)] | None = None
 
 
 class Found(Strict, extra="ignore"):

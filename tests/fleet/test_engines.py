@@ -20,6 +20,14 @@ from fogml.fleet.tasks import OUTCOME
 from tests.fleet.units import deadly_while_writing, noted, one_bad, one_deadly, quick, slow, tasks
 
 ROOT = Path(__file__).parents[2]
+WORST = {
+    "run": "b.csv",
+    "averaging_s": 100.0,
+    "before": 2.0,
+    "after": 1.0,
+    "floor": 0.5,
+    "outside_training": 0.0,
+}
 
 
 def test_units_that_are_done_are_not_done_again(tmp_path):
@@ -38,7 +46,10 @@ def test_units_that_are_done_are_not_done_again(tmp_path):
     [
         ("found", 0.03),
         ("found", {"worst": [1.0]}),
-        ("found", {"worst": {"after": "small"}}),
+        ("found", {"worst": WORST | {"after": "small"}}),
+        ("found", {"worst": WORST | {"before": None}}),
+        ("found", {"worst": WORST | {"after": 1e308}}),
+        ("found", {"worst": WORST | {"floor": -1.0}}),
         ("found", {"met": "yes"}),
         ("found", {"notes": "none"}),
         ("found", {"constants": 3}),

@@ -69,7 +69,7 @@ class NetworkRegressor(RegressorMixin, BaseEstimator):
     _linear_part = True
     _fitted: ClassVar[type[SavedFit]]
     _parameter_constraints: ClassVar[dict[str, Any]] = {
-        "seed": [Interval(Integral, 0, None, closed="left")],
+        "seed": [Interval(Integral, 0, (1 << 32) - 1, closed="both")],
         "threads": [None, Interval(Integral, 1, None, closed="left")],
     }
     threads: int | None
