@@ -101,7 +101,7 @@ class RBFRegressor(NetworkRegressor):
     _parameter_constraints: ClassVar[dict[str, Any]] = {
         "centres": [
             StrOptions({"evidence"}),
-            Interval(Integral, 0, (1 << 32) - 1, closed="both"),
+            Interval(Integral, 0, None, closed="left"),
             WholeNumbers(0, few=1),
         ],
         "centre_choice": [StrOptions({"kmeans", "ols"})],
