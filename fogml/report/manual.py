@@ -38,7 +38,7 @@ def manual_folder() -> Path:
         installed = []
     for path in installed:
         if path.is_file():
-            return path.parent
+            return path.resolve().parent
     raise InputError(
         "the pages of the documentation are not beside this installation; they are the folder docs of the "
         "source, and what `pip install .` there brings along"

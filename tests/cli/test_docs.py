@@ -86,7 +86,7 @@ def test_installed_pages_are_found(monkeypatch: pytest.MonkeyPatch, tmp_path: Pa
     (tmp_path / "share" / "index.md").write_text("# Pages\n")
     monkeypatch.setattr(manual.fogml, "__file__", str(tmp_path / "fogml" / "__init__.py"))
     monkeypatch.setattr(manual, "files", lambda name: [Installed()])
-    assert manual.manual_folder() == tmp_path / "share"
+    assert manual.manual_folder() == (tmp_path / "share").resolve()
 
 
 def test_every_option_stands_on_its_page(invoke) -> None:
