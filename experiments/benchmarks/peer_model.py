@@ -99,7 +99,7 @@ class PeerModel(DriftModel):
         self.learner_, self.setting_ = tuned(self.peer, table, self.budget, self.seed)
         self.features_ = features
         self.rows_ = len(table)
-        self.card_ = training_card(group, hashes=hash_ahead(group), rows=len(table), box=features.box)
+        self.card_ = training_card(group, hashes=hash_ahead(group), rows=len(table), features=features)
         # The tables show errors, not intervals; none are worked out.
         self.intervals_ = Intervals(0.0, (0.0,) * len(LEVELS), 0, "none")
         return self

@@ -29,6 +29,7 @@ from experiments.joint_scale_bias.world import (
     without_facts,
 )
 from experiments.results import write_results
+from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.lab.joint import run_figures, two_step
 from fogml.models.joint import JointModel
@@ -204,6 +205,7 @@ def rate_quality(settings: Mapping[str, Any]) -> dict[str, Any]:
 def results(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Every figure of the page."""
     return {
+        "version": __version__,
         "known": known(settings),
         "compared": compared(settings),
         "sensitivity": sensitivities(settings),

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fogml import __version__
 from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
 
@@ -138,7 +137,7 @@ Data: **synthetic**, `fogml.twin`, 1 Hz, latitude {settings["latitude"]:g}°, in
 compensated output less table rate and Earth rate at rest, averages of {settings["averaging"]:.0f} s; the
 noise realised in those averages (the floor) is {own_floor:.3f} deg/h on the patent's staircase and
 {second_floor:.3f} deg/h on the second. The scale factor error is the largest of single turns. Config:
-`config.yaml`; fogml {__version__}; `python -m experiments.joint_scale_bias`.
+`config.yaml`; fogml {values["version"]}; `python -m experiments.joint_scale_bias`.
 
 **Verdict. One run for both: reproduced, with two conditions.** The model needs an intercept, and Earth rate
 in the reference. The six columns as printed are **contradicted**: without either they leave

@@ -18,6 +18,7 @@ from experiments.multipoint_model.page import drawings, page
 from experiments.multipoint_model.start_up import AVERAGING_S, curve, start_up
 from experiments.multipoint_table.__main__ import RUNS, SAMPLE_S, SENSORS, programme, unit
 from experiments.results import write_results
+from fogml import __version__
 from fogml.features.parse import parse_features
 from fogml.lab.forms import multipoint_form, rank_forms, sensor_sets, smallest_within
 from fogml.models.names import make_model
@@ -224,6 +225,7 @@ def results(settings: Mapping[str, Any]) -> dict[str, Any]:
     recorded = Recorded(unit())
     time_h, series = curve(settings)
     return {
+        "version": __version__,
         "forms": forms(recorded, settings),
         "quiet": forms(Recorded(quiet_unit(settings)), settings),
         "unlimited": without_limits(recorded),

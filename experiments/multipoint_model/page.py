@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from experiments.multipoint_table.__main__ import RUNS
-from fogml import __version__
 from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
 
@@ -150,7 +149,7 @@ Data: **synthetic**, `fogml.twin`, the unit and the runs of `experiments/multipo
 25 → −40 → 60 °C at 1 °C/min, judged on a repeat, at half and twice the rate, and hot before cold. Standard
 deviations of 10 s samples, where the noise realised (the floor) is {floor["floor_10s"]:.4f} deg/h, and of
 100 s averages, floor {floor["floor_100s"]:.4f}; own error is against the noise-free truth. A quiet unit has
-no loop, no ripple, and a floor of {low:.4f} deg/h at 10 s. Config: `config.yaml`; fogml {__version__};
+no loop, no ripple, and a floor of {low:.4f} deg/h at 10 s. Config: `config.yaml`; fogml {values["version"]};
 `python -m experiments.multipoint_model`.
 
 **Verdict. In sample: {_IN_SAMPLE[two_orders]}.** Four points lower the 10 s stability by

@@ -17,6 +17,7 @@ from experiments.rbf_product.loop import loops
 from experiments.rbf_product.page import drawings, page
 from experiments.rbf_product.world import Made, deviation, made, signal_to_noise, unit
 from experiments.results import write_results
+from fogml import __version__
 from fogml.models.names import make_model
 from fogml.yaml_text import read_yaml
 
@@ -127,6 +128,7 @@ def results(settings: Mapping[str, Any]) -> dict[str, Any]:
     """Every figure of the page."""
     sensors = (settings["unit"], settings["coarse"])
     return {
+        "version": __version__,
         "signal_to_noise": [
             [
                 told["sensor_resolution"],

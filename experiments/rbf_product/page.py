@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fogml import __version__
 from fogml.report import style
 from fogml.report.static_svg import Curve, line_figure
 
@@ -133,7 +132,7 @@ Data: **synthetic**, `fogml.twin`, 1 Hz: static bias with a ripple of {told["rip
 {told["sensor_noise"]:g} °C of noise. Rms is of {averaging:.0f} s averages of output less estimate on a
 **fresh** run, bias included, where the noise realised (the floor) is {floor:.4f} deg/h; own error is the rms
 against the noise-free truth. Medians of {len(settings["seeds"])} repeats. Config: `config.yaml`; fogml
-{__version__}; `python -m experiments.rbf_product`.
+{values["version"]}; `python -m experiments.rbf_product`.
 
 **Verdict. As stated: contradicted.** With the first difference, T×ΔT brings the patent's network nothing
 (trained up and down: {pair(PATENT, first, "both", "10 both")} deg/h): what it multiplies is mostly sensor

@@ -56,7 +56,7 @@ def test_unknown_name_gets_a_hint():
         make_model("polynomal")
 
 
-@pytest.mark.parametrize("name", ["none", "mean", "M1", "multipoint-5-3", "joint", "joint-patent"])
+@pytest.mark.parametrize("name", ["none", "mean", "M1", "multipoint-5-3", "joint-patent"])
 def test_features_are_refused_where_the_model_has_its_own(name):
     with pytest.raises(InputError, match="its own columns"):
         make_model(name, features="T, dT")
