@@ -22,16 +22,9 @@ def _gates(value: Any) -> Any:
         return value
     from fogml.blind.score import wanted_gates
 
-    gates: dict[str, float] = wanted_gates() if WANTED in value else {}
-    for text in value:
-        if text == WANTED:
-            continue
-        name, _, number = str(text).partition("=")
-        try:
-            gates[name.strip()] = float(number)
-        except ValueError:
-            raise ValueError(f"'{text}' is no gate; write FIGURE=VALUE, or '{WANTED}'") from None
-    return gates
+    given = [text for text in value if text != WANTED]
+    stated = options.numbers_by_name(given, f"gate; write FIGURE=VALUE, or '{WANTED}'")
+    return (wanted_gates() if WANTED in value else {}) | stated
 
 
 Methods = Annotated[list[str], option("Score these alone; may be repeated.", "--method", metavar="NAME")]

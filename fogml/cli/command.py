@@ -12,13 +12,12 @@ import click
 from click.shell_completion import CompletionItem
 from pydantic.fields import FieldInfo
 
-from fogml.cli.given import Given, load
+from fogml.cli.given import HELP_NAMES, Given, load
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.json_files import json_text
 
-HELP_NAMES = {"help_option_names": ["-h", "--help"]}
 _KINDS: tuple[tuple[type, click.ParamType, str], ...] = (
     (int, click.INT, "N"),
     (float, click.FLOAT, "NUMBER"),
@@ -133,15 +132,10 @@ def _params(settings: type[Settings], key: str, given: Given) -> list[click.Para
     types = _types(field.annotation)
     if bool in types:
         names = _names(key, given)
-        stand = {name: name.split("=") for name in names if "=" in name}
-        ways = [
-            click.Option([key, *(name for name in names if name not in stand)], is_flag=True, default=None)
-        ]
-        ways[0].help = _told(given.help, field, names[0])
-        for option, own in stand.values():
-            text = given.help.partition("\n")[2]
-            ways.append(click.Option([key + _OWN + own, option], is_flag=True, help=text))
-        return [*ways]
+        text = _told(given.help, field, names[0].partition("/")[0])
+        switch = click.Option([key, *names], is_flag=True, default=None, help=text)
+        others = given.values.items()
+        return [switch, *(click.Option([key + _OWN + v, o], is_flag=True, help=h) for o, (v, h) in others)]
     choices = get_args(field.annotation) if Literal in types else ()
     kind, metavar = next(
         ((kind, metavar) for type_, kind, metavar in _KINDS if type_ in types),
@@ -172,10 +166,10 @@ def _names(key: str, given: Given) -> tuple[str, ...]:
 
 
 def _told(text: str, field: FieldInfo, switch: str = "") -> str:
-    """The help, with the default where one is stated."""
-    text, value = text.partition("\n")[0], field.default
+    """The help, with the default where one is stated; of a switch that is on, its option."""
+    value = field.default
     if value is True:
-        shown = switch.partition("/")[0].lstrip("-")
+        shown = switch.lstrip("-")
     elif value is False or not isinstance(value, (str, int, float, list)):
         shown = ""
     else:

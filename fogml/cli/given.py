@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
+
+HELP_NAMES = {"help_option_names": ["-h", "--help"]}
+"""Settings of every command's and group's context."""
 
 
 @dataclass(frozen=True)
@@ -19,8 +22,9 @@ class Given:
     metavar
         What is shown in place of its value; of its type by default.
     names
-        Options; ``--`` and the setting's name by default. A switch names both ways, ``--on/--off``; an option
-        that gives a value of its own stands as ``--option=value``.
+        Options; ``--`` and the setting's name by default. A switch names both ways, ``--on/--off``.
+    values
+        Further options, each of which stands for a value: that value and its help, by option.
     argument
         Given by its place rather than by an option.
     spread
@@ -36,6 +40,7 @@ class Given:
     help: str
     metavar: str | None = None
     names: tuple[str, ...] = ()
+    values: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     argument: bool = False
     spread: bool = False
     as_text: bool = False

@@ -11,14 +11,6 @@ from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
 
 
-def _state_angles(value: Any) -> Any:
-    return options.number_list(value, "0,180,270,90") if isinstance(value, str) else value
-
-
-def _order(value: Any) -> Any:
-    return options.number_list(value, "0,90,180,270") if isinstance(value, str) else value
-
-
 def _transients(value: Any) -> Any:
     """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
     if not isinstance(value, list):
@@ -55,7 +47,7 @@ class MisalignmentSettings(Settings):
     ] = None
     state_angles: Annotated[
         list[float] | None,
-        BeforeValidator(_state_angles),
+        options.numbers("0,180,270,90"),
         option(
             "Turn of the gyro in its mounting plane in states 1 to 4, clockwise as seen from +z "
             "(0,180,270,90), where FILE has no column state_angle [deg].",
@@ -136,7 +128,7 @@ class NorthSettings(Settings):
     sense: Annotated[str, option("Way the positions are taken.", metavar="cw|ccw")] = "cw"
     order: Annotated[
         list[float],
-        BeforeValidator(_order),
+        options.numbers("0,90,180,270"),
         option("Angles of the positions.", metavar="DEG,...", as_text=True),
     ] = [0.0, 90.0, 180.0, 270.0]
     way: Annotated[str, option("plain, drift-observing, palindrome, coarse-fine.", metavar="NAME")] = "plain"

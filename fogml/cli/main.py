@@ -14,7 +14,7 @@ from typing import Any
 import click
 
 from fogml import __version__
-from fogml.cli.given import load
+from fogml.cli.given import HELP_NAMES, load
 from fogml.errors import FogmlError, printable
 from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
@@ -94,9 +94,7 @@ class Group(click.Group):
     """
 
     def __init__(self, commands: Mapping[str, tuple[str, str]], **more: Any) -> None:
-        super().__init__(
-            **more, no_args_is_help=True, context_settings={"help_option_names": ["-h", "--help"]}
-        )
+        super().__init__(**more, no_args_is_help=True, context_settings=HELP_NAMES)
         self.known = commands
 
     def list_commands(self, ctx: Any) -> list[str]:

@@ -29,6 +29,26 @@ def named_values(texts: list[Any]) -> dict[str, Any]:
     return values
 
 
+def numbers_by_name(texts: list[Any], expected: str) -> dict[str, float]:
+    """``["name=value", ...]`` as flags give them, each value a number.
+
+    Raises
+    ------
+    ValueError
+        If one is not of that form, with what was expected.
+    """
+    values = {}
+    for text in texts:
+        name, equals, number = str(text).partition("=")
+        try:
+            values[name.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise ValueError(f"{quoted(text)} is no {expected}")
+    return values
+
+
 def number_list(text: str, example: str) -> list[float]:
     """Numbers of a text with commas.
 
@@ -41,6 +61,11 @@ def number_list(text: str, example: str) -> list[float]:
         return [float(part) for part in text.split(",")]
     except ValueError:
         raise ValueError(f"{quoted(text)} is no list of numbers; write e.g. {example}") from None
+
+
+def numbers(example: str) -> BeforeValidator:
+    """What takes a list of numbers as one text with commas, too."""
+    return BeforeValidator(lambda value: number_list(value, example) if isinstance(value, str) else value)
 
 
 def names_list(value: object) -> object:
@@ -59,10 +84,9 @@ Repairing = bool | Literal["anyway"]
 Repair = Annotated[
     Repairing,
     option(
-        "Mend clocks and drop up to 2 % of faulty rows; what was done is in every result.\n"
-        "Repair, however many rows that drops.",
+        "Mend clocks and drop up to 2 % of faulty rows; what was done is in every result.",
         "--repair/--no-repair",
-        "--repair-anyway=anyway",
+        values={"--repair-anyway": ("anyway", "Repair, however many rows that drops.")},
     ),
 ]
 EFFECTS = "fogml.twin.registry:effects"
@@ -128,15 +152,5 @@ class LimitSettings(Settings):
     @classmethod
     def _from_flags(cls, value: Any) -> Any:
         """``["name=value", ...]`` as flags give them, or a mapping as YAML does."""
-        if not isinstance(value, list):
-            return value
-        limits: dict[str, float] = {}
-        for text in value:
-            name, equals, number = str(text).partition("=")
-            try:
-                limits[name.strip()] = float(number)
-            except ValueError:
-                equals = ""
-            if not equals:
-                raise ValueError(f"{quoted(text)} is no limit; write NAME=VALUE, e.g. bias_stability=0.02")
-        return limits
+        expected = "limit; write NAME=VALUE, e.g. bias_stability=0.02"
+        return numbers_by_name(value, expected) if isinstance(value, list) else value

@@ -10,15 +10,16 @@ def options_page() -> str:
     """Markdown: for each command what it does, and its arguments and options in a table."""
     from fogml.cli.main import app
 
-    return "\n".join(part for name, command in _commands(app, "fogml") for part in _section(name, command))
+    return "\n".join(part for name, command in commands_of(app, "fogml") for part in _section(name, command))
 
 
-def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+def commands_of(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
+    """Each command of a group and of the groups in it, with all its words."""
     context = _context(group)
     for name in group.list_commands(context):
         command = group.get_command(context, name)
         if hasattr(command, "list_commands"):
-            yield from _commands(command, f"{prefix} {name}")
+            yield from commands_of(command, f"{prefix} {name}")
         else:
             yield f"{prefix} {name}", command
 

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.c_program import CProgram, cortex_m4_size, write_files
 from fogml.export.c_source import c_source, number_of
@@ -31,7 +30,14 @@ from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.export.project_files import RUST_FILE, project_files, rust_bindings
 from fogml.export.prune import pruned
-from fogml.export.settings import SCHEMA, ExportSettings, check_settings, hold_within, tolerance_of
+from fogml.export.settings import (
+    ExportSettings,
+    check_settings,
+    hold_within,
+    report_head,
+    report_tail,
+    tolerance_of,
+)
 from fogml.export.sklearn_graph import export_graph, is_graph_alone
 from fogml.export.storage import stored_plan, weight_bytes
 from fogml.models.base import DriftModel
@@ -93,23 +99,16 @@ def export_model(
     )
     hold_within(total, difference, tolerance, settings, dtype)
     (folder / DOCUMENTATION_FILE).write_text(documentation(model, plan), encoding="ascii")
+    size = weight_bytes(plan, dtype, settings.to == "c")
+    head = report_head(
+        settings, dtype, plan, difference, tolerance, weight_bytes=size, operations=plan.operations
+    )
     return {
-        "schema": SCHEMA,
-        "to": settings.to,
-        "dtype": dtype,
-        "bytes_weights": weight_bytes(plan, dtype, settings.to == "c"),
-        **difference.as_dict(),
-        "tolerance": tolerance,
-        "unit": "deg/h",
-        "operations_per_sample": plan.operations,
-        "model": {"kind": plan.kind, "features": list(plan.names), "centres": plan.centres},
-        "sensors": list(plan.sensors),
-        "sample_s": plan.sample_s,
+        **head,
         **({"pruning": pruning} if pruning else {}),
         "accuracy": accuracy_loss(whole, exported, rows, model.intervals_.averaging_s, settings.seed),
         **report,
-        "files": sorted(path.name for path in folder.iterdir()),
-        "fogml_version": __version__,
+        **report_tail(folder),
     }
 
 

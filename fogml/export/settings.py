@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from pathlib import Path
+from typing import Any, Literal, get_args
 
 import numpy as np
 
+from fogml import __version__
 from fogml.errors import InputError
 from fogml.export.c_source import C_DTYPES
 from fogml.export.check import Difference
+from fogml.export.plan import Plan
 from fogml.export.storage import FILE_DTYPES
 from fogml.models.base import DriftModel
 
@@ -103,3 +106,34 @@ def hold_within(
             f"export: in {dtype} the scale factor differs by up to {difference.scale_ppm:.3g} ppm, more than "
             f"{_MOST_SCALE_PPM:g} ppm; choose a finer --dtype, or state --tolerance. Nothing was written"
         )
+
+
+def report_head(
+    settings: ExportSettings,
+    dtype: str,
+    plan: Plan,
+    difference: Difference,
+    tolerance: float,
+    *,
+    weight_bytes: int,
+    operations: int | None,
+) -> dict[str, Any]:
+    """What ``export.json`` begins with, of whatever form."""
+    return {
+        "schema": SCHEMA,
+        "to": settings.to,
+        "dtype": dtype,
+        "bytes_weights": weight_bytes,
+        **difference.as_dict(),
+        "tolerance": tolerance,
+        "unit": "deg/h",
+        "operations_per_sample": operations,
+        "model": {"kind": plan.kind, "features": list(plan.names), "centres": plan.centres},
+        "sensors": list(plan.sensors),
+        "sample_s": plan.sample_s,
+    }
+
+
+def report_tail(folder: Path) -> dict[str, Any]:
+    """What ``export.json`` ends with: the files that are written so far, and the version."""
+    return {"files": sorted(path.name for path in folder.iterdir()), "fogml_version": __version__}

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml import __version__
 from fogml.errors import InputError, first_line
 from fogml.export.check import Difference, value_difference
 from fogml.export.onnx_graph import BEYOND, ONNX_FILE, OPSET, finished_model, session_of
 from fogml.export.plan import Plan
-from fogml.export.settings import SCHEMA, ExportSettings, hold_within, tolerance_of
+from fogml.export.settings import ExportSettings, hold_within, report_head, report_tail, tolerance_of
 from fogml.models.base import DriftModel
 from fogml.models.compact import Compact, affine, network_of
 from fogml.models.regressors import predict_rows
@@ -42,26 +41,15 @@ def export_graph(model: DriftModel, folder: Path, dtype: str, settings: ExportSe
     runs = ", ".join(run.name for run in model.card_.runs)
     told = f"{model.kind} of {features.text}, trained on {runs}"
     data = sklearn_onnx(model, dtype, told).SerializeToString()
-    difference = sklearn_difference(model, data, dtype, settings.seed)
+    # The features without the regressor, for their points.
+    zero = Compact(model.kind, affine(np.zeros(len(features)), 0.0))
+    plan = Plan.with_features(zero, features, model.card_.sample_s)
+    difference = sklearn_difference(model, plan, data, dtype, settings.seed)
     tolerance = tolerance_of(model, settings, dtype)
     hold_within(difference.inside, difference, tolerance, settings, dtype)
     (folder / ONNX_FILE).write_bytes(data)
-    return {
-        "schema": SCHEMA,
-        "to": settings.to,
-        "dtype": dtype,
-        "bytes_weights": len(data),
-        **difference.as_dict(),
-        "tolerance": tolerance,
-        "unit": "deg/h",
-        "operations_per_sample": None,
-        "model": {"kind": model.kind, "features": list(features.names()), "centres": 0},
-        "sensors": list(features.sensors),
-        "sample_s": model.card_.sample_s,
-        "beyond_the_box": BEYOND[False],
-        "files": sorted(path.name for path in folder.iterdir()),
-        "fogml_version": __version__,
-    }
+    head = report_head(settings, dtype, plan, difference, tolerance, weight_bytes=len(data), operations=None)
+    return {**head, "beyond_the_box": BEYOND[False], **report_tail(folder)}
 
 
 def is_graph_alone(model: DriftModel) -> bool:
@@ -69,14 +57,10 @@ def is_graph_alone(model: DriftModel) -> bool:
     return isinstance(model, SklearnModel) and network_of(model.regressor_) is None
 
 
-def sklearn_difference(model: SklearnModel, data: bytes, dtype: str, seed: int) -> Difference:
-    """Difference of a graph from its regressor, at points of the trained box and around it."""
+def sklearn_difference(model: SklearnModel, plan: Plan, data: bytes, dtype: str, seed: int) -> Difference:
+    """Difference of a graph from its regressor, at points of its features' trained box and around it."""
     session = session_of(data)
     real = np.float64 if dtype == "float64" else np.float32
-    features = model.features_
-    # The features without the regressor, for their points.
-    zero = Compact(model.kind, affine(np.zeros(len(features)), 0.0))
-    plan = Plan.with_features(zero, features, model.card_.sample_s)
 
     def off(columns: NDArray[np.float64], gyro: NDArray[np.float64]) -> NDArray[np.float64]:
         (drift,) = session.run(["drift"], {"features": columns.astype(real)})

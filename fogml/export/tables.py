@@ -10,20 +10,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml import __version__
 from fogml.errors import InputError, quoted
 from fogml.export import autopilot, segment_files
 from fogml.export.card import export_card
 from fogml.export.loss import averaged_loss, training_rows
 from fogml.export.plan import Plan
 from fogml.export.segments import Segments, segments
+from fogml.export.settings import SCHEMA, report_tail
 from fogml.export.static_curve import StaticCurve
 from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 from fogml.yaml_text import read_yaml
 
 FloatArray = NDArray[np.float64]
-SCHEMA = "fogml.export/1"
 AXES = ("x", "y", "z")
 TOLERANCE_SHARE = 0.05
 """Error of a table allowed unless stated, as a share of the model's 90 % half-width: 0.1 % more rms."""
@@ -125,8 +124,7 @@ def export_tables(
             }
             for axis, curve in curves.items()
         },
-        "files": sorted(path.name for path in folder.iterdir()),
-        "fogml_version": __version__,
+        **report_tail(folder),
     }
 
 

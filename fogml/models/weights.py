@@ -117,20 +117,17 @@ def intervals_of(
         Whether temperature moves both ways in training; else nothing can be verified of the way back, and
         the variance of the drift that the runs hold is added.
     """
-    kinds = list(dict.fromkeys(part.kind for part in parts))
-    if "runs" in kinds:
-        runs = [part for part in parts if part.kind == "runs"]
-        kinds, half = (
-            ["runs"],
-            half_widths_of_runs([np.abs(part.told - part.predicted @ weights) for part in runs]),
-        )
+    runs = [part for part in parts if part.kind == "runs"]
+    kinds = ["runs"] if runs else list(dict.fromkeys(part.kind for part in parts))
+    if runs:
+        half = half_widths_of_runs([np.abs(part.told - part.predicted @ weights) for part in runs])
     else:
         widest = [quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
         half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)
     if not both_ways or not parts:
         drift = float(table.y.std())
         back = np.array([drift * NormalDist().inv_cdf(0.5 + level / 2.0) for level in LEVELS])
-        half = np.hypot(half, back if "runs" in kinds else UNSEEN_SHIFT * back)
+        half = np.hypot(half, back if runs else UNSEEN_SHIFT * back)
     told = f"{' and '.join(kinds)} left out" if kinds else "none"
     averaging_s, half_widths = float(table.averaging_s), tuple(half.tolist())
     return Intervals(averaging_s, half_widths, len(table), told, LEVELS, WIDENING_PER_SPAN)

@@ -15,6 +15,7 @@ from click.testing import CliRunner
 
 import fogml
 from fogml.cli import command, main
+from fogml.cli.options_page import commands_of
 from fogml.cli.settings import given_settings
 from fogml.errors import InputError
 from fogml.processes import Terminated
@@ -29,13 +30,7 @@ def use_command(monkeypatch, action):
 
 def every_command():
     """Words and command of each, those of groups too."""
-    context = click.Context(main.app)
-    for name in main.COMMANDS:
-        found = main.app.get_command(context, name)
-        if isinstance(found, main.Group):
-            yield from (([name, part], found.get_command(context, part)) for part in found.known)
-        else:
-            yield [name], found
+    return [(name.split()[1:], found) for name, found in commands_of(main.app, "fogml")]
 
 
 def run_program(*arguments: str, **options):
@@ -64,7 +59,7 @@ def test_the_line_in_the_list_is_the_command_s_own(name):
     assert found.help.splitlines()[0] == main.COMMANDS[name][1]
 
 
-@pytest.mark.parametrize(("words", "found"), list(every_command()))
+@pytest.mark.parametrize(("words", "found"), every_command())
 def test_every_command_has_help_and_the_common_options(words, found):
     result = runner.invoke(main.app, [*words, "--help"])
     assert result.exit_code == 0
@@ -74,7 +69,7 @@ def test_every_command_has_help_and_the_common_options(words, found):
         assert option in result.stdout
 
 
-@pytest.mark.parametrize(("words", "found"), list(every_command()))
+@pytest.mark.parametrize(("words", "found"), every_command())
 def test_every_option_is_a_setting_with_help_and_in_the_schema(words, found):
     schema = json.loads(runner.invoke(main.app, [*words, "--schema"]).stdout)
     for key, given in given_settings(found.settings).items():

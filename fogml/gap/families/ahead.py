@@ -10,7 +10,7 @@ from scipy.special import expit
 
 from fogml.gap.families.card import card_of
 from fogml.gap.families.inference import Inference
-from fogml.gap.families.posterior import Judgement
+from fogml.gap.families.posterior import Judgement, at_cost
 from fogml.gap.how_far_result import Rehearsed
 from fogml.gap.model import EffectValue
 from fogml.gap.result import NAMED, Found, SeparatingRun
@@ -133,7 +133,7 @@ def _judged(found: Inference, family: int, form: str, size: str, data: FloatArra
     )
     acts = expit(priors.trusted(float(np.logaddexp(own, others)) - unknown))
     probability = float(acts * expit(priors.trust * (own - others)))
-    probability = probability / (probability + cost * (1.0 - probability))
+    probability = at_cost(probability, cost)
     named = probability >= NAMED
     outcome = "missed" if not named else "named" if family in alike else "mistaken"
     members = tuple(families[f].id for f in alike) if named else ()

@@ -12,7 +12,7 @@ from fogml.gap.families.ahead import next_run, rehearse
 from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause, shares
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.inference import Inference, Progress, infer
-from fogml.gap.families.posterior import Cause, Judgement, judge
+from fogml.gap.families.posterior import Cause, Judgement, at_cost, judge
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.reports import (
     assumed,
@@ -28,6 +28,7 @@ from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (
     FAMILIES,
+    NAMED,
     Diagnosis,
     Unknown,
     Verdict,
@@ -115,9 +116,8 @@ def _answer(
     found: Inference, judged: Judgement, noise: Run | None, part: bool, seed: int, cost: float
 ) -> Diagnosis:
     scene = found.setting.scene
-    # Named from odds of the cost on, said as a half or more.
-    shifted = [_shifted(c.probability, cost) for c in judged.causes]
-    named = [c for c, p in zip(judged.causes, shifted) if p >= 0.5]
+    shifted = [at_cost(c.probability, cost) for c in judged.causes]
+    named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
     verdict = _verdict(named, judged)
     recalibrated = Foretold.of(found, (), ())
     every = Foretold.of(found, judged.best.members, judged.best.members)
@@ -184,11 +184,6 @@ def _constants_alone(every: Foretold, run: int) -> FloatArray:
     """What the fixed block makes of a run [deg/h], shape (m,)."""
     count = every.found.field.fixed.shape[1]
     return np.asarray(every.design(run)[:, :count] @ every.posterior.mean[:count])
-
-
-def _shifted(probability: float, cost: float) -> float:
-    odds = probability / max(1.0 - probability, 1e-12) / cost
-    return odds / (1.0 + odds)
 
 
 def _verdict(named: Sequence[Cause], judged: Judgement) -> Verdict:

@@ -196,3 +196,8 @@ def _chance(log_odds: float) -> float:
 def _log_odds(probability: float) -> float:
     clipped = min(max(probability, 1e-12), 1.0 - 1e-12)
     return math.log(clipped / (1.0 - clipped))
+
+
+def at_cost(probability: float, cost_of_false_name: float) -> float:
+    """A probability said so that a half stands for odds of the cost of a false name over a missed one's."""
+    return probability / (probability + cost_of_false_name * (1.0 - probability))
