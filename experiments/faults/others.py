@@ -68,6 +68,7 @@ def database_restarted(home: Path, files: Mapping[str, bytes], times: int, rng: 
             told[f"exit {status}"] += bool(number)
             if status == 2:
                 status = Started(folder, command).ends(LONGEST_S)
+                told[f"exit {status} of the same command again"] += 1
             found = _named(results(folder, job), folder)
             if not number:
                 wanted, seconds = found, time.monotonic() - started.began
