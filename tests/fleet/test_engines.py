@@ -83,7 +83,10 @@ def test_a_unit_that_ends_its_process_is_found(tmp_path):
     outcomes = run_tasks(tasks(tmp_path, 4, one_deadly), workers=2)
     assert [outcome["status"] for outcome in outcomes] == ["done", "done", "failed", "done"]
     assert "killed" in outcomes[2]["reason"]
-    assert Counter(noted(tmp_path / "out")) == Counter(f"done FOG-00{n}" for n in (0, 1, 3))
+    # What ran beside it may have been ended before its outcome was written: then it was done again.
+    times = Counter(noted(tmp_path / "out"))
+    assert set(times) == {f"done FOG-00{n}" for n in (0, 1, 3)}
+    assert max(times.values()) <= 3
 
 
 def test_what_an_ended_worker_had_half_written_is_removed(tmp_path):
