@@ -8,7 +8,7 @@ from fogml.cli.demo import DemoSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.settings import SHIPPED
 from fogml.cli.terminal import Terminal, number
-from fogml.cli.train_job import TrainSettings, fit_and_judge, write_results
+from fogml.cli.train_job import TrainSettings, fit_and_judge, say_advice, write_results
 from fogml.outputs import whole_folder
 from fogml.validation.judge import judge
 from fogml.validation.report_json import judgement_json
@@ -87,6 +87,8 @@ def _print(judgements: dict[str, Judgement], settings: DemoSettings, terminal: T
         ["axis", "rms before", "after", "bias stability before", "after", "noise floor", "features chosen"],
         rows,
     )
+    for axis, judgement in judgements.items():
+        say_advice(judgement, terminal, f"Axis {axis}: ")
     for axis, judgement in judgements.items():
         for note in judgement.test[0].notes:
             terminal.say(f"{axis}: {note}")

@@ -248,6 +248,19 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         terminal.say(f"{name}: {number(outcome.value)}, limit {outcome.limit:g}: {verdict}")
     for note in judgement.notes:
         terminal.say(note)
+    say_advice(judgement, terminal)
+
+
+def say_advice(judgement: Judgement, terminal: Terminal, lead: str = "") -> None:
+    """The verdict, its reasons and what to do next."""
+    from fogml.report.verdict import advice_words
+    from fogml.validation.advice import advice_on
+
+    told = advice_words(advice_on(judgement))
+    terminal.say(f"{lead}{told['sign']} {told['words']}")
+    for reason in told["reasons"]:
+        terminal.say(f"  - {reason}")
+    terminal.say(f"  Next: {told['next_step']}")
 
 
 def _say_stability(run: RunJudgement, terminal: Terminal) -> None:

@@ -12,23 +12,29 @@ TURNS = 0.2
 """Share of the span that temperature has to move each way for its direction to tell anything."""
 
 
-def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
-    """Whether temperature rises and falls by a fifth of its span or more, in all runs together.
+def ways_moved(temperatures: Sequence[FloatArray]) -> frozenset[str]:
+    """Which ways, ``up`` and ``down``, temperature moves by a fifth of its span, in all runs together.
 
     Parameters
     ----------
     temperatures
         T [degC] of each run, shapes (n,).
     """
-    up = down = 0.0
+    moved = {"up": 0.0, "down": 0.0}
     low, high = np.inf, -np.inf
     for T in temperatures:
         low, high = min(low, float(T.min())), max(high, float(T.max()))
         # Averages over a hundredth of the run keep the sensor's noise from adding up as motion.
         parts = np.array([part.mean() for part in np.array_split(T, min(100, len(T)))])
         steps = np.diff(parts)
-        up, down = up + float(steps[steps > 0].sum()), down - float(steps[steps < 0].sum())
-    return min(up, down) > TURNS * (high - low)
+        moved["up"] += float(steps[steps > 0].sum())
+        moved["down"] -= float(steps[steps < 0].sum())
+    return frozenset(way for way, by in moved.items() if by > TURNS * (high - low))
+
+
+def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
+    """Whether temperature rises and falls by a fifth of its span or more, in all runs together."""
+    return len(ways_moved(temperatures)) == 2
 
 
 LEAST_SPAN_DEGC = 5.0

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from fogml.report.figures_index import Loop, loop_between, loops
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
-from fogml.report.verdict import worst_run
+from fogml.report.verdict import advice_words, worst_run
 from fogml.report.words import MISSING, averages, listed, number
+from fogml.validation.advice import advice_on
 from fogml.validation.results import Judgement
 
 
@@ -20,6 +22,7 @@ class AxisLink:
     axis: str
     href: str
     words: str
+    advice: dict[str, Any]
 
 
 def index_page(
@@ -57,7 +60,10 @@ def index_page(
         title=f"fogml – {title}",
         name=title,
         verdict=_verdict(judgements, found),
-        links=[AxisLink(axis, links[axis], _words(judgement)) for axis, judgement in judgements.items()],
+        links=[
+            AxisLink(axis, links[axis], _words(judgement), advice_words(advice_on(judgement)))
+            for axis, judgement in judgements.items()
+        ],
         table=_table(judgements, beside or {}, found),
         drawing=loops(judgements),
         notes=[*notes, *told],

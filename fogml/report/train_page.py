@@ -19,8 +19,18 @@ from fogml.report.tables import (
     repeatability_table,
     runs_table,
 )
-from fogml.report.verdict import improves, model_card, stated_limits, subject, unseen, verdict, worst_run
+from fogml.report.verdict import (
+    advice_words,
+    improves,
+    model_card,
+    stated_limits,
+    subject,
+    unseen,
+    verdict,
+    worst_run,
+)
 from fogml.report.words import averages, listed, number, percent, plural, stated, unit_of
+from fogml.validation.advice import advice_on
 from fogml.validation.results import Judgement, RunJudgement
 
 
@@ -63,6 +73,7 @@ def train_page(
         title=f"{name} – drift model judged",
         name=name,
         judgement=judgement,
+        advice=advice_words(advice_on(judgement)),
         verdict=verdict(judgement),
         limits=stated_limits(judgement),
         tiles=headline_tiles(judgement),

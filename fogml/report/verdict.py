@@ -7,12 +7,27 @@ from typing import Any
 
 from fogml.report.tables import reference_of
 from fogml.report.words import averages, label, listed, number, percent, plural, stated, unit_of
+from fogml.validation.advice import SEEN, Advice, Asked
 from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
-SEEN = "seen_in_training"
-"""Code of the finding that a test run holds the samples of a training run."""
-_NOTICED_SHARE = 0.01
+_GRADES = {
+    "use": ("met", "✓", "Use it"),
+    "use_with_care": ("care", "!", "Use with care"),
+    "do_not_use": ("missed", "✗", "Do not use"),
+}
+
+
+def advice_words(advice: Advice) -> dict[str, Any]:
+    """A verdict as it is shown: colour's class, sign, words, reasons, next step."""
+    kind, sign, words = _GRADES[advice.grade]
+    return {
+        "kind": kind,
+        "sign": sign,
+        "words": f"{words}: {advice.brief}",
+        "reasons": advice.reasons,
+        "next_step": advice.next_step,
+    }
 
 
 def subject(judgement: Judgement) -> str:
@@ -149,7 +164,7 @@ def _limits(outcomes: Sequence[LimitOutcome]) -> list[str]:
 
 
 def _outside(runs: Sequence[RunJudgement]) -> list[str]:
-    outside = [run for run in runs if run.outside_training >= _NOTICED_SHARE]
+    outside = [run for run in runs if run.outside_training >= Asked().outside]
     if not outside:
         return []
     shares = listed([f"{percent(run.outside_training)} of {run.run}" for run in outside])

@@ -7,6 +7,7 @@ from dataclasses import asdict
 from typing import TYPE_CHECKING, Any
 
 from fogml.json_files import finite_json
+from fogml.validation.advice import advice_on, coverage
 from fogml.validation.certified import set_up, with_uncertainty
 from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, Metrics, Repeatability, RunJudgement
@@ -53,6 +54,8 @@ def _body(judgement: Judgement) -> dict[str, Any]:
         values["repeatability"] = _repeatability(judgement.repeatability)
     values["limits"] = [_limit(outcome) for outcome in judgement.limits]
     values["met"] = judgement.met
+    advice = advice_on(judgement)
+    values |= {"verdict": advice.grade, "reasons": list(advice.reasons), "next_step": advice.next_step}
     values["notes"] = list(judgement.notes)
     return values
 
@@ -69,6 +72,7 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "floor_source": judged.floor_source,
         "left_is_noise": left_is_noise(judged),
         "outside_training": judged.outside_training,
+        "coverage": coverage(judged),
         "rows_used": judged.rows_used,
         "rows_left_out": judged.rows_left_out,
         "bias_reference": judged.bias_reference,

@@ -52,3 +52,13 @@ def test_an_axis_is_trained_again_from_its_configuration(demo, invoke_json, tmp_
     config = demo[0] / "y" / "train.config.yaml"
     again = invoke_json("train", "--config", config, "-o", tmp_path / "again")
     assert again == json.loads((demo[0] / "y" / "report.json").read_text())
+
+
+def test_axis_x_is_not_to_be_used(demo):
+    out, printed = demo
+    told = "Do not use: trained one way"
+    assert f"Axis x: ✗ {told}" in printed
+    assert told in (out / "x" / "report.html").read_text()
+    assert told in (out / "index.html").read_text()
+    report = json.loads((out / "x" / "report.json").read_text())
+    assert (report["verdict"], report["next_step"]) == ("do_not_use", "Train on a run up and a run down.")

@@ -1,0 +1,241 @@
+"""Whether a judged model may be used: use it, use it with care, or do not; why, and what to do next."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fogml.models.directions import LEAST_SPAN_DEGC, ways_moved
+from fogml.runs.run import FloatArray
+from fogml.validation.reach import LEVEL, floor_interval
+from fogml.validation.results import Judgement, RunJudgement
+
+Grade = Literal["use", "use_with_care", "do_not_use"]
+SEEN = "seen_in_training"
+"""Code of the finding that a test run holds the samples of a training run."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a judgement before its model is called fit for use.
+
+    Attributes
+    ----------
+    outside
+        Share of a test run at temperatures and rates that training did not hold, from which on care is
+        due: a hundredth, as less is a sample or two at the ends of a range.
+    mostly_outside
+        The same from which on the judgement is of another model than the one in use: over half.
+    coverage
+        Share of a test run's averages that the model's 90 % interval holds, below which the interval can't
+        be relied on. Averages that follow each other are alike, so that a run may hold 0.8 by chance.
+    """
+
+    outside: float = 0.01
+    mostly_outside: float = 0.5
+    coverage: float = 0.8
+
+
+@dataclass(frozen=True)
+class Reason:
+    """One thing that decides: how far, in a few words, in a sentence, and what to do about it."""
+
+    grade: Grade
+    brief: str
+    sentence: str
+    next_step: str
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The verdict on a model.
+
+    Attributes
+    ----------
+    grade
+        Of the gravest reason; ``use`` where there is none.
+    brief
+        That reason in a few words.
+    reasons
+        Sentences, the gravest first; where nothing speaks against use, what speaks for it.
+    next_step
+        What to do now.
+    """
+
+    grade: Grade
+    brief: str
+    reasons: tuple[str, ...]
+    next_step: str
+
+
+def advice_on(judgement: Judgement, asked: Asked | None = None) -> Advice:
+    """The verdict on a judged model, from what training and judging know.
+
+    Parameters
+    ----------
+    judgement
+        Of the model.
+    asked
+        What is asked of it; the defaults of `Asked` if None.
+    """
+    order: list[Grade] = ["do_not_use", "use_with_care"]
+    found = sorted(_reasons(judgement, asked or Asked()), key=lambda one: order.index(one.grade))
+    if not found:
+        worst = max(judgement.test, key=lambda run: run.after.rms)
+        told = (
+            f"On {worst.run}, which it has not seen, it leaves {worst.after.rms:.3g} of "
+            f"{worst.before.rms:.3g} deg/h rms; nothing that training or judging knows speaks against it."
+        )
+        return Advice(
+            "use",
+            "judged on a run it has not seen",
+            (told,),
+            "Export it, and judge it again on the next run of the unit.",
+        )
+    gravest = found[0]
+    return Advice(gravest.grade, gravest.brief, tuple(one.sentence for one in found), gravest.next_step)
+
+
+def coverage(run: RunJudgement) -> float | None:
+    """Share of a run's averages that lie within the model's 90 % interval; None where it states none."""
+    series = run.series
+    if not np.any(series.upper > 0.0):
+        return None
+    return float(np.mean((series.after >= series.lower) & (series.after <= series.upper)))
+
+
+def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
+    yield from _not_judged(judgement)
+    yield from _one_way(judgement)
+    for run in judgement.test:
+        yield from _of_run(run, asked)
+    yield from _limits(judgement)
+    yield from _one_temperature(judgement)
+    yield from _another_unit(judgement)
+
+
+def _not_judged(judgement: Judgement) -> Iterator[Reason]:
+    seen = [run.run for run in judgement.test if any(finding.code == SEEN for finding in run.findings)]
+    if seen:
+        yield Reason(
+            "do_not_use" if len(seen) == len(judgement.test) else "use_with_care",
+            "not judged on another run",
+            f"{', '.join(seen)} is a training run: its figures say how well the model fits, not how well it "
+            "holds.",
+            "Record another run, and name it after --test.",
+        )
+
+
+def _one_way(judgement: Judgement) -> Iterator[Reason]:
+    trained = _ways(judgement.train)
+    if len(trained) != 1:
+        return
+    (way,) = trained
+    back = "down" if way == "up" else "up"
+    gone_back = back in _ways(judgement.test)
+    yield Reason(
+        "do_not_use" if gone_back else "use_with_care",
+        "trained one way",
+        f"Trained on temperature going {way} only: what follows temperature, its rate and time can't be told "
+        f"apart, and what holds going {back} "
+        + ("is not in the model, though the test run goes there." if gone_back else "was not tested either."),
+        "Train on a run up and a run down.",
+    )
+
+
+def _of_run(run: RunJudgement, asked: Asked) -> Iterator[Reason]:
+    before, after = run.before.rms, run.after.rms
+    upper = run.floor if run.floor_ci90 is None else run.floor_ci90[1]
+    noise = floor_interval(upper, len(run.series.time))[1]
+    gained = before - after
+    if gained < 0.0 and after > noise:
+        yield Reason(
+            "do_not_use",
+            f"worse than none on {run.run}",
+            f"It makes {run.run} worse: {after:.3g} deg/h rms after, {before:.3g} before.",
+            "Train on runs that are like the ones it is used on, or leave the output as it is.",
+        )
+    elif gained < run.floor:
+        already = before <= noise
+        yield Reason(
+            "use_with_care" if already else "do_not_use",
+            f"takes away less than the noise on {run.run}",
+            f"On {run.run} {before:.3g} deg/h rms become {after:.3g}: less is gained than the noise floor of "
+            f"{run.floor:.3g} deg/h{', and there is only noise to take away' if already else ''}.",
+            "Leave the output as it is." if already else "Compare other models (fogml compare).",
+        )
+    if run.outside_training > asked.outside:
+        mostly = run.outside_training > asked.mostly_outside
+        yield Reason(
+            "do_not_use" if mostly else "use_with_care",
+            f"{run.outside_training:.0%} of {run.run} is outside of what was trained",
+            f"{run.outside_training:.1%} of {run.run} lies at temperatures or rates that training did not "
+            "hold: there the model falls back.",
+            "Train over the whole range of use.",
+        )
+    held = coverage(run)
+    if held is not None and held < asked.coverage:
+        yield Reason(
+            "use_with_care",
+            f"its interval does not hold on {run.run}",
+            f"Its {LEVEL:.0%} interval holds {held:.0%} of the averages of {run.run}: that run is unlike the "
+            "training runs.",
+            "Train on more runs, this one among them, and judge on a new one.",
+        )
+
+
+def _limits(judgement: Judgement) -> Iterator[Reason]:
+    stated = [*judgement.limits, *([judgement.design_index] if judgement.design_index else [])]
+    for outcome in stated:
+        if not outcome.met:
+            name = outcome.quantity.replace("_", " ")
+            yield Reason(
+                "do_not_use",
+                f"{name} over its limit",
+                f"{name.capitalize()} is {outcome.value:.3g}, the limit {outcome.limit:g}.",
+                "See which regime the rest comes from, train on more runs, or compare other models.",
+            )
+
+
+def _one_temperature(judgement: Judgement) -> Iterator[Reason]:
+    held = _temperatures(judgement.train)
+    if held and _span(held) < LEAST_SPAN_DEGC:
+        yield Reason(
+            "use_with_care",
+            "trained at one temperature",
+            f"Temperature spans {_span(held):.2g} degC in training: what is compensated holds at "
+            f"{float(np.mean(held[0])):.3g} degC alone.",
+            "Train on a ramp up and a ramp down over the range of use.",
+        )
+
+
+def _another_unit(judgement: Judgement) -> Iterator[Reason]:
+    for what in ("unit", "axis"):
+        of_model = judgement.model.get(what)
+        others = {getattr(run, what) for run in judgement.test} - {of_model, None}
+        if of_model and others:
+            told = ", ".join(sorted(map(str, others)))
+            yield Reason(
+                "use_with_care",
+                f"trained on another {what}",
+                f"Trained on {what} {of_model}, judged on {what} {told}.",
+                f"Train on runs of {what} {told}.",
+            )
+
+
+def _ways(runs: Sequence[RunJudgement]) -> frozenset[str]:
+    """Which ways temperature moves in some runs; none where it hardly does."""
+    held = _temperatures(runs)
+    return ways_moved(held) if held and _span(held) >= LEAST_SPAN_DEGC else frozenset()
+
+
+def _span(temperatures: Sequence[FloatArray]) -> float:
+    return float(max(T.max() for T in temperatures) - min(T.min() for T in temperatures))
+
+
+def _temperatures(runs: Sequence[RunJudgement]) -> list[FloatArray]:
+    """T of the averages of runs that record one [degC]."""
+    return [run.series.temperature for run in runs if np.all(np.isfinite(run.series.temperature))]

@@ -1,0 +1,116 @@
+"""The verdict on a model: each thing that speaks against use is told and alone decides; the gravest leads."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.report.verdict import advice_words
+from fogml.runs.findings import Finding
+from fogml.validation.advice import Asked, advice_on, coverage
+from fogml.validation.report_json import judgement_json
+from fogml.validation.results import Judgement, RunJudgement
+from tests.report.judgements import judgement
+
+SEEN = Finding("seen_in_training", "holds the same samples as training run a.csv")
+
+
+def of_ways(run: RunJudgement, way: str) -> RunJudgement:
+    """A run whose temperature goes one way only."""
+    ends = (-20.0, 60.0) if way == "up" else (60.0, -20.0)
+    temperature = np.linspace(*ends, len(run.series.time))
+    return replace(run, series=replace(run.series, temperature=temperature))
+
+
+def one_way(way: str, test_way: str) -> Judgement:
+    base = judgement()
+    return replace(base, train=(of_ways(base.train[0], way),), test=(of_ways(base.test[0], test_way),))
+
+
+def narrow() -> Judgement:
+    base = judgement()
+    (run,) = base.train
+    flat = replace(run.series, temperature=25.0 + 0.01 * run.series.temperature)
+    return replace(base, train=(replace(run, series=flat),))
+
+
+def overconfident() -> Judgement:
+    base = judgement()
+    (run,) = base.test
+    series = run.series
+    return replace(
+        base, test=(replace(run, series=replace(series, lower=series.lower / 10, upper=series.upper / 10)),)
+    )
+
+
+def test_nothing_against_is_use() -> None:
+    found = advice_on(judgement())
+    assert (found.grade, found.brief) == ("use", "judged on a run it has not seen")
+
+
+@pytest.mark.parametrize(
+    ("make", "grade", "brief"),
+    [
+        (lambda: one_way("up", "down"), "do_not_use", "trained one way"),
+        (lambda: one_way("down", "up"), "do_not_use", "trained one way"),
+        (lambda: one_way("up", "up"), "use_with_care", "trained one way"),
+        (lambda: judgement(findings=(SEEN,)), "do_not_use", "not judged on another run"),
+        (lambda: judgement(left=3.0), "do_not_use", "worse than none on b.csv"),
+        (lambda: judgement(kind="mean", left=1.0), "do_not_use", "takes away less than the noise on b.csv"),
+        (lambda: judgement(outside=0.1), "use_with_care", "10% of b.csv is outside of what was trained"),
+        (lambda: judgement(outside=0.7), "do_not_use", "70% of b.csv is outside of what was trained"),
+        (lambda: judgement(limit=1e-3), "do_not_use", "rms over its limit"),
+        (overconfident, "use_with_care", "its interval does not hold on b.csv"),
+        (narrow, "use_with_care", "trained at one temperature"),
+    ],
+)
+def test_each_reason_alone_decides(make: Callable[[], Judgement], grade: str, brief: str) -> None:
+    judged = make()
+    if brief != "rms over its limit":
+        judged = replace(judged, design_index=None, limits=())
+    found = advice_on(judged)
+    assert (found.grade, found.brief) == (grade, brief)
+    assert found.next_step
+
+
+def test_another_unit_needs_care() -> None:
+    base = judgement(unit="FOG-0418")
+    assert advice_on(base).brief == "trained on another unit"
+
+
+def test_the_gravest_reason_leads_and_all_are_told() -> None:
+    found = advice_on(replace(judgement(outside=0.1, left=3.0), design_index=None, limits=()))
+    assert found.grade == "do_not_use" and len(found.reasons) >= 2
+    assert found.reasons[0].startswith("It makes b.csv worse")
+    assert any("did not hold" in reason for reason in found.reasons)
+
+
+def test_one_of_several_test_runs_seen_needs_care() -> None:
+    base = judgement(2)
+    judged = replace(base, test=(replace(base.test[0], findings=(SEEN,)), base.test[1]))
+    assert advice_on(judged).grade == "use_with_care"
+
+
+def test_what_is_asked_may_be_changed() -> None:
+    judged = replace(judgement(outside=0.1), design_index=None, limits=())
+    assert advice_on(judged, Asked(outside=0.2)).grade == "use"
+
+
+def test_coverage_counts_averages_within_the_interval() -> None:
+    (run,) = judgement().test
+    inside = np.abs(run.series.after) <= run.series.upper
+    assert coverage(run) == pytest.approx(inside.mean())
+    none = replace(run.series, lower=0.0 * run.series.lower, upper=0.0 * run.series.upper)
+    assert coverage(replace(run, series=none)) is None
+
+
+def test_report_and_words_say_the_same() -> None:
+    judged = one_way("up", "down")
+    values = judgement_json(judged)
+    told = advice_words(advice_on(judged))
+    assert values["verdict"] == "do_not_use" and list(told["reasons"]) == values["reasons"]
+    assert told["words"] == "Do not use: trained one way" and told["sign"] == "✗"
+    assert values["test"][0]["coverage"] == coverage(judged.test[0])
