@@ -17,9 +17,9 @@ from fogml.gap.result import NAMED, Found, SeparatingRun
 from fogml.gap.separating import separating_run
 from fogml.gap.shapes import corners
 from fogml.gap.showing import showing_run
+from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
-from fogml.twin.registry import effect
 
 MOST_MEMBERS = 4
 """Members of a class that a programme is looked for."""
@@ -40,9 +40,11 @@ def next_run(
     """The programme that tells the members of the most probable class of several apart.
 
     Where each named effect stands alone, the one that shows what these runs could not. None where there is
-    nothing to tell, or no programme does.
+    nothing to tell, no programme does, or the model can't simulate one.
     """
     setting = found.setting
+    if not isinstance(found.model, TwinModel):
+        return None
     twin, noise = found.model.twin, found.field.whitening.noise
     facts = setting.scene.runs[0].run.facts
     open_ = next((f for f in items if f.named and len(f.members) > 1), None)
@@ -93,7 +95,7 @@ def rehearse(
     sizes = {f.effect: abs(f.amplitude.value) for f in items if f.named}
     rows = []
     for f in found.search.families_of("known"):
-        declared = effect(found.columns.families[f].id)
+        declared = setting.scene.candidates[found.columns.families[f].id]
         if isinstance(declared, NoiseEffect) and not declared.steady:
             continue
         usual = declared.amplitude.typical(grade)  # type: ignore[arg-type]
@@ -110,8 +112,9 @@ def rehearse(
 def _response(found: Inference, id: str, shape: dict[str, float]) -> FloatArray:
     """Whitened response of an effect to a unit of its amplitude on the fit runs."""
     scene = found.setting.scene
-    bare = {name: value for name, value in shape.items() if name in {q.name for q in effect(id).shape}}
-    parts = [r.response(effect(id), bare, None, found.setting.values) for r in scene.runs[: scene.fitted]]
+    declared = scene.candidates[id]
+    bare = {name: value for name, value in shape.items() if name in {q.name for q in declared.shape}}
+    parts = [r.response(declared, bare, None, found.setting.values) for r in scene.runs[: scene.fitted]]
     return found.field.whitening.stacked(parts)
 
 

@@ -12,6 +12,7 @@ from fogml.gap.families.ahead import next_run, rehearse
 from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause, shares
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.inference import Inference, Progress, infer
+from fogml.gap.families.own_simulator import candidates_of
 from fogml.gap.families.posterior import Cause, Judgement, at_cost, judge
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.reports import (
@@ -25,6 +26,7 @@ from fogml.gap.families.reports import (
     stage_energies,
 )
 from fogml.gap.how_far_result import Nearest, WhatIf
+from fogml.gap.model import GyroModel
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import (
     FAMILIES,
@@ -37,7 +39,7 @@ from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import GapOnRun, where
 from fogml.runs.epochs import with_epoch
 from fogml.runs.run import FloatArray, Run
-from fogml.twin.registry import effect, effects
+from fogml.twin.twin import Twin
 
 SURELY_NOT_NOTHING = 0.02
 """Probability that nothing acts under which there is a gap, whatever makes it."""
@@ -47,7 +49,7 @@ NEAREST = 5
 
 
 def diagnose(
-    model: TwinModel,
+    model: Twin | GyroModel,
     fit: Sequence[Run],
     held_out: Sequence[Run] = (),
     *,
@@ -64,6 +66,8 @@ def diagnose(
 
     Parameters
     ----------
+    model
+        The twin, or any model of a gyro in its place.
     priors
         What is taken for granted.
     plan
@@ -81,10 +85,12 @@ def diagnose(
     """
     from threadpoolctl import threadpool_limits
 
+    from fogml.twin.registry import effects
+
     tell = progress or (lambda what: None)
-    without = tuple(without)
+    model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
     for id in without:
-        if id not in effects():
+        if id not in candidates_of(model) and id not in effects():
             raise InputError(f"--without {id}: there is no such effect; `fogml effects` lists them")
     check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
@@ -237,7 +243,7 @@ def _nearest(found: Inference, what_if: Sequence[WhatIf], judged: Judgement) -> 
     order = sorted((i for i in gains if families[i].kind == "known"), key=lambda i: -gains[i])[:NEAREST]
     return tuple(
         Nearest(
-            effect(families[i].id).family.replace("_", " "),
+            found.setting.scene.candidates[families[i].id].family.replace("_", " "),
             families[i].id,
             alone.get(families[i].id, 0.0),
             probability[families[i].id],

@@ -16,7 +16,6 @@ from fogml.gap.model import EffectValue
 from fogml.gap.shapes import AT_AMPLITUDE, Node, is_angle
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
-from fogml.twin.registry import effect
 
 FORM_ERROR = 0.04
 """What an amplitude may differ by because no form is known exactly, of its size."""
@@ -49,8 +48,8 @@ def card_of(
     lines
         Shape that the cause's family tells, such as a period.
     """
-    declared = effect(id)
     scene = setting.scene
+    declared = scene.candidates[id]
     shape = declared.default_shape(scene.grade) | {  # type: ignore[arg-type]
         q.name: float(lines[q.name]) for q in declared.shape if isinstance(lines.get(q.name), float)
     }

@@ -48,15 +48,13 @@ FAMILIES: dict[str, Build] = {
 def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[Family, ...]:
     """Families of everything that may act on these runs.
 
-    Effects that the twin has are among them: their sizes may be wrong.
+    `twin` tells how sensors usually read. Effects that the twin has are among them: their sizes may be wrong.
     """
-    from fogml.twin.registry import effects
-
     left_out = set(without)
     known = [
         _known(declared)
-        for id, declared in effects().items()
-        if declared.candidate and id not in left_out and _can_show(declared, scene, twin)
+        for id, declared in scene.candidates.items()
+        if id not in left_out and _can_show(declared, scene, twin)
     ]
     return (*known, *unknown_families(), Family("other_plant", "plant", other.other_plant))
 

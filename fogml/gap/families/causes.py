@@ -18,7 +18,6 @@ from fogml.gap.how_far_result import Onset
 from fogml.gap.model import EffectValue
 from fogml.gap.result import Estimate, Found, RunAmplitude
 from fogml.runs.run import FloatArray
-from fogml.twin.registry import effect
 
 SHOWN = 9.0
 """Squared whitened length from which on a run alone shows a cause."""
@@ -45,7 +44,7 @@ def fitted_values(
     found: Inference, judged: Judgement, named: Sequence[Cause], cards: Mapping[str, Card]
 ) -> tuple[EffectValue, ...]:
     """What the model with the named causes has of each: of an effect that it had already, all of it."""
-    had = {declared.id: (declared, setting) for declared, setting in found.model.twin.on}
+    had = {declared.id: (declared, setting) for declared, setting in found.plant.on}
     runs = found.setting.scene.runs[: found.setting.scene.fitted]
     values = []
     for cause in named:
@@ -67,8 +66,9 @@ def found_cause(
     found: Inference, every: Foretold, cause: Cause, probability: float, card: Card, share: float
 ) -> Found:
     """A cause as reports have it; `every` foretells all causes together."""
-    declared = effect(cause.ids[0])
-    _, high = declared.amplitude.range(found.setting.scene.grade)  # type: ignore[arg-type]
+    scene = found.setting.scene
+    declared = scene.candidates[cause.ids[0]]
+    _, high = declared.amplitude.range(scene.grade)  # type: ignore[arg-type]
     by_run = _by_run(found, cause, card.value.amplitude)
     return Found(
         effect=cause.ids[0],

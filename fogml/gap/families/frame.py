@@ -200,6 +200,10 @@ def fixed_columns(
                 response = rows.response(declared, setting.shape, None, values)
                 own_column[:, run] = setting.amplitude * response
             columns.append(own_column)
+    off = {i: r.own.nuisances(values) for i, r in enumerate(scene.runs) if r.own is not None}
+    for name in sorted({name for held in off.values() for name in held}):
+        mine = off[run].get(name)
+        columns.append((np.zeros(len(rows)) if mine is None else rows.samples(mine))[:, None])
     return np.concatenate(columns, axis=1)
 
 

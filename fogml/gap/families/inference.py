@@ -21,14 +21,17 @@ from fogml.gap.families.linear_gaussian import Posterior, log_evidence
 from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
 from fogml.gap.families.other_families import LINES
+from fogml.gap.families.own_simulator import candidates_of, plant_of
 from fogml.gap.families.places import Scene, outstanding_lines
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search
+from fogml.gap.model import GyroModel
 from fogml.gap.noise import prior_of
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin import Twin
 
 FAR_OFF = 3.0
 """Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
@@ -50,7 +53,9 @@ class Inference:
     Attributes
     ----------
     model
-        The twin.
+        The twin, or another in its place.
+    plant
+        The twin whose plant and sensors count.
     setting, columns, points
         Runs and constants; families' blocks; noises.
     fields
@@ -63,7 +68,8 @@ class Inference:
         Runs that could not be used, with the reason.
     """
 
-    model: TwinModel
+    model: GyroModel
+    plant: Twin
     setting: Setting
     columns: Columns
     points: NoisePoints
@@ -78,7 +84,7 @@ class Inference:
 
 
 def infer(
-    model: TwinModel,
+    model: GyroModel,
     fit: Sequence[Run],
     held_out: Sequence[Run],
     noise: Run | None,
@@ -88,22 +94,23 @@ def infer(
 ) -> Inference:
     """The posterior of the causes behind the fit runs."""
     tell("reading inputs")
+    plant = plant_of(model)
     most = min(priors.most_rows, priors.most_of_all // max(len(fit), 1))
-    runs, unusable = _rows(fit, model, most)
+    runs, unusable = _rows(fit, model, plant, most)
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))
-    held, more = _rows(held_out, model, most)
-    scene = Scene((*runs, *held), len(runs), model.grade)
+    held, more = _rows(held_out, model, plant, most)
+    scene = Scene((*runs, *held), len(runs), model.grade, candidates=candidates_of(model))
     prior, source = prior_of(model, noise)
-    setting = _setting(model, scene, priors, prior.centre)
-    setting = _setting(model, scene, priors, first_noise(setting, prior))
+    setting = _setting(model, plant, scene, priors, prior.centre)
+    setting = _setting(model, plant, scene, priors, first_noise(setting, prior))
     tell("fitting the noise")
     points = noise_points(setting, prior, source, noise, priors.hopeless)
-    setting = _setting(model, scene, priors, points.fit.model)
+    setting = _setting(model, plant, scene, priors, points.fit.model)
     scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
     setting = replace(setting, scene=scene)
     tell("building families")
-    columns = Columns.of(families_of(model.twin, scene, without), scene, setting.values)
+    columns = Columns.of(families_of(plant, scene, without), scene, setting.values)
     for _ in range(MOST_ROUNDS):
         tell("searching")
         best = points.best
@@ -124,24 +131,27 @@ def infer(
         if settled and points.best == best:
             break
         points = points.within(priors.hopeless)
-    return Inference(model, setting, columns, points, search, tuple(rescored), (*unusable, *more))
+    return Inference(model, plant, setting, columns, points, search, tuple(rescored), (*unusable, *more))
 
 
 def _nodes(explanations: Sequence[Explanation]) -> list[int]:
     return sorted({n for e in explanations for n, _ in e.nodes})
 
 
-def _rows(runs: Sequence[Run], model: TwinModel, most: int) -> tuple[list[Rows], list[tuple[str, str]]]:
+def _rows(
+    runs: Sequence[Run], model: GyroModel, plant: Twin, most: int
+) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
+    own = None if isinstance(model, TwinModel) else model
     for run in runs:
         try:
-            usable.append(rows_of(run, model.twin, most))
+            usable.append(rows_of(run, plant, most, own))
         except Unusable as error:
             unusable.append((run.name, str(error)))
     return usable, unusable
 
 
-def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
+def _setting(model: GyroModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
     """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
     constants = model.constants
     values = {c.name: c.mean for c in constants}
@@ -157,7 +167,7 @@ def _setting(model: TwinModel, scene: Scene, priors: Priors, noise: NoiseModel) 
             wide = np.zeros((len(r), int(ends[-1])))
             if i < scene.fitted:
                 wide[:, ends[i] : ends[i + 1]] = errors[i]
-            own = fixed_columns(r, i, scene, model.twin, constants, widened, values, priors)
+            own = fixed_columns(r, i, scene, plant, constants, widened, values, priors)
             blocks.append(np.concatenate([own, wide], axis=1))
         fixed = tuple(blocks)
         setting = Setting(scene, constants, priors, fixed, values, widened)

@@ -9,8 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.gap.families.own_simulator import OwnOnRun
 from fogml.gap.families.readings import Smoothness, at_points, smoothed, window_difference
 from fogml.gap.families.rows import BySample, Rows
+from fogml.gap.model import GyroModel
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.inputs import Inputs
@@ -23,7 +25,7 @@ FEWEST_ROWS = 16
 LEAST_FULL = 0.5
 """A row needs this share of its samples."""
 SHORT_GAP = 0.25
-"""Readings are linear over a gap of this share of the nominal's memory; a longer one is left out."""
+"""Readings are linear over a gap of this share of the model's memory; a longer one is left out."""
 SATURATED = 3
 """Neighbouring samples at the greatest or least value of all from which on it is a limit."""
 
@@ -36,8 +38,8 @@ class Unusable(InputError):
     """A run that a diagnosis can't use; others may do."""
 
 
-def rows_of(run: Run, twin: Twin, most: int) -> Rows:
-    """A run brought to `most` rows at most.
+def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None) -> Rows:
+    """A run brought to `most` rows at most, replayed by the twin, or by another model in its place.
 
     Raises
     ------
@@ -63,16 +65,22 @@ def rows_of(run: Run, twin: Twin, most: int) -> Rows:
     samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
     even, readings, noise = _even(samples, time, twin, replayer, row_s)
-    replayed = replayer.with_temperatures(
-        {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
-    ).output(twin)
-    errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed)
+    smooth = {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
+    own = None
+    if model is not None:
+        own = OwnOnRun(model, run.with_columns(**{n: v for n, v in smooth.items() if n in run.columns}))
+        replayed = own.output({c.name: c.mean for c in model.constants})
+        errors, columns = np.zeros((len(time), 2)), samples.means_of(own.columns())
+    else:
+        replayed = replayer.with_temperatures(smooth).output(twin)
+        errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed)
+        columns = _constant_columns(samples, even, step)
+    memory_s = 2.0 * DELTA_WINDOW_S if model is None else model.memory_s
     kept = counts >= LEAST_FULL * width
-    kept &= time - row_s >= run.time[0] + min(2.0 * DELTA_WINDOW_S, 0.1 * run.span_s) - step
-    kept &= ~_after_gaps(run, time, row_s)
+    kept &= time - row_s >= run.time[0] + min(memory_s, 0.1 * run.span_s) - step
+    kept &= ~_after_gaps(run, time, row_s, memory_s)
     if kept.sum() < FEWEST_ROWS:
         raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
-    columns = _constant_columns(samples, even, step)
     return Rows(
         run=run,
         gap=samples.means(run.gyro_deg_h - replayed)[kept],
@@ -87,6 +95,7 @@ def rows_of(run: Run, twin: Twin, most: int) -> Rows:
         smoothness=noise,
         by_sample=samples,
         replay_errors=errors[kept],
+        own=own,
         masked=masked,
     )
 
@@ -139,10 +148,9 @@ def _usable(run: Run) -> tuple[NDArray[np.bool_], dict[str, int]]:
     return usable, {why: n for why, n in masked.items() if n}
 
 
-def _after_gaps(run: Run, time: FloatArray, row_s: float) -> NDArray[np.bool_]:
-    """Even rows into which the nominal's memory reaches from over a long gap."""
+def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float) -> NDArray[np.bool_]:
+    """Even rows into which the model's memory [s] reaches from over a long gap."""
     hidden = np.zeros(len(time), dtype=np.bool_)
-    memory = 2.0 * DELTA_WINDOW_S
     jumps = np.flatnonzero(np.diff(run.time) > max(SHORT_GAP * memory, 3.0 * run.sample_s))
     for i in jumps.tolist():
         hidden |= (time + 0.5 * row_s > run.time[i]) & (time - row_s < run.time[i + 1] + memory)

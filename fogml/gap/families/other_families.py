@@ -8,6 +8,7 @@ from itertools import combinations
 import numpy as np
 
 from fogml.gap.families.family import Block, column_block
+from fogml.gap.families.own_simulator import OwnEffect
 from fogml.gap.families.places import Scene, lag, rate
 from fogml.gap.families.rows import Rows, slopes, through_nominal
 from fogml.gap.model import amplitudes_about
@@ -68,6 +69,9 @@ def nodes_of(declared: Effect, scene: Scene, constants: Constants) -> tuple[Node
 def _driving(
     declared: Effect, rows: Rows, scene: Scene
 ) -> list[tuple[str, Mapping[str, FloatArray] | None, float]]:
+    if isinstance(declared, OwnEffect):
+        # What drives it is for the model itself to know.
+        return [("", None, 1.0)]
     if "T_electronics" in declared.needs:
         return [(p.name, {"T_electronics": p.temperature}, p.weight) for p in scene.optics(rows, NEAR)]
     if (
@@ -89,7 +93,8 @@ def _at(
     if not amplitudes_about(declared):
         return rows.response(declared, shape, temperatures, constants)
     about = shape[AT_AMPLITUDE]
-    return rows.changed_output(declared, about, constants) / about
+    bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+    return rows.changed_output(declared, bare, about, constants) / about
 
 
 def moisture(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:

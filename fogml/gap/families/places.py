@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,6 +14,7 @@ from fogml.gap.families.rows import Rows
 from fogml.runs.run import FloatArray
 from fogml.runs.steps import recorded_step
 from fogml.signals.recursions import lag_kernel
+from fogml.twin.effect import Effect
 from fogml.twin.twin import Twin
 
 MIXES = (0.5, 0.0, 1.0, -0.5)
@@ -60,6 +61,8 @@ class Scene:
         Whose ranges hold.
     lines_hz
         Frequencies that stand out of the fit runs.
+    candidates
+        What may be named, by id.
     cache
         What several families ask for.
     """
@@ -68,6 +71,7 @@ class Scene:
     fitted: int
     grade: str
     lines_hz: tuple[float, ...] = ()
+    candidates: Mapping[str, Effect] = field(default_factory=dict)
     cache: dict[Any, Any] = field(default_factory=dict)
 
     @cached_property

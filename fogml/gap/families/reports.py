@@ -14,7 +14,6 @@ from fogml.gap.result import CandidateEvidence, ConstantFit, NoiseReport, RunSer
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import floor_square
 from fogml.twin.effect import NoiseEffect
-from fogml.twin.registry import effect, effects
 
 if TYPE_CHECKING:
     from fogml.gap.families.closing import Foretold
@@ -45,9 +44,7 @@ def candidate_evidence(
     gains, families = found.search.alone(), found.columns.families
     index = {f.id: i for i, f in enumerate(families) if f.kind == "known"}
     rows = []
-    for id, declared in effects().items():
-        if not declared.candidate:
-            continue
+    for id, declared in found.setting.scene.candidates.items():
         i = index.get(id)
         if i is None or i not in gains:
             # A random error has no mean response; others lie in the span of the constants.
@@ -68,7 +65,8 @@ def candidate_evidence(
 
 def usual_length(found: Inference, id: str) -> float:
     """Whitened length beside the constants of an effect of the usual size and shape in its card."""
-    declared, setting = effect(id), found.setting
+    setting = found.setting
+    declared = setting.scene.candidates[id]
     if isinstance(declared, NoiseEffect) and not declared.steady:
         return float(setting.priors.least_detectable)
     grade = setting.scene.grade
@@ -88,7 +86,7 @@ def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[s
         family = found.columns.families[member.family]
         stage: str = UNKNOWN_STAGE
         if family.kind == "known":
-            stage = effect(family.id).stage
+            stage = found.setting.scene.candidates[family.id].stage
         else:
             stage = STAGES.get(family.id, UNKNOWN_STAGE)
         total[stage] = total.get(stage, 0.0) + energy
@@ -217,11 +215,11 @@ def headline(
     segments: Sequence[GapSegment],
 ) -> tuple[str, ...]:
     """Sentences: the verdict, each cause with its size, share and place, the nearest where none is sure."""
-    said = []
+    said, titles = [], found.setting.scene.candidates
     if verdict == "no_gap":
         said.append("Nothing is missing that these runs could show.")
     for f in (f for f in shown if f.named):
-        title = effect(f.effect).title
+        title = titles[f.effect].title
         others = f" (or {', '.join(f.others)})" if f.others else ""
         size = f"{f.amplitude.value:.3g} {f.amplitude.unit}"
         usual = f", {f.times_usual:.2g} times the usual most" if (f.times_usual or 0.0) > 1.0 else ""
@@ -243,7 +241,7 @@ def headline(
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
             if n.share >= 0.2:
                 said.append(
-                    f"Nearest known cause: {effect(n.effect).title.lower()}, in whatever form, holds "
+                    f"Nearest known cause: {titles[n.effect].title.lower()}, in whatever form, holds "
                     f"{n.share:.0%} of the gap."
                 )
     order = sorted(range(found.setting.scene.fitted), key=lambda i: found.setting.scene.begun_s[i])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.gap.families.own_simulator import OwnEffect, OwnOnRun
 from fogml.gap.families.readings import Smoothness, at_points, window_difference
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
@@ -45,6 +46,8 @@ class Rows:
     replay_errors
         What a lag of the readings of 1 s, and what smoothing leaves, make of the twin's own effects, shape
         (m, 2) [deg/h].
+    own
+        A laboratory's own simulator on the run, where that takes the twin's place.
     masked
         Samples left out, by why.
     cache
@@ -64,6 +67,7 @@ class Rows:
     smoothness: Mapping[str, Smoothness]
     by_sample: BySample
     replay_errors: FloatArray
+    own: OwnOnRun | None = None
     masked: Mapping[str, int] = field(default_factory=dict)
     cache: dict[tuple[Any, ...], Inputs] = field(default_factory=dict)
 
@@ -114,6 +118,9 @@ class Rows:
         `temperatures` take the place of those of the even rows; `constants` are those at which an effect
         meets output and slopes.
         """
+        if isinstance(declared, OwnEffect):
+            assert self.own is not None
+            return self.samples(self.own.response(declared.id, shape, constants or {}))
         fast = {"rate", "angle", "output", "slopes", "earth"} & set(declared.needs)
         met = constants if {"output", "slopes"} & set(declared.needs) else None
         if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
@@ -128,7 +135,7 @@ class Rows:
         """Inputs at the samples."""
         key = ("samples", *_key(temperatures, constants))
         if key not in self.cache:
-            self.cache[key] = _meeting(self.by_sample.inputs(self.even, temperatures), constants)
+            self.cache[key] = self._meeting(self.by_sample.inputs(self.even, temperatures), constants)
         return self.cache[key].afresh()
 
     def _even_inputs(
@@ -140,17 +147,36 @@ class Rows:
             inputs = self.even
             if temperatures:
                 inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
-            self.cache[key] = _meeting(inputs, constants)
+            self.cache[key] = self._meeting(inputs, constants)
         return self.cache[key].afresh()
 
     def samples(self, values: FloatArray) -> FloatArray:
         """Means of a series over the samples, shape (n,) to (m,)."""
         return self.of(self.by_sample.means(values))
 
+    def _meeting(self, inputs: Inputs, constants: Mapping[str, float] | None) -> Inputs:
+        """Inputs with the output of the model without effects, and its slopes, at constants."""
+        if constants is None:
+            return inputs
+        if self.own is not None:
+            by_sample = len(inputs.time) == len(self.by_sample.row)
+            over = (lambda values: values) if by_sample else self.by_sample.means
+            told = {name: over(slope) for name, slope in self.own.slopes(constants).items()}
+            return replace(inputs, output=over(self.own.output(constants)), slopes=told)
+        from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
+
+        nominal = NominalConstants(**dict(constants))
+        rate = inputs.input_rate_deg_h
+        output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * rate + bias_deg_h(inputs, nominal)
+        return replace(inputs, output=np.asarray(output), slopes=temperature_slopes(inputs, nominal))
+
     def changed_output(
-        self, declared: Effect, amplitude: float, constants: Mapping[str, float]
+        self, declared: Effect, shape: Mapping[str, float], amplitude: float, constants: Mapping[str, float]
     ) -> FloatArray:
         """What an effect that meets the output makes of it at an amplitude [deg/h], shape (m,)."""
+        if isinstance(declared, OwnEffect):
+            assert self.own is not None
+            return self.samples(self.own.changed(declared.id, shape, amplitude, constants))
         assert isinstance(declared, LoopEffect)
         inputs = self._by_sample_inputs(None, constants)
         output = np.asarray(inputs.output)
@@ -183,6 +209,10 @@ class BySample:
         at = np.arange(len(total))
         return means if held.all() else np.where(held, means, np.interp(at, at[held], means[held]))
 
+    def means_of(self, columns: FloatArray) -> FloatArray:
+        """The same of columns side by side, shape (n, k) to (e, k)."""
+        return np.column_stack([self.means(c) for c in columns.T])
+
     def inputs(self, even: Inputs, temperatures: Mapping[str, FloatArray] | None) -> Inputs:
         """Inputs at the samples, with the even rows' temperatures."""
         held = {**even.temperatures, **(temperatures or {})}
@@ -206,6 +236,8 @@ def _key(
 
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:
     """Change of the nominal output with each temperature and with DeltaT, on the even rows."""
+    if rows.own is not None:
+        return {name: rows.by_sample.means(slope) for name, slope in rows.own.slopes(constants).items()}
     from fogml.twin.nominal import NominalConstants, temperature_slopes
 
     return temperature_slopes(rows.even.afresh(), NominalConstants(**dict(constants)))
@@ -230,15 +262,3 @@ def through_nominal(
         if error is not None:
             total = total + (slope if error.ndim == 1 else slope[:, None]) * error
     return rows.of(total)
-
-
-def _meeting(inputs: Inputs, constants: Mapping[str, float] | None) -> Inputs:
-    """Inputs with the output and the slopes of the nominal gyro at constants."""
-    if constants is None:
-        return inputs
-    from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
-
-    nominal = NominalConstants(**dict(constants))
-    rate = inputs.input_rate_deg_h
-    output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * rate + bias_deg_h(inputs, nominal)
-    return replace(inputs, output=np.asarray(output), slopes=temperature_slopes(inputs, nominal))

@@ -47,7 +47,8 @@ def test_spikes_and_a_limit_of_the_output_are_masked():
 
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     scene = _scene(_cycle(offset=-40.0))
-    setting = _setting(TwinModel(load_twin("nominal")), scene, Priors(), NOISE)
+    twin = load_twin("nominal")
+    setting = _setting(TwinModel(twin), twin, scene, Priors(), NOISE)
     assert setting.values["b0"] == pytest.approx(-40.0, abs=0.1)
     assert setting.widened["b0"] == pytest.approx(2.0 * 40.0 / 5.0, rel=0.05)
     found = SimpleNamespace(setting=setting, points=SimpleNamespace(source="-"))
