@@ -62,6 +62,6 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
     title = f"{values['source']}: tests on a rate table" + (
         " (synthetic data)" if values["synthetic"] else ""
     )
-    terminal.table(title, ["quantity", "value", "standard error", "unit", ""], rows)
+    terminal.table(title, ["quantity", "value", "standard error", "unit", "remark"], rows)
     for note in values["notes"]:
         terminal.say(note)

@@ -8,13 +8,12 @@ from pathlib import Path
 from fogml.cli.simulate import SimulateSettings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
-from fogml.runs.facts import Facts, facts_from
+from fogml.runs.facts import facts_from
 from fogml.twin.between_runs import Storage
-from fogml.twin.programme import Programme, load_programme
-from fogml.twin.simulate import default_facts, simulate_to_file, world_of, write_world
-from fogml.twin.timeline import timeline
-from fogml.twin.twin import Twin
+from fogml.twin.programme import load_programme
+from fogml.twin.simulate import default_facts, world_of, write_world
 from fogml.twin.twin_file import load_twin
+from fogml.twin.world import World
 
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
@@ -32,8 +31,18 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     programme, twin = load_programme(settings.programme), load_twin(settings.twin)
     facts = default_facts(programme) if settings.facts is None else facts_from(settings.facts, "facts")
     with settings.written_beside(out, "simulate"):
-        rows = _simulate(settings, programme, twin, facts, out, terminal)
-    _print(settings, programme, twin, rows, terminal)
+        world = world_of(
+            programme,
+            twin,
+            settings.sample_s,
+            settings.seed,
+            settings.columns,
+            facts,
+            truth=settings.truth is not None,
+        )
+        with terminal.work(f"simulating {programme.name}", total=len(world.timeline)) as work:
+            rows = write_world(world, out, settings.truth, work.advance)
+    _print(settings, world, rows, terminal)
 
 
 def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
@@ -68,35 +77,24 @@ def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:
             with terminal.work(f"simulating {programme.name}", total=len(before.timeline)) as work:
                 rows = write_world(before, out, run.truth, work.advance)
             terminal.say(f"{rows} samples of {programme.name}, started {run.started}, written to {out}")
-            results.append({"run": out.name, "rows": rows, "started": run.started.isoformat()})
+            _say_silent(before, terminal)
+            results.append(
+                {
+                    "run": out.name,
+                    "rows": rows,
+                    "started": run.started.isoformat(),
+                    "silent": list(before.silent),
+                }
+            )
     for note in twin.notes:
         terminal.say(note)
     values = {"schema": "fogml.simulation/1", "twin": twin.name, "runs": results, "notes": list(twin.notes)}
     terminal.result(values)
 
 
-def _simulate(
-    settings: SimulateSettings, programme: Programme, twin: Twin, facts: Facts, out: Path, terminal: Terminal
-) -> int:
-    total = len(timeline(programme, settings.sample_s))
-    with terminal.work(f"simulating {programme.name}", total=total) as work:
-        return simulate_to_file(
-            programme,
-            twin,
-            out,
-            sample_s=settings.sample_s,
-            seed=settings.seed,
-            columns=settings.columns,
-            facts=facts,
-            truth_path=settings.truth,
-            progress=work.advance,
-        )
-
-
-def _print(
-    settings: SimulateSettings, programme: Programme, twin: Twin, rows: int, terminal: Terminal
-) -> None:
+def _print(settings: SimulateSettings, world: World, rows: int, terminal: Terminal) -> None:
     assert settings.out
+    programme, twin = world.timeline.programme, world.twin
     values = {
         "schema": "fogml.simulation/1",
         "run": Path(settings.out).name,
@@ -108,6 +106,7 @@ def _print(
         "programme": programme.name,
         "twin": twin.name,
         "effects": list(twin.settings),
+        "silent": list(world.silent),
         "notes": list(twin.notes),
     }
     terminal.say(
@@ -116,8 +115,16 @@ def _print(
     )
     on = ", ".join(twin.settings) or "none"
     terminal.say(f"Twin {twin.name}, seed {settings.seed}; effects: {on}.")
+    _say_silent(world, terminal)
     for note in twin.notes:
         terminal.say(note)
     if settings.truth:
         terminal.say(f"The truth of every node and effect is in {settings.truth}.")
     terminal.result(values)
+
+
+def _say_silent(world: World, terminal: Terminal) -> None:
+    """Name the effects that are on and that this programme gives nothing to act on."""
+    if world.silent:
+        name = world.timeline.programme.name
+        terminal.say(f"On, but without any part in the output of {name}: {', '.join(world.silent)}.")

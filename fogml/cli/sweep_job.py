@@ -145,7 +145,7 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         ]
         rows.append([f"{trial['model']}: {trial['features'] or 'no features'}", *figures, mark])
     units = [f"{name} [{unit}]" for name, unit in OBJECTIVES.items()]
-    terminal.table("Trials that none beats in every objective", ["model", *units, ""], rows)
+    terminal.table("Trials that none beats in every objective", ["model", *units, "chosen"], rows)
     judged = values["winner"].get("judged")
     for run in judged["test"] if judged else []:
         terminal.say(

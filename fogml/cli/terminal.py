@@ -70,7 +70,7 @@ class Terminal:
             click.echo(json_text(values, "result", ascii_only=True))
 
     def table(self, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """A table on stdout for people: the first column left, the others right."""
+        """A table on stdout for people: the first column left, the others right; no head if it names none."""
         if self.quiet or self.as_json:
             return
         from rich import box
@@ -78,6 +78,7 @@ class Terminal:
         from rich.table import Table
 
         table = Table(title=terminal_text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        table.show_header = any(header)
         console = Console(highlight=False, markup=False)
         columns = [[terminal_text(cell) for cell in cells] for cells in zip(header, *rows, strict=True)]
         widths = _column_widths(columns, console.width)

@@ -89,7 +89,7 @@ class Signal:
 
     @property
     def written_unit(self) -> str:
-        """Unit as feature text writes it beside a number; empty where it is no word (%, 0/1)."""
+        """Unit as feature text writes it beside a number; empty where it is no word (%, 1)."""
         return self.unit if self.unit.isidentifier() else ""
 
     @property

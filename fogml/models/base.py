@@ -199,6 +199,10 @@ class DriftModel(BaseEstimator, ABC):
     def weights(self) -> dict[str, NDArray[Any]]:
         """The arrays that the fitted model consists of, by name."""
 
+    def weight_bytes(self) -> int:
+        """Bytes of what the model predicts from."""
+        return sum(array.nbytes for array in self.weights().values())
+
     @abstractmethod
     def parameter_count(self) -> int:
         """Number of fitted parameters."""
@@ -271,7 +275,7 @@ class DriftModel(BaseEstimator, ABC):
             "kind": self.kind,
             "features": self.feature_names,
             "parameters": self.parameter_count(),
-            "bytes": sum(array.nbytes for array in self.weights().values()),
+            "bytes": self.weight_bytes(),
             "unit": self.card_.unit,
             "axis": self.card_.axis,
             "window_s": self.window_s,

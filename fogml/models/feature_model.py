@@ -39,14 +39,9 @@ from fogml.models.regressors import (
     refit,
     regressor_from_saved,
     regressor_to_saved,
+    weight_bytes,
 )
-from fogml.models.table import (
-    RunRows,
-    TrainingTable,
-    row_count,
-    run_rows,
-    table_of_rows,
-)
+from fogml.models.table import RunRows, TrainingTable, row_count, run_rows, table_of_rows
 from fogml.models.tall_least_squares import Part
 from fogml.models.threads import one_thread
 from fogml.runs.columns import coil_sensor_number
@@ -227,6 +222,11 @@ class FeatureModel(DriftModel):
         """Number of the regressor's fitted parameters."""
         self._check_fitted()
         return parameter_count(self.regressor_)
+
+    def weight_bytes(self) -> int:
+        """Bytes of what the regressor predicts from."""
+        self._check_fitted()
+        return weight_bytes(self.regressor_)
 
     def describe(self) -> dict[str, Any]:
         """What reports say of the model; for linear models with coefficients and standard errors."""

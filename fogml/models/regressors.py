@@ -103,11 +103,22 @@ def goes_on_linearly(regressor: Any) -> bool:
 
 
 def parameter_count(regressor: Any) -> int:
-    """Number of fitted parameters; of a scikit-learn regressor, of the numbers in its fitted arrays."""
+    """Number of fitted parameters; of a scikit-learn regressor, of the numbers that it predicts from."""
     count = getattr(regressor, "parameter_count", None)
     if count is not None:
         return int(count() if callable(count) else count)
-    return _count_numbers(regressor)
+    from fogml.models.sklearn_size import numbers_of
+
+    return numbers_of(regressor)
+
+
+def weight_bytes(regressor: Any) -> int:
+    """Bytes of a fitted regressor's arrays; of a scikit-learn one, of those that it predicts from."""
+    if _is_sklearn(regressor):
+        from fogml.models.sklearn_size import bytes_of
+
+        return bytes_of(regressor)
+    return sum(array.nbytes for array in regressor_to_saved(regressor)[1].values())
 
 
 def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
@@ -124,7 +135,7 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
         if kind.__name__ == name and kind.__module__.startswith(module.rsplit(".", 1)[0]):
             values, arrays = regressor.to_saved()
             return {"form": form, **values}, arrays
-    if type(regressor).__module__.split(".")[0] == "sklearn":
+    if _is_sklearn(regressor):
         from fogml.models.sklearn_saving import dump_sklearn
 
         return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
@@ -158,14 +169,5 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
     return getattr(import_module(module), name).from_saved(values, arrays)
 
 
-def _count_numbers(value: Any) -> int:
-    if isinstance(value, np.ndarray):
-        return int(value.size) if value.dtype.kind == "f" else 0
-    if isinstance(value, list | tuple):
-        return sum(_count_numbers(item) for item in value)
-    if isinstance(value, float):
-        return 1
-    if type(value).__module__.startswith("sklearn."):
-        fitted = {name: item for name, item in vars(value).items() if name.endswith("_")}
-        return sum(_count_numbers(item) for name, item in fitted.items() if not name.startswith("__"))
-    return 0
+def _is_sklearn(regressor: Any) -> bool:
+    return type(regressor).__module__.split(".")[0] == "sklearn"

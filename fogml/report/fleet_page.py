@@ -109,7 +109,7 @@ def _trends(fleet: Mapping[str, Any]) -> Table:
         ("Between units, 1 σ", "", "figure"),
         ("Per serial number", "", "figure"),
         ("Probability by chance", "", "figure"),
-        ("", "", "text"),
+        ("Trend", "", "text"),
     )
     return Table(columns, tuple(rows), "Slope by Theil and Sen, probability by Kendall's rank correlation.")
 

@@ -68,7 +68,7 @@ def _result(values: Mapping[str, Any]) -> Table:
             ("Value", "", "figure"),
             ("Standard error", "", "figure"),
             ("Unit", "", "text"),
-            ("", "", "text"),
+            ("Remark", "", "text"),
         ),
         rows,
     )
@@ -191,4 +191,5 @@ def _unit(facts: Mapping[str, Any] | None) -> Table | None:
         f"{stated(facts['wavelength_nm'])} nm, {facts['winding']} winding of {facts['layers']} layers, "
         f"leads of {' and '.join(stated(length) for length in facts['leads_m'])} m."
     )
-    return Table((("", "", "text"), ("Value", "", "figure"), ("Unit", "", "text")), tuple(rows), caption)
+    columns = (("Quantity", "", "text"), ("Value", "", "figure"), ("Unit", "", "text"))
+    return Table(columns, tuple(rows), caption)

@@ -24,11 +24,22 @@ class Row:
 
 @dataclass(frozen=True)
 class Table:
-    """A table as a page shows it."""
+    """A table as a page shows it; every column has a heading.
+
+    Raises
+    ------
+    ValueError
+        If one has none.
+    """
 
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
     caption: str = ""
+
+    def __post_init__(self) -> None:
+        for place, (heading, _, _) in enumerate(self.columns, 1):
+            if not heading.strip():
+                raise ValueError(f"column {place} of the table '{self.caption}' has no heading")
 
 
 @dataclass(frozen=True)

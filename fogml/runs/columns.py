@@ -42,7 +42,9 @@ _GYRO = {
 _TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
 _RATE = {"deg/s": (1.0, 0.0), "deg/h": (1.0 / 3600.0, 0.0), "rad/s": (_DEGREE_PER_RADIAN, 0.0)}
 _ANGLE = {"deg": (1.0, 0.0), "rad": (_DEGREE_PER_RADIAN, 0.0)}
-_DUTY = {"%": (0.01, 0.0), "0/1": (1.0, 0.0)}
+DUTY = "1"
+"""Unit of a share of the time for which something is on, from 0 to 1."""
+_DUTY = {"%": (0.01, 0.0), DUTY: (1.0, 0.0), "0/1": (1.0, 0.0)}
 _FIELD = {"uT": (1.0, 0.0), "G": (100.0, 0.0)}
 
 
@@ -66,9 +68,9 @@ def _specs() -> dict[str, ColumnSpec]:
         ColumnSpec("humidity", "%", {"%": (1.0, 0.0)}, "relative humidity"),
         ColumnSpec("vibration", "g", {"g": (1.0, 0.0)}, "rms vibration"),
         ColumnSpec("dose", "Gy", {"Gy": (1.0, 0.0), "krad": (10.0, 0.0)}, "absorbed radiation dose"),
-        ColumnSpec("compressor", "0/1", _DUTY, "duty of the compressor"),
-        ColumnSpec("heater", "0/1", _DUTY, "duty of the heater"),
-        ColumnSpec("fan", "0/1", _DUTY, "duty of the fan"),
+        ColumnSpec("compressor", DUTY, _DUTY, "duty of the compressor"),
+        ColumnSpec("heater", DUTY, _DUTY, "duty of the heater"),
+        ColumnSpec("fan", DUTY, _DUTY, "duty of the fan"),
         ColumnSpec("B_x", "uT", _FIELD, "magnetic field in the gyro frame"),
         ColumnSpec("B_y", "uT", _FIELD, "magnetic field in the gyro frame"),
         ColumnSpec("B_z", "uT", _FIELD, "magnetic field in the gyro frame"),
@@ -95,7 +97,6 @@ _ALIASES = {
     "º/h": "deg/h",
     "º/s": "deg/s",
     "counts": "count",
-    "1": "0/1",
 }
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.runs.columns import column_spec
+from fogml.runs.columns import DUTY, column_spec
 from fogml.runs.findings import Finding
 
 FloatArray = NDArray[np.float64]
@@ -18,7 +18,6 @@ REGULAR_SHARE = 0.9
 """Share of its values that must be as many rows apart as usual, to half of that or one row."""
 LONGEST_HOLE = 3.0
 """Nothing is filled in where values are more usual distances apart [s] than this."""
-_SWITCHED = ("0/1",)
 
 
 def is_of_another_rate(values: FloatArray) -> bool:
@@ -68,7 +67,7 @@ def on_gyro_rows(
             filled[name] = values[rows]
             continue
         held = np.flatnonzero(~np.isnan(values))
-        hold = spec is not None and spec.internal in _SWITCHED
+        hold = spec is not None and spec.internal == DUTY
         filled[name] = _at(time[rows], time[held], values[held], hold)
         how = "held" if hold else "interpolated"
         message = (

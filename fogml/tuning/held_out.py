@@ -19,7 +19,7 @@ from fogml.models.feature_model import FeatureModel
 from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.names import make_model
 from fogml.models.operations import operations_of_compact, operations_of_features
-from fogml.models.regressors import parameter_count, regressor_to_saved
+from fogml.models.regressors import parameter_count, weight_bytes
 from fogml.models.table import RunRows, TrainingTable, usable_rows
 from fogml.models.trial import averaged_rows, bare_table, held_out_prediction
 from fogml.runs.run import BoolArray, FloatArray, Run
@@ -190,11 +190,6 @@ class HeldOut:
             atoms = features.atom_values(run).values
             rows.append(RunRows(atoms[used], run.error_deg_h[used], run.time[used]))
         return np.concatenate([part.atoms for part in averaged_rows(rows)])
-
-
-def weight_bytes(regressor: Any) -> int:
-    """Bytes of a fitted regressor's saved arrays."""
-    return int(sum(array.nbytes for array in regressor_to_saved(regressor)[1].values()))
 
 
 def _rows_of_all(run: Run, texts: Sequence[str]) -> BoolArray:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from copy import deepcopy
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -22,11 +21,11 @@ from fogml.twin.between_runs import (
     stored_nodes,
     windows_with_history,
 )
+from fogml.twin.branch import Branch
 from fogml.twin.chain import ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
-from fogml.twin.plant.network import AIR, PlantState
 from fogml.twin.plant.power import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
@@ -62,38 +61,6 @@ class Samples:
     noise: FloatArray
     random: dict[str, FloatArray]
     without: dict[str, Inputs]
-
-
-class _Branch:
-    """Plant and chain of one twin, with what they remember."""
-
-    def __init__(self, twin: Twin) -> None:
-        self.twin = twin
-        self.network = twin.network
-        self.state = PlantState()
-        self.chamber_memory, self.memory = Memory(), Memory()
-
-    def go_on_from(self, before: _Branch) -> None:
-        """Take over the states that another run of the same unit left."""
-        left = before.state, before.chamber_memory, before.memory
-        self.state, self.chamber_memory, self.memory = deepcopy(left)
-
-    def nodes(
-        self, block: TimelineBlock, drives: dict[str, FloatArray], clock_s: float, windows: PowerWindows
-    ) -> dict[str, FloatArray]:
-        """Temperature of every node at all samples of the block, on or off."""
-        chamber, time = block.set_point, clock_s + block.time
-        for declared, setting in self.twin.thermal:
-            inputs = Inputs(time, {AIR: chamber}, block.table_rate, drives=drives, memory=self.chamber_memory)
-            chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
-        return self.network.temperatures(
-            time,
-            chamber,
-            powered=windows,
-            fan=block.fan,
-            table_rate=block.table_rate,
-            state=self.state,
-        )
 
 
 class World:
@@ -151,11 +118,11 @@ class World:
         power_on = first if math.isfinite(first) else None
         self.facts = facts.model_copy(update={"powered_on": power_on, "in_use_since": since})
         self.counts_per_deg_h = twin.counts_per_deg_h(sample_s)
-        self._main = _Branch(twin)
+        self._main = Branch(twin)
         self._without = {}
         if truth:
             thermal = [declared.id for declared, _ in twin.thermal if not hidden(declared)]
-            self._without = {id: _Branch(twin.without_effect(id)) for id in thermal}
+            self._without = {id: Branch(twin.without_effect(id)) for id in thermal}
         self._drives = self._needed_drives()
         if before is not None:
             self._go_on_from(before, storage)
@@ -163,6 +130,7 @@ class World:
         self._sensor_rng = Streams(seed, "sensor")
         self._sensor_memory, self._share_memory = Memory(), Memory()
         self._log_memory, self._free_memory = Memory(), Memory()
+        self._acted: dict[str, bool] = {}
         self._check_sensors()
 
     @property
@@ -179,6 +147,20 @@ class World:
     def end_s(self) -> float:
         """When the run ends on the unit's clock [s]."""
         return self.clock_s + len(self.timeline) * self.timeline.sample_s
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Effects that are on and changed nothing so far: exactly 0 at every sample.
+
+        Of effects of the plant and the sensors and of random ones that is known where contributions are
+        asked for.
+        """
+        return tuple(id for id in self.twin.settings if not self._acted.get(id, True))
+
+    def _note(self, parts: Mapping[str, FloatArray]) -> None:
+        """Keep in mind which contributions of a block are other than 0."""
+        for id, values in parts.items():
+            self._acted[id] = self._acted.get(id, False) or bool(np.any(values))
 
     def _go_on_from(self, before: World, storage: Storage) -> None:
         """Take over what the unit remembers of the run before, and what storage made of it."""
@@ -205,11 +187,15 @@ class World:
 
     def output(self, samples: Samples) -> ChainOutput:
         """The chain's output for the next block."""
-        return through_chain(self.twin, samples.inputs, samples.inputs, contributions=self.truth)
+        given = through_chain(self.twin, samples.inputs, samples.inputs, contributions=True)
+        self._note(given.contributions)
+        return given
 
     def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
         """The output as recorded."""
-        return logged(self.twin, output, replace(samples.inputs, memory=self._log_memory)).output
+        given = logged(self.twin, output, replace(samples.inputs, memory=self._log_memory))
+        self._note(given.contributions)
+        return given.output
 
     def noise_free(self, samples: Samples, output: FloatArray) -> ChainOutput:
         """The output as it would be recorded without noise, and what each logger effect changes in it."""
@@ -232,9 +218,11 @@ class World:
         parts = dict(samples.random)
         for id, inputs in samples.without.items():
             parts[id] = output - through_chain(self._without[id].twin, inputs, inputs).output
-        return parts | sensor_shares(
+        parts |= sensor_shares(
             self.twin, replace(samples.inputs, memory=self._share_memory).with_output(output)
         )
+        self._note(parts)
+        return parts
 
     def _samples(self, block: TimelineBlock) -> Samples:
         facts = self.facts
@@ -249,7 +237,7 @@ class World:
         if len(block):
             self._last_drives = {name: float(values[-1]) for name, values in drives.items()}
 
-        def inputs(branch: _Branch) -> Inputs:
+        def inputs(branch: Branch) -> Inputs:
             nodes = branch.nodes(block, drives, self.clock_s, self._windows)
             nodes_on = {name: values[rows] for name, values in nodes.items()}
             return self._inputs(branch, self.clock_s + block.time[rows], nodes_on, rate[rows], drives_on)
@@ -261,7 +249,7 @@ class World:
 
     def _inputs(
         self,
-        branch: _Branch,
+        branch: Branch,
         time: FloatArray,
         nodes: dict[str, FloatArray],
         rate: FloatArray,

@@ -30,3 +30,13 @@ def test_no_figure_is_lost_where_they_do_not_fit(monkeypatch, capsys) -> None:
     for row in WAYS:
         for letter in "".join(row):
             assert letter in told
+
+
+def test_a_table_without_names_has_no_head(capsys) -> None:
+    Terminal().table("Export", ["", ""], [["weights", "72 bytes"]])
+    assert [line.split() for line in capsys.readouterr().out.splitlines()] == [
+        ["Export"],
+        [],
+        ["weights", "72", "bytes"],
+        [],
+    ]

@@ -56,6 +56,26 @@ def test_simulate_then_replay(config, tmp_path, invoke_json, invoke):
     np.testing.assert_allclose(part, wanted, atol=0.12 / 8.0 * 0.2)
 
 
+@pytest.mark.parametrize("truth", [False, True], ids=["run alone", "with its truth"])
+def test_effects_that_changed_nothing_are_told(tmp_path, invoke, invoke_json, truth):
+    """No dose, no end of the range; that a sensor never lagged, only the truth tells."""
+    twin, out = tmp_path / "twin.yaml", tmp_path / "run.csv"
+    on = ["electronic_crosstalk", "radiation", "rate_range", "output_counts", "sensor_lag"]
+    unit = Twin("unit")
+    for id in on:
+        unit = unit.with_effect(id)
+    save_twin(unit, twin)
+    config = tmp_path / "simulation.yaml"
+    values = {"schema": "fogml.simulate/1", "twin": str(twin), "programme": ["soak at 25 degC for 10 min"]}
+    config.write_text(yaml.safe_dump(values))
+    command = ["simulate", config, "-o", out]
+    command += ["--truth", tmp_path / "truth.parquet"] if truth else []
+    values = invoke_json(*command)
+    assert values["effects"] == on
+    assert values["silent"] == ["radiation", "rate_range", *(["sensor_lag"] if truth else [])]
+    assert "On, but without any part in the output" in invoke(*command).stdout
+
+
 @pytest.mark.parametrize("suffixes", [(".csv", ".parquet"), (".parquet", ".csv")])
 def test_a_truth_of_the_run_s_stem_leaves_its_facts(config, tmp_path, invoke, suffixes):
     out, truth = (tmp_path / f"run{suffix}" for suffix in suffixes)

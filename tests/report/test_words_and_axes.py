@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from fogml.report import words
 from fogml.report.axes import log_axis, rounded_up, time_unit
 from fogml.report.static_svg import ticks
-from fogml.report.tables import coefficients_table
+from fogml.report.tables import Table, coefficients_table
 
 
 @pytest.mark.parametrize(
@@ -105,3 +105,8 @@ def test_a_table_of_terms_of_the_output_says_what_they_add_up_to() -> None:
     )
     assert of_output is not None and "sign opposite" in of_output.caption
     assert of_drift is not None and not of_drift.caption
+
+
+def test_no_column_of_a_table_goes_without_a_heading() -> None:
+    with pytest.raises(ValueError, match="column 2 of the table 'Terms' has no heading"):
+        Table((("Term", "", "text"), (" ", "", "figure")), (), "Terms")

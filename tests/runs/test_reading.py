@@ -60,6 +60,7 @@ UNITS = [
     ("vibration [g]", 0.1, "vibration", 0.1),
     ("compressor [%]", 50.0, "compressor", 0.5),
     ("heater [0/1]", 1.0, "heater", 1.0),
+    ("heater [1]", 0.85, "heater", 0.85),
     ("fan [%]", 100.0, "fan", 1.0),
     ("dose [krad]", 2.0, "dose", 20.0),
     ("B_x [G]", 0.5, "B_x", 50.0),
@@ -85,8 +86,8 @@ def test_every_unit_of_the_run_format_is_tested():
     conversions = {(spec.name, unit) for spec in KNOWN.values() for unit in spec.units if unit != "count"}
     trivial = {(name, unit) for name, unit in conversions if unit == KNOWN[name].internal}
     assert conversions - trivial - tested <= {
-        ("compressor", "%"), ("heater", "%"), ("B_y", "G"), ("B_z", "G"), ("T_case", "K"),
-        ("T_top", "K"), ("T_bottom", "K"),
+        ("compressor", "%"), ("heater", "%"), ("compressor", "0/1"), ("fan", "0/1"), ("B_y", "G"),
+        ("B_z", "G"), ("T_case", "K"), ("T_top", "K"), ("T_bottom", "K"),
     }  # fmt: skip
 
 
