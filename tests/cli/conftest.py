@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,26 +29,47 @@ def csv_text(
 @pytest.fixture
 def run_files(tmp_path: Path) -> tuple[Path, Path]:
     """A training run and a test run with side files."""
-    paths = tmp_path / "a.csv", tmp_path / "b.csv"
+    return write_runs(tmp_path)
+
+
+def write_runs(folder: Path) -> tuple[Path, Path]:
+    """A training run and a test run with side files in a folder."""
+    paths = folder / "a.csv", folder / "b.csv"
     for seed, path in enumerate(paths):
         path.write_text(csv_text(seed))
         path.with_suffix(".yaml").write_text("unit: FOG-1\naxis: x\n")
     return paths
 
 
+def run_program(*arguments: object, status: int = 0):
+    """Run ``fogml`` with arguments; the result has exit_code, stdout, stderr and json()."""
+    result = CliRunner().invoke(app, [str(argument) for argument in arguments])
+    if result.exception is not None and not isinstance(result.exception, SystemExit):
+        raise result.exception
+    assert result.exit_code == status, result.stderr + result.stdout
+    return result
+
+
 @pytest.fixture
 def invoke():
-    """Run ``fogml`` with arguments; the result has exit_code, stdout, stderr and json()."""
-    runner = CliRunner()
+    """`run_program`."""
+    return run_program
 
-    def run(*arguments: object, status: int = 0):
-        result = runner.invoke(app, [str(argument) for argument in arguments])
-        if result.exception is not None and not isinstance(result.exception, SystemExit):
-            raise result.exception
-        assert result.exit_code == status, result.stderr + result.stdout
-        return result
 
-    return run
+@pytest.fixture(scope="session")
+def trained(tmp_path_factory: pytest.TempPathFactory):
+    """Gives the folder of a polynomial of features that `fogml train` wrote of `run_files`, trained once."""
+
+    @cache
+    def folder(*words: str) -> Path:
+        home = tmp_path_factory.mktemp("trained")
+        train, test = write_runs(home)
+        run_program(
+            "train", train, "--test", test, "--model", "polynomial", *words, "-o", home / "out", "--quiet"
+        )
+        return home / "out" / "model"
+
+    return folder
 
 
 @pytest.fixture

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -17,11 +18,9 @@ ADDED = ["drift", "gyro_compensated", "flag"]
 
 
 @pytest.fixture
-def model(invoke, run_files, tmp_path):
-    out = tmp_path / "trained"
-    arguments = ("--model", "polynomial", "--features", "T, dT", "-o", out, "--quiet")
-    invoke("train", run_files[0], "--test", run_files[1], *arguments)
-    return out / "model"
+def model(trained, tmp_path):
+    """A trained model of a test's own."""
+    return shutil.copytree(trained("--features", "T, dT"), tmp_path / "model")
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet"])

@@ -12,10 +12,9 @@ pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not 
 
 
 @pytest.fixture
-def model(invoke, run_files, tmp_path):
-    out = tmp_path / "trained"
-    invoke("train", run_files[0], "--test", run_files[1], "--model", "polynomial", "-o", out, "--quiet")
-    return out / "model"
+def model(trained, tmp_path):
+    """A trained model of a test's own."""
+    return shutil.copytree(trained(), tmp_path / "model")
 
 
 def test_c_with_figures(invoke_json, model, tmp_path):

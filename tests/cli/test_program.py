@@ -22,11 +22,13 @@ def run(*arguments: object, cwd=None):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd)
 
 
-def test_train_and_compensate(run_files, tmp_path):
-    arguments = ("--model", "M1", "--limit", "rms=10", "-o", "out", "--json")
+def test_an_unmet_limit_is_status_1_and_what_is_written_is_used(run_files, tmp_path):
+    arguments = ("--model", "M1", "--limit", "rms=0.001", "-o", "out", "--json")
     found = run("train", "a.csv", "--test", "b.csv", *arguments, cwd=tmp_path)
-    assert (found.returncode, found.stderr) == (0, "")
-    assert json.loads(found.stdout)["schema"] == "fogml.train/1"
+    assert (found.returncode, found.stderr) == (1, "")
+    report = json.loads(found.stdout)
+    assert report["schema"] == "fogml.train/1" and not report["limits"][0]["met"]
+    assert json.loads((tmp_path / "out" / "report.json").read_text()) == report
     assert (tmp_path / "out" / "certificate.html").exists()
     found = run("compensate", "b.csv", "--model", "out/model", "-o", "c.csv", "--quiet", cwd=tmp_path)
     assert (found.returncode, found.stdout, found.stderr) == (0, "", "")
@@ -34,19 +36,14 @@ def test_train_and_compensate(run_files, tmp_path):
     assert header == "time [s],gyro [deg/h],T [degC],drift [deg/h],gyro_compensated [deg/h],flag"
 
 
-def test_an_unmet_limit_is_status_1(run_files, tmp_path):
-    arguments = ("--model", "mean", "--limit", "rms=0.001", "-o", "out")
-    found = run("train", "a.csv", "--test", "b.csv", *arguments, cwd=tmp_path)
-    assert found.returncode == 1
-    assert "NOT met" in found.stdout
-    assert (tmp_path / "out" / "report.json").exists()
-
-
-def test_bad_input_is_status_2_and_one_line(run_files, tmp_path):
+def test_bad_input_is_status_2_and_one_line(run_files, tmp_path, invoke, monkeypatch):
     (tmp_path / "bad.csv").write_bytes(bytes(range(256)) * 20)
-    for name in ("bad.csv", "none.csv"):
-        found = run("train", name, "--test", "b.csv", "-o", "out", cwd=tmp_path)
-        assert found.returncode == 2
+    process = run("train", "bad.csv", "--test", "b.csv", "-o", "out", cwd=tmp_path)
+    assert process.returncode == 2
+    monkeypatch.chdir(tmp_path)
+    here = [invoke("train", name, "--test", "b.csv", "-o", "out", status=2) for name in ("bad.csv", "no.csv")]
+    assert process.stderr == here[0].stderr
+    for found, name in zip((process, *here), ("bad.csv", "bad.csv", "no.csv"), strict=True):
         assert found.stdout == ""
         assert len(found.stderr.strip().splitlines()) == 1
         assert name in found.stderr
