@@ -17,8 +17,6 @@ from fogml.gap.shapes import AT_AMPLITUDE, Node, is_angle
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect
 
-FORM_ERROR = 0.04
-"""What an amplitude may differ by because no form is known exactly, of its size."""
 MOST_NODES = 400
 
 
@@ -92,7 +90,9 @@ def card_of(
     weights = np.exp(np.clip(np.array(gains) - max(gains), -50.0, 0.0))
     weights /= weights.sum()
     sizes = np.array([a for a, _ in values])
-    se = math.sqrt(se**2 + float(weights @ (sizes - amplitude) ** 2) + (FORM_ERROR * amplitude) ** 2)
+    se = math.sqrt(
+        se**2 + float(weights @ (sizes - amplitude) ** 2) + (setting.priors.form_error * amplitude) ** 2
+    )
     shape_se = {
         name: math.sqrt(float(weights @ np.array([(v.get(name, x) - x) ** 2 for _, v in values])))
         for name, x in told.items()

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import chi2
 
-from fogml.gap.families.card import FORM_ERROR, Card, card_of
+from fogml.gap.families.card import Card, card_of
 from fogml.gap.families.closing import Foretold
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
@@ -106,7 +106,7 @@ def _by_run(found: Inference, cause: Cause, amplitude: float) -> tuple[RunAmplit
         size = float(beside @ beside)
         if size > SHOWN:
             scale = float(beside @ data) / size
-            se = float(np.hypot(size**-0.5, FORM_ERROR * scale))
+            se = float(np.hypot(size**-0.5, found.setting.priors.form_error * scale))
             rows.append(RunAmplitude(r.run.name, amplitude * scale, abs(amplitude) * se))
     return tuple(rows)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
@@ -27,6 +27,8 @@ LONGEST_RUNS = 30.0
 """Flicker goes on to this many run lengths: what is slower sets runs apart by a constant."""
 LEAST_ERROR = 0.3
 """Whitened length under which an error of the readings is left out."""
+FORM_WAVES = 24
+"""Half waves of a run that an error of a form may be smooth over."""
 IN_CONSTANTS = 1e-4
 """A block that keeps less of its energy beside the constants lies in their span."""
 
@@ -205,6 +207,34 @@ def fixed_columns(
         mine = off[run].get(name)
         columns.append((np.zeros(len(rows)) if mine is None else rows.samples(mine))[:, None])
     return np.concatenate(columns, axis=1)
+
+
+def with_form_errors(setting: Setting, noise: NoiseModel, length: float) -> Setting:
+    """With what no form holds of a gap of a whitened length: its share, smooth in each run's time.
+
+    Where that is too short to be seen there is none.
+    """
+    share = setting.priors.form_error * length
+    if share < 1.0:
+        return setting
+    runs, fitted = setting.scene.runs, setting.scene.fitted
+    waves = []
+    for i, rows in enumerate(runs):
+        held = np.zeros((len(rows), FORM_WAVES * fitted))
+        if i < fitted:
+            phase = (
+                np.pi
+                * (rows.time_s - rows.end_s[0] + rows.row_s)
+                / (rows.end_s[-1] - rows.end_s[0] + rows.row_s)
+            )
+            own = slice(i * FORM_WAVES, (i + 1) * FORM_WAVES)
+            held[:, own] = np.cos(phase[:, None] * np.arange(1, FORM_WAVES + 1))
+        waves.append(held)
+    white = Whitening(noise, setting).stacked(waves[:fitted])
+    scale = share / np.sqrt(float(FORM_WAVES * fitted) * np.sum(white**2, axis=0))
+    return replace(
+        setting, fixed=tuple(np.concatenate([f, w * scale], axis=1) for f, w in zip(setting.fixed, waves))
+    )
 
 
 def _through_each(rows: Rows, constants: Sequence[Constant], errors: Mapping[str, FloatArray]) -> FloatArray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,8 +17,9 @@ from fogml.gap.families.frame import (
     Whitening,
     fixed_columns,
     reading_errors,
+    with_form_errors,
 )
-from fogml.gap.families.linear_gaussian import Posterior, log_evidence
+from fogml.gap.families.linear_gaussian import LinearGaussian, Posterior, log_evidence
 from fogml.gap.families.making_rows import Unusable, rows_of
 from fogml.gap.families.noise_points import NoisePoints, first_noise, noise_points
 from fogml.gap.families.other_families import LINES
@@ -103,10 +105,15 @@ def infer(
     scene = Scene((*runs, *held), len(runs), model.grade, candidates=candidates_of(model))
     prior, source = prior_of(model, noise)
     setting = _setting(model, plant, scene, priors, prior.centre)
-    setting = _setting(model, plant, scene, priors, first_noise(setting, prior))
+    first = first_noise(setting, prior)
+    setting = _setting(model, plant, scene, priors, first)
+    length = _gap_length(setting, first)
+    priors = priors.reaching(length)
+    setting = with_form_errors(replace(setting, priors=priors), first, length)
     tell("fitting the noise")
     points = noise_points(setting, prior, source, noise, priors.hopeless)
     setting = _setting(model, plant, scene, priors, points.fit.model)
+    setting = with_form_errors(setting, points.fit.model, length)
     scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
     setting = replace(setting, scene=scene)
     tell("building families")
@@ -132,6 +139,14 @@ def infer(
             break
         points = points.within(priors.hopeless)
     return Inference(model, plant, setting, columns, points, search, tuple(rescored), (*unusable, *more))
+
+
+def _gap_length(setting: Setting, noise: NoiseModel) -> float:
+    """Whitened length of the gap beside the constants, above noise."""
+    whitening, fitted = Whitening(noise, setting), setting.scene.fitted
+    data = whitening.stacked([r.gap for r in setting.scene.runs[:fitted]])
+    left = LinearGaussian.of(data).beside(whitening.stacked(setting.fixed[:fitted])).gram(data[:, None])
+    return math.sqrt(max(float(left[0, 0]) - len(data), 0.0))
 
 
 def _nodes(explanations: Sequence[Explanation]) -> list[int]:

@@ -21,6 +21,8 @@ MIXES = (0.5, 0.0, 1.0, -0.5)
 """Shares of the outer face in a place's temperature: within, inner, outer, and beyond the inner one."""
 LAGS_S = (0.0, 600.0, 1800.0)
 """Lags of a place behind that [s]."""
+DIRECTION_DEGC_MIN = 0.05
+"""Rates under this are no direction."""
 COARSE_STEP_DEGC = 0.0101
 """Steps of a good sensor are no coarser: part of any recording."""
 SAME_DEGC = 0.3

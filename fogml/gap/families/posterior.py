@@ -161,7 +161,7 @@ def _alike(
     near = [
         (score, next(iter(held - rest)))
         for held, score in by_set.items()
-        if held > rest and len(held) == len(rest) + 1 and score > best.score - found.setting.priors.exchange
+        if held > rest and len(held) == len(rest) + 1 and score > best.score - found.setting.priors.alike
     ]
     others = [f for _, f in sorted(near, reverse=True) if f != family and families[f].kind == "known"]
     return [family, *others]

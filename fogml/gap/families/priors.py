@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -28,11 +28,15 @@ class Priors:
         one: a real cause is a distribution over forms, which is often narrow.
     least_size, greatest_size, sizes
         Whitened length of what a cause does: log-uniform, in so many values. Under 3 none can be told from
-        noise; from 60 on a prior makes no difference, whatever the size is.
+        noise; no cause makes more than all of the gap, and where that is longer than 60, values go on in the
+        same steps.
     plant_size
         Greatest whitened length of another plant: unbounded it would do what Shupe's effect does.
     beyond_range
         A size this many times the card's range is one standard deviation less likely, in its logarithm.
+    form_error
+        No form is known more exactly than to this share of its size: what a few per cent of a large gap are
+        like is nobody's knowledge.
     most_causes
         Of one explanation: more than four have not been told apart by any run.
     beam
@@ -40,7 +44,8 @@ class Priors:
     hopeless
         Explanations this far behind the best are not gone on from [nats].
     exchange
-        Members of a class cost less than this to be exchanged [nats]: one in twenty.
+        Members of a class cost less than this to be exchanged, as far as evidence is trusted [nats]: one in
+        twenty.
     trust, doubt
         Logarithms of odds are multiplied by the first, since no form is quite known; those of known causes
         against something unknown are then less the second, since what is unknown has more forms than families
@@ -67,6 +72,7 @@ class Priors:
     sizes: int = 6
     plant_size: float = 8.0
     beyond_range: float = 3.0
+    form_error: float = 0.04
     most_causes: int = 4
     beam: int = 6
     hopeless: float = 12.0
@@ -83,6 +89,18 @@ class Priors:
     def lengths(self) -> FloatArray:
         """The values of a cause's size, shape (sizes,)."""
         return np.geomspace(self.least_size, self.greatest_size, self.sizes)
+
+    def reaching(self, length: float) -> Priors:
+        """With sizes that go on, in the same steps, to a whitened length."""
+        step = math.log(self.greatest_size / self.least_size) / (self.sizes - 1)
+        more = max(math.ceil(math.log(max(length, 1.0) / self.greatest_size) / step), 0)
+        greatest = self.greatest_size * math.exp(more * step)
+        return replace(self, greatest_size=greatest, sizes=self.sizes + more)
+
+    @property
+    def alike(self) -> float:
+        """Members of a class cost less than this to be exchanged [nats of evidence]."""
+        return self.exchange / self.trust
 
     @property
     def plant_lengths(self) -> FloatArray:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from functools import partial
 
 import numpy as np
 
 from fogml.gap.families.family import Block, Family
-from fogml.gap.families.places import Scene, lag, rate
-from fogml.gap.families.rows import Rows, slopes, through_nominal
+from fogml.gap.families.places import DIRECTION_DEGC_MIN, Scene, lag, rate
+from fogml.gap.families.rows import Rows
 from fogml.gap.families.thermal_families import bumps
+from fogml.gap.families.unknown_readings import reading_errors, reading_errors_in_time
 from fogml.runs.run import FloatArray
 from fogml.signals.recursions import play_kernel
 
@@ -28,8 +30,9 @@ LINES, LINE_WEIGHT = 3, 0.01
 """One line among as many as a run of some hours holds between its start and its rows."""
 BETWEEN = (("T_out", "T_in"), ("T_case", "T_in"), ("T_chamber", "T_in"), ("T_electronics", "T_in"))
 """Places whose difference may drive something."""
-DIRECTION_DEGC_MIN = 0.05
-"""Rates under this are no direction."""
+STARTS_S = (30.0, 30000.0)
+"""From when to when after the start something may be settling [s]."""
+A_READING = "is an error of a thermometer, of no known kind"
 Constants = Mapping[str, float]
 
 
@@ -108,21 +111,6 @@ def _differences(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Blo
         yield Block(rows.of(np.column_stack([levels, *late])))
 
 
-def _readings(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """Any error of the thermometers through the nominal: smooth in time, by temperature, by direction."""
-    told, time = slopes(rows, constants), rows.even.time
-    phase = np.pi * (time - time[0]) / max(float(time[-1] - time[0]), 1.0)
-    for names in (("T", "T_in"), ("T_out",)):
-        own = [n for n in names if n in rows.readings]
-        errors = {}
-        for name in own:
-            x = rows.even.temperatures[name]
-            levels = bumps(x, *scene.range_degc, 5)
-            ways = np.tanh(rate(time, x) / DIRECTION_DEGC_MIN)[:, None]
-            errors[name] = np.column_stack([np.cos(phase[:, None] * np.arange(1, 13)), levels, ways * levels])
-        yield Block(through_nominal(rows, told, errors) if own else np.zeros((len(rows), 22)))
-
-
 def _excursion(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     x = rows.even.temperature("T")
     low, high = scene.range_degc
@@ -180,22 +168,32 @@ def _of_candidates() -> set[str]:
 
 
 def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
-    """Lines that stand out, as strong as temperature, its direction, the table or time make them."""
+    """Lines that stand out: steady, while the table turns, as temperature or time make them strong."""
     time = rows.time_s
     phase = np.pi * (time - time[0]) / max(float(time[-1] - time[0]), 1.0)
     direction = np.tanh(rows.of(rate(rows.even.time, rows.even.temperature("T"))) / DIRECTION_DEGC_MIN)
-    strength = [
+    strengths = [
         np.ones(len(time)),
         (np.abs(rows.of(rows.even.table_rate)) > 0.0).astype(np.float64),
         (rows.temperature - scene.range_degc[0]) / scene.span_degc,
         direction,
-        *(np.cos(k * phase) for k in (1.0, 2.0, 3.0)),
     ]
+    any_of = [*strengths, *(np.cos(k * phase) for k in (1.0, 2.0, 3.0))]
     for frequency in scene.lines_hz[:LINES]:
         turn = 2.0 * np.pi * frequency * time
         waves = np.column_stack([wave(h * turn) for h in (1.0, 2.0) for wave in (np.sin, np.cos)])
-        columns = [s[:, None] * waves for s in strength]
-        yield Block(np.concatenate(columns, axis=1), {"period": 1.0 / frequency}, LINE_WEIGHT)
+        held = {"period": 1.0 / frequency}
+        for strength in strengths:
+            yield Block(strength[:, None] * waves, held, LINE_WEIGHT / len(strengths))
+        yield Block(np.concatenate([s[:, None] * waves for s in any_of], axis=1), held, LINE_WEIGHT)
+
+
+def _start(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """Any course since power-on, or since the run began where that is not known, at its own pace."""
+    on = rows.even.powered_on_s
+    since = rows.time_s - (on if math.isfinite(on) else float(rows.even.time[0]))
+    pace = np.log10(np.maximum(since, STARTS_S[0]))
+    yield Block(bumps(pace, math.log10(STARTS_S[0]), math.log10(STARTS_S[1]), 8))
 
 
 def unknown_families() -> tuple[Family, ...]:
@@ -222,8 +220,11 @@ def unknown_families() -> tuple[Family, ...]:
         Family("excursion", "unknown", _excursion, "remembers how far and how often temperature went"),
         Family("events", "unknown", _events, "follows turns, starts and ends of changes of temperature"),
         Family("differences", "unknown", _differences, "goes with how much warmer one place is than another"),
-        Family("readings", "unknown", _readings, "is an error of a thermometer, of no known kind"),
+        Family("readings", "unknown", reading_errors, A_READING),
+        Family("reading_times", "unknown", reading_errors_in_time, A_READING, True),
         Family("lines", "unknown", _lines, "is a line that comes and goes", True),
+        Family("line", "unknown", _lines, "is a line"),
+        Family("start", "unknown", _start, "goes with the time since the start"),
         Family("table", "unknown", _table, "goes with the table's rate or angle"),
         Family("recorded", "unknown", _recorded, "goes with something else that is recorded"),
     )
