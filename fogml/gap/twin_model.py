@@ -30,7 +30,7 @@ class TwinModel:
     memory_s = 2.0 * DELTA_WINDOW_S
 
     def __init__(self, twin: Twin, lacks: Iterable[str] = ()) -> None:
-        self.twin, self._lacks = twin, frozenset(lacks)
+        self.twin, self.lacks = twin, frozenset(lacks)
         self.name = twin.name
         self.grade = twin.grade
 
@@ -52,7 +52,7 @@ class TwinModel:
         return {
             id: AS_CANDIDATE[id](declared) if id in AS_CANDIDATE else declared
             for id, declared in effects().items()
-            if declared.candidate and id not in on | self._lacks and not on & set(declared.conflicts)
+            if declared.candidate and id not in on | self.lacks and not on & set(declared.conflicts)
         }
 
     def on(self, run: Run) -> TwinOnRun:

@@ -9,8 +9,10 @@ import numpy as np
 from scipy.special import expit
 
 from fogml.gap.families.card import card_of
+from fogml.gap.families.closing import Foretold
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.posterior import Judgement, at_cost
+from fogml.gap.families.repeating import repeat_run
 from fogml.gap.how_far_result import Rehearsed
 from fogml.gap.model import EffectValue
 from fogml.gap.result import NAMED, Found, SeparatingRun
@@ -34,15 +36,22 @@ def next_run(
     judged: Judgement,
     items: Sequence[Found],
     undetectable: Sequence[str],
+    unknown: bool,
     seed: int,
     tell: Callable[[str], None],
 ) -> SeparatingRun | None:
     """The programme that tells the members of the most probable class of several apart.
 
-    Where each named effect stands alone, the one that shows what these runs could not. None where there is
-    nothing to tell, no programme does, or the model can't simulate one.
+    Where each named effect stands alone and something `unknown` acts, the one that tells what that goes with;
+    else the one that shows what these runs could not. None where there is nothing to tell, no programme does,
+    or the model can't simulate one.
     """
     setting = found.setting
+    several = any(f.named and len(f.members) > 1 for f in items)
+    if unknown and not several:
+        repeat = repeat_run(found, Foretold.of(found, judged.best.members, judged.best.members))
+        if repeat is not None:
+            return repeat
     if not isinstance(found.model, TwinModel):
         return None
     twin, noise = found.model.twin, found.field.whitening.noise

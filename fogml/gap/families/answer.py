@@ -12,6 +12,7 @@ from fogml.gap.families.ahead import next_run, rehearse
 from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause, shares
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.inference import Inference, Progress, infer
+from fogml.gap.families.left_out import doubted
 from fogml.gap.families.own_simulator import candidates_of
 from fogml.gap.families.posterior import Cause, Judgement, at_cost, judge
 from fogml.gap.families.priors import Priors
@@ -110,7 +111,8 @@ def diagnose(
         judged = judge(found)
         answer = _answer(found, judged, noise, part, seed, cost_of_false_name)
         if plan:
-            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell)
+            open_ = answer.verdict in ("unknown", "partly_explained")
+            run = next_run(found, judged, answer.found, answer.undetectable, open_, seed, tell)
             answer = replace(answer, separating_run=run)
         if rehearsed:
             tell("rehearsing each candidate")
@@ -124,7 +126,6 @@ def _answer(
     scene = found.setting.scene
     shifted = [at_cost(c.probability, cost) for c in judged.causes]
     named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
-    verdict = _verdict(named, judged)
     recalibrated = Foretold.of(found, (), ())
     every = Foretold.of(found, judged.best.members, judged.best.members)
     counted = [m for c in named for m in c.members]
@@ -149,7 +150,8 @@ def _answer(
     evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
     what_if = _what_if(found, named, held_out)
     nearest = _nearest(found, what_if, judged)
-    unknown = Unknown(judged.unknown, looks_like(found, judged), 0.0)
+    unknown = doubted(Unknown(judged.unknown, looks_like(found, judged), 0.0), items)
+    verdict = _verdict(named, unknown, judged.nothing)
     shown = () if verdict == "unknown" else tuple(f for f in items)
     from fogml.gap.noise import Noise
 
@@ -182,7 +184,7 @@ def _answer(
         method=FAMILIES,
         what_if=what_if,
         nearest=nearest,
-        headline=headline(found, judged, verdict, shown, nearest, far, lies.segments),
+        headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments),
     )
 
 
@@ -192,12 +194,12 @@ def _constants_alone(every: Foretold, run: int) -> FloatArray:
     return np.asarray(every.design(run)[:, :count] @ every.posterior.mean[:count])
 
 
-def _verdict(named: Sequence[Cause], judged: Judgement) -> Verdict:
-    if named and judged.unknown >= 0.5:
+def _verdict(named: Sequence[Cause], unknown: Unknown, nothing: float) -> Verdict:
+    if named and unknown.probability >= 0.5:
         return "partly_explained"
     if named:
         return "explained" if all(len(c.ids) == 1 for c in named) else "ambiguous"
-    return "unknown" if judged.unknown >= 0.5 or judged.nothing < SURELY_NOT_NOTHING else "no_gap"
+    return "unknown" if unknown.probability >= 0.5 or nothing < SURELY_NOT_NOTHING else "no_gap"
 
 
 def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOut]) -> tuple[WhatIf, ...]:

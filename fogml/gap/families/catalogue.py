@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Literal
 
 from fogml.gap.families import other_families as other
 from fogml.gap.families import thermal_families as thermal
@@ -52,18 +53,18 @@ def families_of(twin: Twin, scene: Scene, without: Iterable[str] = ()) -> tuple[
     """
     left_out = set(without)
     known = [
-        _known(declared)
+        _known(declared, "left_out" if id in left_out else "known")
         for id, declared in scene.candidates.items()
-        if id not in left_out and _can_show(declared, scene, twin)
+        if _can_show(declared, scene, twin)
     ]
     return (*known, *unknown_families(), Family("other_plant", "plant", other.other_plant))
 
 
-def _known(declared: Effect) -> Family:
+def _known(declared: Effect, kind: Literal["known", "left_out"]) -> Family:
     build = FAMILIES.get(declared.family) or other.signature_of(declared)
     return Family(
         declared.id,
-        "known",
+        kind,
         build,
         drawn_per_run=declared.drawn_per_run or declared.family == "line",
         place=declared.place,

@@ -16,7 +16,7 @@ from fogml.gap.families.posterior import Cause, Judgement
 from fogml.gap.families.search import Member
 from fogml.gap.how_far_result import Onset
 from fogml.gap.model import EffectValue
-from fogml.gap.result import Estimate, Found, RunAmplitude
+from fogml.gap.result import NAMED, Estimate, Found, RunAmplitude
 from fogml.runs.run import FloatArray
 
 SHOWN = 9.0
@@ -89,6 +89,7 @@ def found_cause(
         place=declared.place,
         times_usual=abs(card.value.amplitude) / high,
         log_odds=(cause.odds, cause.within),
+        left_out=cause.left_out if probability >= NAMED else (),
     )
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
+from fogml.gap.families.noise_points import white_noise
+from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
 from fogml.gap.how_far_result import HowFar
+from fogml.gap.noise import UNIT_FACTOR
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
@@ -105,11 +109,13 @@ class HeldOut:
         self.run, self.rows = run, found.setting.scene.runs[run]
         self._rng = np.random.default_rng([seed, run])
         self._windows = windows = averages(self.rows)
-        model = found.field.whitening.noise
+        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise)
         self._before = _square(windows.of(self.rows.gap))
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
-        models = found.points.fit.draw(self._rng, DRAWS)
+        as_much = model.N / found.field.whitening.noise.N
+        drawn = found.points.fit.draw(self._rng, DRAWS)
+        models = [replace(m, N=as_much * m.N) for m in drawn]
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
         self._noises = self._drawn(model, None)
         level = self._recalibrated - self._noises.mean() > Z90 * float(np.std(self._noises))
@@ -149,6 +155,8 @@ class HeldOut:
             drawn = closing / np.maximum(rec - self._floors[None, :], LEAST_GAP * gap)
             low, high = np.quantile(drawn, (0.05, 0.95))
             interval = min(float(low), closed), max(float(high), closed)
+        if self._noisier:
+            note = f"{self._noisier}{'; ' if note else ''}{note}"
         return HowFar(
             run=self.rows.run.name,
             averaging_s=windows.window_s,
@@ -160,6 +168,18 @@ class HeldOut:
             closed_ci90=interval,
             note=note,
         )
+
+
+def _own_noise(rows: Rows, model: NoiseModel) -> tuple[NoiseModel, str]:
+    """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
+    own, usual = white_noise(rows), model.N
+    # The median of second differences of m rows is told to about 1.4 over the root of m.
+    chance = 3.0 * 1.4 / math.sqrt(len(rows))
+    if abs(math.log(max(own, 1e-12) / usual)) < max(chance, math.log(UNIT_FACTOR)):
+        return model, ""
+    apart = f"{own / usual:.2g} times" if own > usual else f"only {own / usual:.2g} times"
+    said = f"white noise of this run is {apart} that of the others; its floor is its own"
+    return replace(model, N=own), said
 
 
 def _square(values: FloatArray) -> float:

@@ -39,7 +39,8 @@ class Family:
     id
         The effect's; of an unknown cause what it looks like.
     kind
-        ``known`` may be named, ``unknown`` and ``plant`` may not.
+        ``known`` may be named, ``unknown`` and ``plant`` may not; what is ``left_out`` by the user
+        takes no part, and is asked whether it looks like what is named.
     build
         Its blocks on a run.
     words
@@ -51,7 +52,7 @@ class Family:
     """
 
     id: str
-    kind: Literal["known", "unknown", "plant"]
+    kind: Literal["known", "unknown", "plant", "left_out"]
     build: Build
     words: str = ""
     drawn_per_run: bool = False

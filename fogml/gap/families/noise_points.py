@@ -12,6 +12,7 @@ import numpy as np
 
 from fogml.gap.families.frame import Columns, Field, Setting
 from fogml.gap.families.linear_gaussian import LinearGaussian, size_gains
+from fogml.gap.families.rows import Rows
 from fogml.gap.families.unknown import unknown_families
 from fogml.gap.noise import UNIT_FACTOR
 from fogml.runs.run import FloatArray, Run
@@ -119,11 +120,14 @@ def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
 
 def _glance(setting: Setting) -> float:
     """Coefficient N from second differences of neighbouring rows."""
-    found = []
-    for rows in setting.scene.runs[: setting.scene.fitted]:
-        second = np.abs(np.diff(rows.gap, 2))
-        found.append(float(np.median(second)) / _MEDIAN / np.sqrt(6.0) * np.sqrt(rows.row_s / 3600.0))
+    found = [white_noise(rows) for rows in setting.scene.runs[: setting.scene.fitted]]
     return max(float(np.median(found)), 1e-9)
+
+
+def white_noise(rows: Rows) -> float:
+    """Coefficient N of one run from second differences of neighbouring rows, by their median."""
+    second = np.abs(np.diff(rows.gap, 2))
+    return float(np.median(second)) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
 
 
 def _score(setting: Setting, columns: Columns, noise: NoiseModel) -> float:

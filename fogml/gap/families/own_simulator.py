@@ -119,7 +119,7 @@ def candidates_of(model: GyroModel) -> dict[str, Effect]:
 
     catalogue = {id: declared for id, declared in effects().items() if declared.candidate}
     if isinstance(model, TwinModel):
-        return catalogue
+        return {id: declared for id, declared in catalogue.items() if id not in model.lacks}
     offered = dict(model.candidates())
     return {id: _declared(c, catalogue.get(id)) for id, c in offered.items()} if offered else catalogue
 

@@ -34,6 +34,8 @@ class Cause:
         That it, or another known cause in its place, acts, by the evidence alone.
     doubted
         What of that is not believed.
+    left_out
+        Effects that were taken off the candidates and look like it.
     """
 
     members: tuple[Member, ...]
@@ -43,6 +45,7 @@ class Cause:
     carried: float
     known: float
     doubted: float = 0.0
+    left_out: tuple[str, ...] = ()
 
     @property
     def member(self) -> Member:
@@ -112,6 +115,7 @@ def judge(found: Inference) -> Judgement:
         causes.append(
             replace(
                 cause,
+                left_out=_left_out(found, best, f),
                 probability=believed * _chance(priors.trust * cause.within),
                 doubted=max(cause.known - believed, 0.0),
             )
@@ -165,6 +169,15 @@ def _alike(
     ]
     others = [f for _, f in sorted(near, reverse=True) if f != family and families[f].kind == "known"]
     return [family, *others]
+
+
+def _left_out(found: Inference, best: Explanation, family: int) -> tuple[str, ...]:
+    """Effects that are no candidates, and that these runs don't tell from one of the likeliest set."""
+    search = found.search
+    others = search.instead(best, family, search.families_of("left_out"))
+    asked = best.log_prior + best.log_evidence - found.setting.priors.alike
+    near = [f for f, e in others.items() if e.log_prior + e.log_evidence > asked]
+    return tuple(found.columns.families[f].id for f in near)
 
 
 def carries(found: Inference, explanation: Explanation) -> float:

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
 
 from typing import TYPE_CHECKING
 
-from fogml.gap.how_far_result import HowFar, Nearest
-from fogml.gap.result import Found, Verdict
+from fogml.gap.how_far_result import HowFar, Nearest, Onset
+from fogml.gap.result import Found, Unknown, Verdict
 from fogml.gap.where_result import GapSegment
 
 if TYPE_CHECKING:
@@ -199,15 +199,28 @@ def looks_like(found: Inference, judged: Judgement) -> str:
     for e, w in zip(judged.explanations, judged.weights):
         for m in e.members:
             if families[m.family].kind == "unknown":
-                weights[families[m.family].words] = weights.get(families[m.family].words, 0.0) + float(w)
+                between = found.columns.nodes[m.node].shape.get("between")
+                words = families[m.family].words + (f", {between}" if between else "")
+                weights[words] = weights.get(words, 0.0) + float(w)
     if judged.unknown < 0.05 or not weights:
         return ""
     return max(weights, key=weights.__getitem__)
 
 
+def _since(found: Inference, onset: Onset) -> str:
+    """When something began: between two runs, or within one."""
+    scene = found.setting.scene
+    order = sorted(range(scene.fitted), key=lambda i: scene.begun_s[i])
+    names = [scene.runs[i].run.name for i in order]
+    at = names.index(onset.run)
+    if at and onset.time_s <= float(scene.runs[order[at]].time_s[0]):
+        return f"began between {names[at - 1]} and {onset.run}"
+    return f"acts from {onset.run} on, {onset.time_s:.0f} s into it"
+
+
 def headline(
     found: Inference,
-    judged: Judgement,
+    unknown: Unknown,
     verdict: Verdict,
     shown: Sequence[Found],
     nearest: Sequence[Nearest],
@@ -227,16 +240,18 @@ def headline(
         look = f"; look at the {f.place}" if f.place else ""
         said.append(f"{title}{others}: {f.probability:.0%} probable, {size}{usual}{share}{look}.")
         if f.onset is not None:
-            said.append(
-                f"{title} acts from {f.onset.run} on, {f.onset.time_s:.0f} s into it, and not before."
-            )
+            said.append(f"{title} {_since(found, f.onset)}, and not before.")
         if f.grows is not None:
             way = "grows" if f.grows * f.amplitude.value > 0.0 else "fades"
             said.append(f"{title} {way} from run to run, by {abs(f.grows):.2g} {f.amplitude.unit} a day.")
         elif not f.consistent and len(f.by_run) > 1:
             said.append(f"{title}: the runs do not agree in its size.")
+    for f in (f for f in shown if f.left_out):
+        said.append(
+            f"{titles[f.effect].title} may as well be {', '.join(f.left_out)}, left out of the candidates."
+        )
     if verdict in ("unknown", "partly_explained"):
-        like = looks_like(found, judged)
+        like = unknown.looks_like
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
             if n.share >= 0.2:
@@ -258,4 +273,6 @@ def headline(
             said.append(f"{h.run}: {h.note}.")
         elif any(f.named for f in shown):
             said.append(f"{h.run}: {h.closed:.0%} of the gap closes{' — ' + h.note if h.note else ''}.")
+        elif h.note:
+            said.append(f"{h.run}: {h.note}.")
     return tuple(said)

@@ -182,6 +182,11 @@ class Search:
                 break
         return sets
 
+    def instead(self, explanation: Explanation, family: int, others: Sequence[int]) -> dict[int, Explanation]:
+        """The set with a known family exchanged for each of some others."""
+        rest = self.without(explanation, {family})
+        return {f: self._refined(e) for f, e in self._each_more(rest, others).items()} if others else {}
+
     def families_of(self, kind: str) -> list[int]:
         """Families of a kind that have blocks."""
         return [f for f in self.blocks.rows if self.families[f].kind == kind]
@@ -216,7 +221,11 @@ class Search:
         return self.blocks.rows[f].stop - self.blocks.rows[f].start
 
     def _with_one_more(self, explanation: Explanation) -> list[Explanation]:
-        joining = [f for f in self.blocks.rows if self._may_join(explanation, f)]
+        joining = [
+            f
+            for f in self.blocks.rows
+            if self.families[f].kind != "left_out" and self._may_join(explanation, f)
+        ]
         return list(self._each_more(explanation, joining).values())
 
     def _each_more(self, explanation: Explanation, joining: Sequence[int]) -> dict[int, Explanation]:
@@ -294,9 +303,13 @@ class Search:
         return across, self._fits[span] - across.T @ held.along
 
     def _log_odds(self) -> FloatArray:
-        count = {kind: sum(f.kind == kind for f in self.families) for kind in ("known", "unknown", "plant")}
+        kinds = ("known", "unknown", "plant", "left_out")
+        count = {kind: sum(f.kind == kind for f in self.families) for kind in kinds}
+        # What is left out is as likely as any candidate.
+        count["left_out"] = count["known"] = max(count["known"], 1)
         mass = {
             "known": self.priors.expected_causes,
+            "left_out": self.priors.expected_causes,
             "unknown": self.priors.unknown,
             "plant": self.priors.other_plant,
         }

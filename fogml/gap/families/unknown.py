@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 
@@ -167,6 +168,28 @@ def _of_candidates() -> set[str]:
     return {name for declared in effects().values() if declared.candidate for name in declared.needs}
 
 
+def _between(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
+    """Constants that changed between one run and the next: each alone, or all of them."""
+    order = sorted(range(scene.fitted), key=lambda i: scene.begun_s[i])
+    begun = scene.begun_s[scene.runs.index(rows)]
+    for before, after in pairwise(order):
+        later = begun >= scene.begun_s[after]
+        columns = rows.constants / _usual(scene) * float(later)
+        held = {"between": f"{scene.runs[before].run.name} and {scene.runs[after].run.name}"}
+        weight = 1.0 / (scene.fitted - 1)
+        yield Block(columns, held, weight)
+        for column in columns.T:
+            yield Block(column[:, None], held, weight / columns.shape[1])
+
+
+def _usual(scene: Scene) -> FloatArray:
+    """Root mean squares of the responses to constants on the fit runs, shape (c,)."""
+    if "responses" not in scene.cache:
+        every = np.concatenate([r.constants for r in scene.runs[: scene.fitted]])
+        scene.cache["responses"] = np.maximum(np.sqrt(np.mean(every**2, axis=0)), 1e-12)
+    return np.asarray(scene.cache["responses"])
+
+
 def _lines(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Lines that stand out: steady, while the table turns, as temperature or time make them strong."""
     time = rows.time_s
@@ -224,6 +247,7 @@ def unknown_families() -> tuple[Family, ...]:
         Family("reading_times", "unknown", reading_errors_in_time, A_READING, True),
         Family("lines", "unknown", _lines, "is a line that comes and goes", True),
         Family("line", "unknown", _lines, "is a line"),
+        Family("between", "unknown", _between, "comes of constants that changed between two runs"),
         Family("start", "unknown", _start, "goes with the time since the start"),
         Family("table", "unknown", _table, "goes with the table's rate or angle"),
         Family("recorded", "unknown", _recorded, "goes with something else that is recorded"),
