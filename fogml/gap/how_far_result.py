@@ -38,6 +38,21 @@ class WhatIf:
 
 
 @dataclass(frozen=True)
+class CauseShare:
+    """A cause's share of what all of them take away of the gap's energy: in all, on a run, or in a regime.
+
+    ``effect`` is ``unknown`` for whatever is not known. Shares of one run or regime add to 1; where causes
+    cancel, one may be negative.
+    """
+
+    effect: str
+    run: str | None
+    regime: str | None
+    share: float
+    ci90: tuple[float, float]
+
+
+@dataclass(frozen=True)
 class Nearest:
     """A known family, how much of the gap's energy it holds alone, and how probable it is."""
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.confidence import Support
-from fogml.gap.how_far_result import HowFar, Nearest, Onset, Rehearsed, WhatIf
+from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehearsed, WhatIf
 from fogml.gap.model import EffectValue, GyroModel, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
@@ -263,6 +263,8 @@ class Diagnosis:
         Sentences that say the result.
     rehearsal
         What these runs would name of each candidate, where that was asked for.
+    shares
+        Of the gap's energy: of each cause in all, by run and by regime.
     method
         What answered: ``diagnosis`` or ``families``.
     """
@@ -291,6 +293,7 @@ class Diagnosis:
     nearest: tuple[Nearest, ...] = ()
     headline: tuple[str, ...] = ()
     rehearsal: tuple[Rehearsed, ...] = ()
+    shares: tuple[CauseShare, ...] = ()
     method: str = "diagnosis"
 
     @property

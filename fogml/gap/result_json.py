@@ -46,6 +46,7 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "what_if": [_plain(asdict(item)) for item in diagnosis.what_if],
         "nearest": [_plain(asdict(item)) for item in diagnosis.nearest],
         "headline": list(diagnosis.headline),
+        "shares": [_plain(asdict(item)) for item in diagnosis.shares],
         "rehearsal": [_plain(asdict(item)) for item in diagnosis.rehearsal],
         "assumed": list(diagnosis.assumed),
     }

@@ -36,9 +36,9 @@ def next_run(
     judged: Judgement,
     items: Sequence[Found],
     undetectable: Sequence[str],
-    unknown: bool,
     seed: int,
     tell: Callable[[str], None],
+    unknown: bool = False,
 ) -> SeparatingRun | None:
     """The programme that tells the members of the most probable class of several apart.
 

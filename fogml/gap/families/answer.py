@@ -9,7 +9,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.families.ahead import next_run, rehearse
-from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause, shares
+from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.inference import Inference, Progress, infer
 from fogml.gap.families.left_out import doubted
@@ -26,6 +26,7 @@ from fogml.gap.families.reports import (
     series_of,
     stage_energies,
 )
+from fogml.gap.families.shares import cause_shares
 from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.model import GyroModel
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
@@ -112,7 +113,7 @@ def diagnose(
         answer = _answer(found, judged, noise, part, seed, cost_of_false_name)
         if plan:
             open_ = answer.verdict in ("unknown", "partly_explained")
-            run = next_run(found, judged, answer.found, answer.undetectable, open_, seed, tell)
+            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_)
             answer = replace(answer, separating_run=run)
         if rehearsed:
             tell("rehearsing each candidate")
@@ -134,10 +135,11 @@ def _answer(
     after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
     structural = [r.gap - recalibrated.on(i) for i, r in enumerate(scene.runs)]
     energies = {m: energy(found, every, m) for m in judged.best.members}
-    share = shares(energies)
+    shares = cause_shares(found, judged, every, recalibrated, seed)
+    share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
     cards = cards_of(found, judged)
     items = tuple(
-        found_cause(found, every, c, p, cards[c.ids[0]], sum(share.get(m, 0.0) for m in c.members))
+        found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
         for c, p in zip(judged.causes, shifted)
         if p >= LISTED
     )
@@ -184,6 +186,7 @@ def _answer(
         method=FAMILIES,
         what_if=what_if,
         nearest=nearest,
+        shares=shares,
         headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments),
     )
 

@@ -167,9 +167,3 @@ def energy(found: Inference, every: Foretold, member: Member) -> float:
     """Squares of what a cause makes on the fit runs [(deg/h)^2]."""
     parts: list[FloatArray] = [every.of_member(i, member) for i in range(found.setting.scene.fitted)]
     return float(sum(np.sum((p - p.mean()) ** 2) for p in parts))
-
-
-def shares(energies: Mapping[Member, float]) -> dict[Member, float]:
-    """Energies over their sum."""
-    total = sum(energies.values())
-    return {m: e / total for m, e in energies.items()} if total > 0.0 else {}

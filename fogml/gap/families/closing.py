@@ -74,20 +74,28 @@ class Foretold:
 
     def of_member(self, run: int, member: Member) -> FloatArray:
         """What one cause makes on a run [deg/h], shape (m,)."""
+        return self.part(run, member, self.posterior.mean)
+
+    def part(self, run: int, member: Member, coefficients: FloatArray) -> FloatArray:
+        """What one cause makes at coefficients of shape (q, ...), shape (m, ...)."""
         at = self.found.field.fixed.shape[1]
         for m in self.members:
             width = self.found.field.block(m.node).shape[1]
             if m is member:
-                return np.asarray(self.design(run)[:, at : at + width] @ self.posterior.mean[at : at + width])
+                return np.asarray(self.design(run)[:, at : at + width] @ coefficients[at : at + width])
             at += width
         raise ValueError("not a member")
 
-    def draws(self, run: int, rng: np.random.Generator) -> FloatArray:
-        """What coefficients drawn from the posterior foretell, shape (m, draws)."""
+    def drawn(self, rng: np.random.Generator) -> FloatArray:
+        """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""
         values, vectors = np.linalg.eigh(self.posterior.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        drawn = self.posterior.mean[:, None] + root @ rng.standard_normal((len(values), DRAWS))
-        return np.asarray(self.design(run) @ drawn)
+        off = np.concatenate([np.zeros((len(values), 1)), rng.standard_normal((len(values), DRAWS))], axis=1)
+        return np.asarray(self.posterior.mean[:, None] + root @ off)
+
+    def draws(self, run: int, rng: np.random.Generator) -> FloatArray:
+        """What coefficients drawn from the posterior foretell, shape (m, draws)."""
+        return np.asarray(self.design(run) @ self.drawn(rng)[:, 1:])
 
 
 class HeldOut:

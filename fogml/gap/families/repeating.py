@@ -100,15 +100,18 @@ def _steps(rows: Rows) -> list[str]:
     while len(corners) > MOST_STEPS:
         wider *= 1.5
         corners = _corners(time, x, wider)
-    said, at = [], _start(rows)
+    said: list[str] = []
+    at, soaked = _start(rows), 0.0
     for one, other in pairwise(corners):
-        minutes, to = (time[other] - time[one]) / 60.0, float(round(float(x[other]), 1))
+        minutes, to = float(time[other] - time[one]) / 60.0, float(round(float(x[other]), 1))
         if abs(to - at) < wider:
-            said.append(f"soak at {at:g} degC for {max(minutes, 1.0):.0f} min")
+            soaked += minutes
             continue
-        said.append(f"ramp to {to:g} degC at {max(abs(to - at) / max(minutes, 1e-6), 1e-3):.3g} degC/min")
-        at = to
-    return said
+        if soaked:
+            said.append(f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min")
+        said.append(f"ramp to {to:g} degC at {abs(to - at) / minutes:.3g} degC/min")
+        at, soaked = to, 0.0
+    return [*said, f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min"]
 
 
 def _corners(time: FloatArray, x: FloatArray, within: float) -> Sequence[int]:

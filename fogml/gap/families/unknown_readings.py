@@ -15,7 +15,7 @@ from fogml.signals.recursions import play_kernel
 
 GROUPS = (("T", "T_in"), ("T_out",))
 """Sensors that err apart."""
-SLACK_DEGC = (0.1, 0.3, 1.0, 3.0)
+SLACK_DEGC = (0.1, 0.3, 1.0, 3.0, 10.0)
 """What a sensor that sticks has to move by before it moves on."""
 HEALS_S = (1800.0, 7200.0, 30000.0)
 STEPS, SINGLE_STEPS, WAVES = 20, 12, 12
@@ -26,7 +26,7 @@ def reading_errors(rows: Rows, scene: Scene, constants: Constants) -> Iterator[B
     """Errors that go with temperature, its direction or its past: the same on every run."""
     for group in GROUPS:
         of_each = {n: _of_temperature(rows, scene, n) for n in group if n in rows.readings}
-        for columns in _through(rows, constants, of_each, (10, 20, *(1 for _ in SLACK_DEGC))):
+        for columns in _through(rows, constants, of_each, (10, 20, *(1 for _ in 2 * SLACK_DEGC))):
             yield Block(columns)
 
 
@@ -52,7 +52,12 @@ def _of_temperature(rows: Rows, scene: Scene, name: str) -> list[FloatArray]:
     ways = np.tanh(rate(time, x) / DIRECTION_DEGC_MIN)[:, None]
     spent = np.cumsum(levels, axis=0) / len(levels)
     healing = [lag(time, level, s) for level in levels.T for s in HEALS_S]
-    stuck = [(play_kernel(x, slack, np.nan)[0] - x)[:, None] / slack for slack in SLACK_DEGC]
+    # What a sensor that sticks would have read is near what another place did.
+    other = rows.even.temperature("T_out" if name != "T_out" and "T_out" in rows.readings else "T_case")
+    ways_stuck = [
+        (play_kernel(np.ascontiguousarray(y), s, np.nan)[0] - y) / s for y in (x, other) for s in SLACK_DEGC
+    ]
+    stuck = [way[:, None] for way in ways_stuck]
     return [np.column_stack([levels, ways * levels]), np.column_stack([spent, *healing]), *stuck]
 
 
