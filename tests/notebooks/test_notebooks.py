@@ -42,7 +42,7 @@ def test_notebook_runs(path: Path, kernel: Any) -> None:
         notebook = nbformat.read(path, as_version=4)
         # Nothing of the notebook before is there.
         notebook.cells.insert(0, nbformat.v4.new_code_cell("%reset -f"))
-        client = NotebookClient(notebook, km=kernel, timeout=300)
+        client = NotebookClient(notebook, km=kernel, timeout=1800)
         try:
             client.execute()
         finally:
@@ -50,4 +50,6 @@ def test_notebook_runs(path: Path, kernel: Any) -> None:
     printed = [out for cell in notebook.cells if cell.cell_type == "code" for out in cell.outputs]
     assert printed
     assert not any(out.output_type == "error" for out in printed)
+    shown = [out.data for out in printed if out.output_type in ("display_data", "execute_result")]
+    assert any("application/vnd.plotly.v1+json" in data for data in shown), "show a figure"
     assert not any(cell.get("outputs") for cell in stored.cells), "store notebooks without outputs"

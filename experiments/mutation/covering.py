@@ -1,0 +1,100 @@
+"""Which tests run which lines, measured once for a package: a plugin tells coverage whose turn it is."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from experiments.mutation.mutants import Mutant
+
+_TIMES = "FOGML_MUTATION_TIMES"
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Iterator[None]:
+    """Lines that run from here on are those of this test; its time is kept."""
+    import coverage
+
+    current = coverage.Coverage.current()
+    assert current is not None
+    current.switch_context(item.nodeid)
+    began = time.process_time()
+    result = yield
+    with open(os.environ[_TIMES], "a", encoding="utf-8") as file:
+        file.write(json.dumps([item.nodeid, time.process_time() - began]) + "\n")
+    return result
+
+
+@dataclass(frozen=True)
+class Covering:
+    """The tests of a package, measured: their times [s], and by file and line which of them run it."""
+
+    seconds: dict[str, float]
+    lines: dict[str, dict[int, list[str]]]
+
+    def tests_of(self, mutant: Mutant, most_s: float) -> list[str]:
+        """Tests that run a changed expression, else its file, the quickest first, `most_s` of time in all."""
+        by_line = self.lines.get(mutant.path, {})
+        touching = {test for line in range(mutant.first, mutant.last + 1) for test in by_line.get(line, ())}
+        touching = touching & self.seconds.keys() or {
+            test for tests in by_line.values() for test in tests if test in self.seconds
+        }
+        chosen: list[str] = []
+        spent = 0.0
+        for test in sorted(touching, key=lambda one: (self.seconds[one], one)):
+            spent += self.seconds[test]
+            if chosen and spent > most_s:
+                break
+            chosen.append(test)
+        return chosen
+
+
+def measured(root: Path, package: str, work: Path) -> Covering:
+    """What covers a package's files; measured if `work` does not hold it yet."""
+    from coverage import CoverageData
+
+    data, times = work / f"{package or 'root'}.coverage", work / f"{package or 'root'}.times"
+    if not (work / f"{package or 'root'}.done").exists():
+        for old in (data, times):
+            old.unlink(missing_ok=True)
+        _measure(root, tests_of_package(root, package), data, times)
+        (work / f"{package or 'root'}.done").touch()
+    held = CoverageData(str(data))
+    held.read()
+    lines: dict[str, dict[int, list[str]]] = {}
+    for name in held.measured_files():
+        path = Path(name)
+        if path.is_relative_to(root):
+            lines[path.relative_to(root).as_posix()] = held.contexts_by_lineno(name)
+    rows = [json.loads(line) for line in times.read_text(encoding="utf-8").splitlines()]
+    return Covering(dict(rows), lines)
+
+
+def tests_of_package(root: Path, package: str) -> list[str]:
+    """Where a package's own tests are."""
+    if package:
+        return [f"tests/{package}"]
+    return sorted(path.relative_to(root).as_posix() for path in (root / "tests").glob("test_*.py"))
+
+
+def _measure(root: Path, tests: list[str], data: Path, times: Path) -> None:
+    options = ["--data-file", str(data), "--source", str(root / "fogml")]
+    plugin = ["-p", "experiments.mutation.covering", "-p", "no:cacheprovider", "-q", *tests]
+    words = [sys.executable, "-m", "coverage", "run", *options, "-m", "pytest", *plugin]
+    done = subprocess.run(words, cwd=root, env=environment(root) | {_TIMES: str(times)}, check=False)
+    if done.returncode != 0:
+        raise SystemExit(f"{', '.join(tests)}: they fail without any change; mend that first")
+
+
+def environment(root: Path) -> dict[str, Any]:
+    """What tests of a tree run in: that tree's code, one thread."""
+    return {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}

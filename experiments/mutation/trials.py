@@ -1,0 +1,97 @@
+"""Each change made in a copy of the project, under the tests that cover it."""
+
+from __future__ import annotations
+
+import json
+import resource
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from experiments.mutation.covering import Covering, environment, measured
+from experiments.mutation.mutants import Mutant
+
+NOTICED, UNNOTICED, UNTESTED = "noticed", "unnoticed", "no test runs it"
+_SLOWER = 5.0
+"""A change that makes tests take so many times their time is noticed as well."""
+_SPARE_S = 120.0
+"""Processor time beside that, for imports and kernels to compile [s]."""
+_FAILED = (1, 2, 4)
+"""Statuses of pytest: a test failed, a module could not be loaded, and so named tests were not found."""
+
+
+def copied(root: Path, work: Path) -> Path:
+    """A copy of what the tests need, to be changed."""
+    tree = work / "tree"
+    if not tree.exists():
+        partial = work / "partial"
+        shutil.rmtree(partial, ignore_errors=True)
+        without = shutil.ignore_patterns(".git", ".venv*", "*.html", "__pycache__", "_build")
+        shutil.copytree(root, partial, ignore=without)
+        partial.rename(tree)
+    return tree
+
+
+def tried(tree: Path, mutants: Sequence[Mutant], work: Path, most_s: float) -> Iterator[dict[str, Any]]:
+    """What became of each change, those tried before from `work`; interrupted, it goes on from there."""
+    log = work / "tried.jsonl"
+    rows = log.read_text(encoding="utf-8").splitlines() if log.exists() else []
+    known = {(row["path"], *row["span"], row["after"]): row for row in map(json.loads, rows)}
+    covers: dict[str, Covering] = {}
+    for mutant in mutants:
+        row = known.get((mutant.path, *mutant.span, mutant.after))
+        if row is None:
+            if mutant.package not in covers:
+                covers[mutant.package] = measured(tree, mutant.package, work)
+            row = _trial(tree, mutant, covers[mutant.package], work, most_s)
+            with log.open("a", encoding="utf-8") as file:
+                file.write(json.dumps(row) + "\n")
+        yield row
+
+
+def _trial(tree: Path, mutant: Mutant, cover: Covering, work: Path, most_s: float) -> dict[str, Any]:
+    tests = cover.tests_of(mutant, most_s)
+    row = {
+        "path": mutant.path,
+        "line": mutant.first,
+        "function": mutant.function,
+        "before": mutant.before,
+        "after": mutant.after,
+        "span": mutant.span,
+        "key": mutant.key,
+        "tests": len(tests),
+    }
+    if not tests:
+        return row | {"state": UNTESTED, "seconds": 0.0}
+    file = tree / mutant.path
+    source = file.read_bytes()
+    seconds = sum(cover.seconds[test] for test in tests)
+    began = time.monotonic()
+    try:
+        file.write_bytes(mutant.applied(source))
+        status = _status(tree, tests, work, _SPARE_S + _SLOWER * seconds)
+    finally:
+        file.write_bytes(source)
+    if status != 0 and status not in _FAILED and status > 0:
+        raise SystemExit(f"{mutant.key}: pytest ended with {status}")
+    state = UNNOTICED if status == 0 else NOTICED
+    return row | {"state": state, "seconds": round(time.monotonic() - began, 1)}
+
+
+def _status(tree: Path, tests: Sequence[str], work: Path, cpu_s: float) -> int:
+    """With what the tests end; negative where they took too long."""
+    asked = work / "asked.txt"
+    asked.write_text("\n".join(tests) + "\n", encoding="utf-8")
+    words = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", f"@{asked}"]
+
+    def limited() -> None:
+        resource.setrlimit(resource.RLIMIT_CPU, (int(cpu_s), int(cpu_s) + 5))
+
+    done = subprocess.run(
+        words, cwd=tree, env=environment(tree), preexec_fn=limited, capture_output=True, check=False
+    )
+    return done.returncode
