@@ -1,8 +1,8 @@
 """The diagnosis on families beside the present one: every wanted figure, on the cases that both answered.
 
 ``python -m experiments.families DIR...`` reads the suites in the folders, made by ``fogml blind make`` and
-answered by ``fogml blind run --method diagnosis --method families``, and writes ``results.md`` and
-``results.json``. Of a suite that one method alone has answered, that method alone stands in the table.
+answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``, and the rates that pages of
+diagnoses tell. Of a suite that one method alone has answered, that method alone stands in the table.
 
 With ``--calibrate`` it prints the trust and the doubt of `fogml.gap.families.priors.Priors` that what is
 listed asks for: the one monotone map between evidence and probability, fitted by likelihood.
@@ -11,6 +11,7 @@ listed asks for: the one monotone map between evidence and probability, fitted b
 from __future__ import annotations
 
 import argparse
+import json
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -23,14 +24,17 @@ from scipy.special import expit
 from experiments.gap_blind.by_reality import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
-from fogml.blind.methods import FAMILIES
 from fogml.blind.realities import SAME_TWIN
 from fogml.blind.scoring.by_reality import ALL, by_reality
 from fogml.blind.scoring.marks import Mark
+from fogml.outputs import whole_file
 from fogml.report.blind_words import figure_text, wanted_text
+from fogml.report.error_rates import ERROR_RATES, error_rates
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
+FAMILIES = "families"
+"""Answers by families that stand beside others."""
 METHODS = (DIAGNOSIS, FAMILIES)
 LAPSES = 0.04
 """Share of names that are right or false whatever the odds are."""
@@ -61,6 +65,10 @@ def main() -> None:
     values["families"] = by_reality(alone[FAMILIES])
     values["fit_runs"] = {"shared": _fit_runs(both[FAMILIES]), FAMILIES: _fit_runs(alone[FAMILIES])}
     write_results(HERE, values, page(values))
+    counts = Counter(x.truth.reality for x in alone[FAMILIES])
+    rates = error_rates(values["families"][ALL], dict(sorted(counts.items())), values["seeds"], final=False)
+    with whole_file(ERROR_RATES) as partial:
+        partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
 
 
 def names_of(suites: Sequence[BlindFolder]) -> list[tuple[float, float, bool]]:

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.blind.folders import DIAGNOSIS
+from fogml.blind.scoring.by_reality import ALL
 from fogml.blind.scoring.marks_file import MARKS, read_marks
 from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
 from fogml.cli.blind_job import (
@@ -139,8 +140,11 @@ def _tell_elsewhere(home: Path, directory: Path, terminal: Terminal) -> None:
     """The page where the cases lie, linked to their reports; error rates for pages of diagnoses."""
     values = json.loads((home / "score.json").read_text(encoding="utf-8"))
     if DIAGNOSIS in values["methods"]:
+        tables = values["methods"][DIAGNOSIS]["by_reality"]
+        cases = {name: max(row["cases"] for row in rows) for name, rows in tables.items() if name != ALL}
+        rates = error_rates(tables[ALL], cases, [values["seed"]], final=True)
         with whole_file(ERROR_RATES) as partial:
-            partial.write_text(json.dumps(error_rates(values), indent=1) + "\n", encoding="utf-8")
+            partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
     link_reports(values, sorted(path.parent for path in directory.glob(f"*/{MARKS}")), directory)
     with whole_file(directory / "score.html") as partial:
         partial.write_text(blind_page(values), encoding="utf-8")

@@ -15,13 +15,10 @@ Method = Callable[..., Any]
 """Reads a case's runs, given as `CaseFiles`, and writes ``gap.json`` into a folder; options by name."""
 
 _PACKAGE = "fogml.blind"
-FAMILIES = "families"
-"""The diagnosis on families."""
 ABSTAIN = "abstain"
 """The baseline that names nothing."""
 METHODS = {
     DIAGNOSIS: f"{_PACKAGE}.methods:diagnosis",
-    FAMILIES: f"{_PACKAGE}.methods:families",
     "bic": f"{_PACKAGE}.baselines.forward:bic",
     "bic-unwhitened": f"{_PACKAGE}.baselines.forward:bic_unwhitened",
     "bic-fixed-nominal": f"{_PACKAGE}.baselines.forward:bic_fixed_nominal",
@@ -33,7 +30,7 @@ METHODS = {
 """Name of each method to ``module:function``; all of them run sealed."""
 ORACLE = "oracle"
 """The baseline that is given the truth, and so can't run sealed."""
-BASELINES = (*(name for name in METHODS if name not in (DIAGNOSIS, FAMILIES)), ORACLE)
+BASELINES = (*(name for name in METHODS if name != DIAGNOSIS), ORACLE)
 
 
 def load_method(text: str) -> Method:
@@ -46,6 +43,8 @@ def load_method(text: str) -> Method:
     """
     module, colon, name = METHODS.get(text, text).partition(":")
     if not colon:
+        if text == "families":
+            raise InputError(f"no method 'families': it is what '{DIAGNOSIS}' does")
         known = ", ".join(METHODS)
         raise InputError(f"no method '{text}'; known are {known}, or name one as module:function")
     try:
@@ -55,33 +54,9 @@ def load_method(text: str) -> Method:
     return method
 
 
-def diagnosis(case: CaseFiles, out: Path) -> Any:
-    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page.
-
-    What is withheld is nothing that its catalogue holds: not even as a doubt about what looks like it.
-    """
+def diagnosis(case: CaseFiles, out: Path, *, cost_of_false_name: float = 1.0) -> Any:
+    """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page."""
     from fogml.gap.diagnosis import diagnose
-    from fogml.gap.twin_model import TwinModel
-    from fogml.runs.reading import read_run
-    from fogml.twin.twin_file import load_twin
-
-    model = TwinModel(load_twin(case.twin), case.without)
-    found = diagnose(
-        model,
-        [read_run(path) for path in case.fit],
-        [read_run(path) for path in case.held_out],
-        noise=read_run(case.noise) if case.noise else None,
-        seed=case.seed,
-        plan=False,
-    )
-    write_json(out / "gap.json", found.as_dict(), indent=None)
-    found.write_model(model, out / "twin.yaml")
-    return found
-
-
-def families(case: CaseFiles, out: Path, *, cost_of_false_name: float = 1.0) -> Any:
-    """The diagnosis on families; as `diagnosis`, with the cost of a false name over that of a missed one."""
-    from fogml.gap.families.answer import diagnose
     from fogml.gap.twin_model import TwinModel
     from fogml.runs.reading import read_run
     from fogml.twin.twin_file import load_twin

@@ -110,7 +110,7 @@ class RunSettings(SuiteSettings):
     methods: Annotated[
         list[str],
         option(
-            "diagnosis, families, a baseline, 'baselines', or module:function; repeatable.",
+            "diagnosis, a baseline, 'baselines', or module:function; repeatable.",
             "--method",
             metavar="NAME",
         ),
@@ -122,12 +122,7 @@ class RunSettings(SuiteSettings):
     limit: Annotated[float, option("Time that a case may take.", metavar="SECONDS")] = 600.0
     shard: Annotated[str, option("Every N-th case from the I-th on.", metavar="I/N")] = "1/1"
     retry: Annotated[bool, option("Try failed cases again.", "--retry")] = False
-    cost_of_false_name: Annotated[
-        float | None,
-        option(
-            "Of 'families': a false name costs so many times what a missed one does (1).", metavar="RATIO"
-        ),
-    ] = None
+    cost_of_false_name: options.CostOfFalseName = 1.0
 
     @property
     def part(self) -> tuple[int, int]:

@@ -73,18 +73,16 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer cases by each method, and say how many failed."""
-    from fogml.blind.methods import BASELINES, FAMILIES, ORACLE
+    from fogml.blind.methods import BASELINES, ORACLE
     from fogml.blind.oracle_run import run_oracle
     from fogml.blind.run import RunPlan, run_cases
 
     methods = [m for name in settings.methods for m in (BASELINES if name == _BASELINES else (name,))]
     if len(methods) > 1 and settings.name:
         raise InputError("--name: the answers of several methods can't have one name")
-    options = {}
-    if settings.cost_of_false_name is not None:
-        if methods != [FAMILIES] or not settings.cost_of_false_name > 0.0:
-            raise InputError(f"--cost-of-false-name: a positive number, for --method {FAMILIES} alone")
-        options = {"cost_of_false_name": settings.cost_of_false_name}
+    cost = {"cost_of_false_name": settings.cost_of_false_name}
+    if settings.cost_of_false_name != 1.0 and DIAGNOSIS not in methods:
+        raise InputError(f"--cost-of-false-name: no method but '{DIAGNOSIS}' takes it")
     told = {}
     config = settings.in_full().yaml("blind run", "run.yaml")
     for method in methods:
@@ -99,7 +97,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
             shard=settings.part,
             retry=settings.retry,
             seed=settings.seed,
-            options=options,
+            options=cost if method == DIAGNOSIS else {},
         )
         with terminal.work(method, total=len(plan.left())) as work:
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
-
-from pydantic import Field
+from typing import Annotated, ClassVar
 
 from fogml.cli import options
 from fogml.cli.given import argument, option
@@ -34,18 +32,9 @@ class DiagnoseSettings(Settings):
         list[str],
         option("Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS),
     ] = []
-    method: Annotated[
-        Literal["diagnosis", "families"],
-        option("Families: each effect in whatever form its family has."),
-    ] = "diagnosis"
-    cost_of_false_name: Annotated[
-        float | None,
-        option(
-            "Of 'families': a false name costs so many times what a missed one does (1).", metavar="RATIO"
-        ),
-    ] = Field(None, gt=0.0)
-    rehearse: Annotated[
-        bool, option("Of 'families': what these runs would name of each candidate.", "--rehearse")
-    ] = False
+    cost_of_false_name: options.CostOfFalseName = 1.0
+    rehearse: Annotated[bool, option("Tell what these runs would name of each candidate.", "--rehearse")] = (
+        False
+    )
     repair: options.Repair = False
     out: options.Folder = "diagnosis"

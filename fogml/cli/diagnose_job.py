@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
-
 from fogml.cli.diagnose import DiagnoseSettings
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
-from fogml.gap.diagnosis import as_model
-from fogml.gap.result import FAMILIES, Diagnosis
+from fogml.gap.diagnosis import diagnose
+from fogml.gap.result import Diagnosis
+from fogml.gap.twin_model import TwinModel
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.twin.twin_file import load_twin
@@ -26,16 +25,22 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     both = sorted(set(settings.runs) & set(settings.held_out))
     if both:
         raise InputError(f"{', '.join(both)}: both a fit run and held out; hold out another run")
-    if settings.method != FAMILIES and (settings.rehearse or settings.cost_of_false_name is not None):
-        raise InputError(f"--rehearse and --cost-of-false-name: for --method {FAMILIES} alone")
-    model = as_model(load_twin(settings.twin))
+    model = TwinModel(load_twin(settings.twin))
     with whole_folder(settings.out) as folder:
         runs = open_runs(settings.runs, terminal, repair=settings.repair)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
         noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
         with terminal.work("diagnosing") as work:
-            found = _diagnosed(
-                settings, model, runs, held_out, noise=noise, seed=settings.seed, progress=work.doing
+            found = diagnose(
+                model,
+                runs,
+                held_out,
+                noise=noise,
+                without=settings.without,
+                seed=settings.seed,
+                rehearsed=settings.rehearse,
+                cost_of_false_name=settings.cost_of_false_name,
+                progress=work.doing,
             )
             work.doing("writing")
             _write(folder, settings, found)
@@ -44,24 +49,6 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     terminal.result(found.as_dict())
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
     return found
-
-
-def _diagnosed(settings: DiagnoseSettings, *given: Any, **named: Any) -> Diagnosis:
-    """By the method that is asked for."""
-    if settings.method == FAMILIES:
-        from fogml.gap.families import answer
-
-        cost = 1.0 if settings.cost_of_false_name is None else settings.cost_of_false_name
-        return answer.diagnose(
-            *given,
-            **named,
-            without=settings.without,
-            rehearsed=settings.rehearse,
-            cost_of_false_name=cost,
-        )
-    from fogml.gap.diagnosis import diagnose
-
-    return diagnose(*given, **named, without=settings.without)
 
 
 def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:

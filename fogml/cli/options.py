@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, field_validator
+from pydantic import BeforeValidator, Field, field_validator
 
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
@@ -117,6 +117,11 @@ AnyUnit = Annotated[
     bool, option("Allow a run of another unit or axis than the model's.", "--any-unit/--same-unit")
 ]
 Workers = Annotated[int, option("Processes on this machine.")]
+CostOfFalseName = Annotated[
+    float,
+    Field(gt=0.0),
+    option("What a false name costs over a missed one: the greater, the surer a name.", metavar="RATIO"),
+]
 Twin = Annotated[
     str,
     option("Twin file, or one that ships.", metavar="TWIN", reads=True, known=TWINS),

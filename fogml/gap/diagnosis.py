@@ -11,6 +11,8 @@ from fogml.errors import InputError
 from fogml.gap.assumptions import assumptions
 from fogml.gap.confidence import UNSURE, likely
 from fogml.gap.describe import describe_unknown
+from fogml.gap.families import answer
+from fogml.gap.families.priors import Priors
 from fogml.gap.found import fit_named, found_effects
 from fogml.gap.how_far import AVERAGING_S, averages, how_far
 from fogml.gap.how_far_result import HowFar
@@ -30,6 +32,7 @@ from fogml.gap.reports import (
 from fogml.gap.result import NAMED, Diagnosis, Found, Unknown, Verdict
 from fogml.gap.structure import gaps_on_runs, stage_energies, systematic_parts
 from fogml.gap.trials import Trial, best_trial
+from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import where
 from fogml.runs.run import Run
 from fogml.twin.twin import Twin
@@ -47,6 +50,9 @@ def diagnose(
     without: Iterable[str] = (),
     seed: int = 0,
     plan: bool = True,
+    rehearsed: bool = False,
+    cost_of_false_name: float = 1.0,
+    priors: Priors | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Where the gap between a model and recordings lies, which effect causes it, how far it closes.
@@ -66,7 +72,13 @@ def diagnose(
     seed
         Of the draws behind intervals.
     plan
-        Whether to look for a programme that tells a class's members apart.
+        Whether to look for a programme that would tell more.
+    rehearsed
+        Whether to tell what these runs would name of each candidate.
+    cost_of_false_name
+        Of a false name over that of a missed one: a cause is named from odds of this on.
+    priors
+        What is taken for granted.
     progress
         Told what is being done.
 
@@ -78,13 +90,28 @@ def diagnose(
     """
     from threadpoolctl import threadpool_limits
 
+    model = as_model(twin)
+    if isinstance(model, TwinModel):
+        return answer.diagnose(
+            model,
+            fit,
+            held_out,
+            noise=noise,
+            without=without,
+            seed=seed,
+            plan=plan,
+            rehearsed=rehearsed,
+            cost_of_false_name=cost_of_false_name,
+            priors=priors,
+            progress=progress,
+        )
     # Matrices are small: more threads than one cost more than they bring.
     with threadpool_limits(1):
-        return _diagnosed(twin, fit, held_out, noise, without, seed, plan, progress or (lambda what: None))
+        return _diagnosed(model, fit, held_out, noise, without, seed, plan, progress or (lambda what: None))
 
 
 def _diagnosed(
-    twin: Twin | GyroModel,
+    model: GyroModel,
     fit: Sequence[Run],
     held_out: Sequence[Run],
     noise: Run | None,
@@ -93,7 +120,6 @@ def _diagnosed(
     plan: bool,
     tell: Progress,
 ) -> Diagnosis:
-    model = as_model(twin)
     candidates, left_out = _candidates(model, without)
     trial = best_trial(prepare(model, fit, held_out, noise, tell), candidates, tell)
     return _result(trial, candidates, left_out, seed, plan, tell)
@@ -177,11 +203,7 @@ def _verdict(found: Sequence[Found], unknown: Unknown, nothing: float) -> Verdic
 
 
 def as_model(twin: Twin | GyroModel) -> GyroModel:
-    if isinstance(twin, Twin):
-        from fogml.gap.twin_model import TwinModel
-
-        return TwinModel(twin)
-    return twin
+    return TwinModel(twin) if isinstance(twin, Twin) else twin
 
 
 def _candidates(

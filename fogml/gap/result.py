@@ -18,8 +18,6 @@ from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
 from fogml.runs.run import FloatArray
 
-FAMILIES = "families"
-"""The diagnosis on families, as results and settings call it."""
 NAMED = 0.5
 """An effect is named from this probability on."""
 Verdict = Literal["no_gap", "explained", "ambiguous", "partly_explained", "unknown"]
@@ -265,8 +263,6 @@ class Diagnosis:
         What these runs would name of each candidate, where that was asked for.
     shares
         Of the gap's energy: of each cause in all, by run and by regime.
-    method
-        What answered: ``diagnosis`` or ``families``.
     """
 
     fit: tuple[str, ...]
@@ -294,7 +290,6 @@ class Diagnosis:
     headline: tuple[str, ...] = ()
     rehearsal: tuple[Rehearsed, ...] = ()
     shares: tuple[CauseShare, ...] = ()
-    method: str = "diagnosis"
 
     @property
     def named(self) -> tuple[Found, ...]:

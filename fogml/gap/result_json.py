@@ -26,7 +26,6 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
             "unusable": [{"run": run, "reason": reason} for run, reason in diagnosis.unusable],
         },
         "model": diagnosis.model,
-        "method": diagnosis.method,
         "verdict": diagnosis.verdict,
         "which": [_found(found) for found in diagnosis.found],
         "suspected": [_found(found) for found in diagnosis.suspected],

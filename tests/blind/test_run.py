@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from fogml.blind.folders import BlindFolder
+from fogml.blind.methods import load_method
 from fogml.blind.run import RunPlan, check_out_of_reach, run_cases
 from fogml.blind.sealing import own_roots
 from fogml.cli.blind import RunSettings
@@ -154,7 +155,12 @@ def test_a_method_that_does_not_load_is_said_at_once(folder: BlindFolder) -> Non
         run_cases(RunPlan(folder, "nowhere:nothing"))
 
 
-def test_the_cost_of_a_false_name_is_asked_of_families_alone(folder: BlindFolder) -> None:
+def test_the_cost_of_a_false_name_is_asked_of_the_diagnosis_alone(folder: BlindFolder) -> None:
     settings = RunSettings(directory=str(folder.path), methods=["abstain"], cost_of_false_name=3.0)
-    with pytest.raises(InputError, match="families"):
+    with pytest.raises(InputError, match="no method but 'diagnosis' takes it"):
         run_and_tell(settings, Terminal())
+
+
+def test_a_method_that_is_the_diagnosis_itself_is_said_to_be() -> None:
+    with pytest.raises(InputError, match="it is what 'diagnosis' does"):
+        load_method("families")

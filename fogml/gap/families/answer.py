@@ -30,13 +30,7 @@ from fogml.gap.families.shares import cause_shares
 from fogml.gap.how_far_result import Nearest, WhatIf
 from fogml.gap.model import GyroModel
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
-from fogml.gap.result import (
-    FAMILIES,
-    NAMED,
-    Diagnosis,
-    Unknown,
-    Verdict,
-)
+from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.twin_model import TwinModel
 from fogml.gap.where import GapOnRun, where
 from fogml.runs.epochs import with_epoch
@@ -183,7 +177,6 @@ def _answer(
         unusable=found.unusable,
         assumed=assumed(found),
         model=found.model.name,
-        method=FAMILIES,
         what_if=what_if,
         nearest=nearest,
         shares=shares,
