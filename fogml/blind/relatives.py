@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from fogml.blind.folders import BlindFolder, case_files
-from fogml.blind.signatures import Atom, Stack, atoms
+from fogml.blind.signatures import Atom, Stack, atoms, free_shape
 from fogml.blind.truth import Truth, read_contributions
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
@@ -62,10 +62,11 @@ class Likeness:
         columns = self._seen(np.column_stack([self._stack.column(atom) for atom in grid]))
         reached = np.abs(targets.T @ columns).max(axis=0)
         best = float(reached.max(initial=0.0))
-        names = [quantity.name for quantity in candidate.shape]
+        free = free_shape(candidate)
+        names = [quantity.name for quantity in free]
         if not names or best > ALIKE:
             return best
-        bounds = [quantity.tactical for quantity in candidate.shape]
+        bounds = [quantity.tactical for quantity in free]
         for start in np.argsort(reached)[::-1][:_STARTS]:
             fitted = minimize(
                 lambda x: -self._reached(targets, Atom(id, dict(zip(names, map(float, x))))),

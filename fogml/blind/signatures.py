@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.gap.families.making_rows import rows_of
+from fogml.gap.families.rows import Rows
 from fogml.gap.model import Candidate
 from fogml.gap.noise import MOST_ROWS
-from fogml.gap.observation import Observation, observe
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
@@ -20,6 +21,7 @@ from fogml.signals.noise_fit import fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
 from fogml.twin.quantities import Quantity
+from fogml.twin.registry import effect
 from fogml.twin.twin_file import load_twin
 
 LARGEST_ROWS = 4096
@@ -27,6 +29,8 @@ LARGEST_ROWS = 4096
 _NODES = {1: 7, 2: 4, 3: 3}
 _FINEST_LINE = 60
 _TIME_ORDERS, _TEMPERATURE_ORDERS = 6, (3, 4, 5)
+PHASE = Quantity("phase", "deg", (0.0, 360.0), (0.0, 360.0), "at the run's time 0", default=0.0)
+"""Of a line: each run has its own."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,8 @@ class Stack:
         self.model = TwinModel(load_twin("nominal"))
         self.constants = {constant.name: constant for constant in self.model.constants}
         self.about = dict.fromkeys(self.constants, 0.0) | dict(constants or {})
-        self.parts: list[Observation] = [
-            observe(read_run(path), self.model, largest_rows=LARGEST_ROWS) for path in runs
-        ]
+        twin = self.model.twin
+        self.parts: list[Rows] = [rows_of(read_run(path), twin, LARGEST_ROWS) for path in runs]
         self.names = [path.name for path in runs]
 
     def __len__(self) -> int:
@@ -68,24 +71,12 @@ class Stack:
     @cached_property
     def gap(self) -> FloatArray:
         """Recorded less replayed at the priors' means [deg/h], shape (n,)."""
-        means = {name: constant.mean for name, constant in self.constants.items()}
-        return np.concatenate(
-            [part.recorded - part.averaged(part.model.output(means)) for part in self.parts]
-        )
+        return np.concatenate([part.gap for part in self.parts])
 
     @cached_property
     def nominal(self) -> FloatArray:
         """Response to each nominal constant [deg/h per unit], shape (n, k)."""
-        columns = []
-        for part in self.parts:
-            given = part.model.columns()
-            zeros = np.zeros(len(part))
-            columns.append(
-                np.column_stack(
-                    [part.averaged(given[name]) if name in given else zeros for name in self.constants]
-                )
-            )
-        return np.concatenate(columns)
+        return np.concatenate([part.constants for part in self.parts])
 
     @cached_property
     def prior_sd(self) -> FloatArray:
@@ -94,11 +85,17 @@ class Stack:
 
     def column(self, atom: Atom) -> FloatArray:
         """Response to a unit of a candidate's amplitude [deg/h], shape (n,)."""
-        return np.concatenate([part.response(atom.id, atom.shape, self.about) for part in self.parts])
+        return np.concatenate([self._response(part, atom) for part in self.parts])
+
+    def _response(self, part: Rows, atom: Atom) -> FloatArray:
+        if atom.id == "sinusoidal":
+            phase = np.radians(atom.shape[PHASE.name])
+            return np.asarray(np.sin(2.0 * np.pi * atom.shape["frequency"] * part.time_s + phase))
+        return part.response(effect(atom.id), atom.shape, None, self.about)
 
     def averaged(self, series: Sequence[FloatArray]) -> FloatArray:
         """Block means of one series per run over its samples [deg/h], shape (n,)."""
-        return np.concatenate([part.averaged(values) for part, values in zip(self.parts, series)])
+        return np.concatenate([part.samples(values) for part, values in zip(self.parts, series)])
 
     def split(self, values: FloatArray) -> list[FloatArray]:
         """Rows of a stacked array by run."""
@@ -145,14 +142,20 @@ def atoms(candidates: Mapping[str, Candidate], without: Sequence[str], grid: boo
     for id, candidate in candidates.items():
         if id in without:
             continue
-        usual = {quantity.name: quantity.typical() for quantity in candidate.shape}
+        free = free_shape(candidate)
+        usual = {quantity.name: quantity.typical() for quantity in free}
         if not grid:
             found.append(Atom(id, usual))
             continue
-        count = _NODES[min(max(len(candidate.shape), 1), 3)]
-        axes = [_axis(quantity, count) for quantity in candidate.shape]
+        count = _NODES[min(max(len(free), 1), 3)]
+        axes = [_axis(quantity, count) for quantity in free]
         found += [Atom(id, dict(zip(usual, values))) for values in product(*axes)]
     return found
+
+
+def free_shape(candidate: Candidate) -> tuple[Quantity, ...]:
+    """Shape parameters of a candidate, a line's phase among them."""
+    return (*candidate.shape, PHASE) if candidate.id == "sinusoidal" else candidate.shape
 
 
 def _axis(quantity: Quantity, count: int) -> list[float]:

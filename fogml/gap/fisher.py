@@ -14,12 +14,14 @@ from typing import Literal
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.model import Candidate, EffectValue
+from fogml.gap.model import EffectValue
 from fogml.gap.rehearsal import Rehearsed, Stage
 from fogml.gap.shapes import usual_shape
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
+from fogml.twin.effect import Effect, NoiseEffect
 from fogml.twin.quantities import Quantity
+from fogml.twin.registry import effect
 
 Criterion = Literal["D", "A"]
 _SHAPE_STEP = 0.01
@@ -98,7 +100,7 @@ def unknowns(on: Stage, names: Sequence[str]) -> Unknowns:
     for id in ids:
         value = usual_value(on, id, constants)
         effects.append(value)
-        candidate = on.candidate(id)
+        candidate = effect(id)
         size = abs(value.amplitude) or abs(candidate.amplitude.typical(grade))
         unit = candidate.amplitude.unit
         parameters.append(Parameter(f"{id}.amplitude", unit, value.amplitude, size, None))
@@ -128,9 +130,6 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
     InputError
         If there is none of this id, or it is a random error.
     """
-    from fogml.twin.effect import NoiseEffect
-    from fogml.twin.registry import effect
-
     try:
         declared = effect(id)
     except InputError as error:
@@ -144,7 +143,7 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
     return stated_or_usual(on, declared)
 
 
-def stated_or_usual(on: Stage, declared: Candidate) -> EffectValue:
+def stated_or_usual(on: Stage, declared: Effect) -> EffectValue:
     """An effect as the twin states it, else at the usual size and shape of its grade."""
     held, grade = on.model.twin.settings.get(declared.id), on.model.grade
     shape = usual_shape(declared, grade)
@@ -156,7 +155,7 @@ def stated_or_usual(on: Stage, declared: Candidate) -> EffectValue:
 def responses(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
     """Whitened responses of the output to each unknown in its scale, shape (m, p)."""
     scales = {p.name: p.scale for p in of.parameters}
-    blocks = [rehearsal.fixed]
+    blocks = [rehearsal.constants]
     for value in of.effects:
         columns = rehearsal.white(value.id, _moved(value, scales))
         blocks.append(columns[:, :1] * scales[f"{value.id}.amplitude"])
@@ -166,9 +165,11 @@ def responses(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
 
 
 def information(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
-    """Fisher information of runs, priors included, in scales, shape (p, p)."""
-    columns = responses(rehearsal, of)
-    return np.asarray(columns.T @ columns + of.prior_information())
+    """Fisher information of runs beside what is always a little off, priors included, in scales.
+
+    Shape (p, p).
+    """
+    return rehearsal.beside_nuisances.gram(responses(rehearsal, of)) + of.prior_information()
 
 
 def covariance(info: FloatArray) -> FloatArray:

@@ -65,7 +65,7 @@ def _run(number: int, run: PlannedRun) -> dict[str, Any]:
             for programme, summary, outlook in run.alternatives
         ],
         "profile": profile(run.programme)
-        | {"coil": _thinned(run.rehearsal.observation.time, run.rehearsal.observation.temperature)},
+        | {"coil": _thinned(run.rehearsal.rows.time_s, run.rehearsal.rows.temperature)},
     }
 
 

@@ -7,18 +7,22 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import block_diag
 
-from fogml.gap.frame import constant_rows, posterior_factor, products_beside
-from fogml.gap.model import Candidate
-from fogml.gap.observation import observe
+from fogml.gap.families.frame import LONGEST_RUNS, fixed_columns
+from fogml.gap.families.linear_gaussian import LinearGaussian
+from fogml.gap.families.making_rows import rows_of
+from fogml.gap.families.places import Scene
+from fogml.gap.families.priors import Priors
+from fogml.gap.families.rows import Rows, slopes
 from fogml.gap.programme_design import Design
 from fogml.gap.programme_family import Family
-from fogml.gap.run_whitener import RunWhitener
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.gap.twin_model import TwinModel
-from fogml.gap.twin_on_run import TwinOnRun
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
+from fogml.signals.whitening import Whitener
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.power import SelfHeating
 from fogml.twin.registry import effect
@@ -64,17 +68,6 @@ class Stage:
     columns: tuple[str, ...] | None
     assumed: tuple[str, ...]
 
-    def candidate(self, id: str) -> Candidate:
-        """An effect as a diagnosis would offer it.
-
-        Raises
-        ------
-        InputError
-            If there is none of this id.
-        """
-        declared: Candidate = effect(id)
-        return self.model.candidates().get(id, declared)
-
 
 def stage(
     twin: Twin,
@@ -118,20 +111,25 @@ class Rehearsed:
     ----------
     stage
         Who rehearses.
-    fixed
-        Whitened columns of the constants, each scaled by its prior's standard deviation, shape (m, c).
+    constants
+        Whitened responses to one prior standard deviation of each constant, shape (m, c).
+    nuisances
+        Those to what a diagnosis takes to be always a little off, shape (m, k).
     """
 
-    stage: Stage
-    fixed: FloatArray
+    def __init__(self, on: Stage, constants: FloatArray, nuisances: FloatArray) -> None:
+        self.stage, self.constants, self.nuisances = on, constants, nuisances
+        nothing = LinearGaussian.of(np.zeros(len(constants)))
+        self.beside_nuisances = nothing.beside(nuisances)
+        self.beside_all = self.beside_nuisances.beside(constants)
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
         raise NotImplementedError
 
     def beside(self, columns: FloatArray) -> FloatArray:
-        """Inner products of whitened columns beside the constants, their priors known, shape (k, k)."""
-        return products_beside(columns, self.fixed, posterior_factor(self.fixed))
+        """Inner products of whitened columns beside constants and nuisances with priors, shape (k, k)."""
+        return self.beside_all.gram(columns)
 
 
 class Rehearsal(Rehearsed):
@@ -148,41 +146,67 @@ class Rehearsal(Rehearsed):
 
     Attributes
     ----------
-    observation
+    rows
         The run.
     """
 
     def __init__(self, on: Stage, family: Family, design: Design, sample_s: float = COARSE_S) -> None:
-        self.stage = on
         programme = family.programme(design)
         sample_s = min(sample_s, max(math.floor(programme.total_s / LEAST_ROWS), 1.0))
-        facts = mounted(on.facts, design)
+        model, facts = on.model, mounted(on.facts, design)
+        run = model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns).run
+        # What a run of it would give is no matter, and without noise might pass for a stuck output.
+        run = run.with_columns(gyro=np.where(np.isfinite(run.gyro), 0.0, np.nan))
+        self.rows = rows = rows_of(run, model.twin, len(run))
+        self._values = on.values
+        span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
+        ladder = on.noise.ladder(rows.row_s, LONGEST_RUNS * span)
+        self._whitener = Whitener(on.noise, rows.end_s, rows.row_s, ladder)
+        reading = _reading_noise(rows, on.sensors, on.values)
+        self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
+        scene, none = Scene((rows,), 1, on.model.grade), dict[str, float]()
+        fixed = fixed_columns(rows, 0, scene, model.twin, model.constants, none, on.values, Priors())
+        white, count = self._whiten(fixed), len(model.constants)
+        super().__init__(on, white[:, :count], white[:, count:])
 
-        run = on.model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns).run
-        self.observation = observe(run, on.model)
-        replay = self.observation.model
-        assert isinstance(replay, TwinOnRun)
-        reading = replay.noise_of_sensors(on.sensors, on.values)
-        self._whitener = RunWhitener(on.noise, self.observation, on.values, reading)
-        self.fixed = self._whitener.whiten(constant_rows(self.observation, on.model.constants))
+    def _whiten(self, columns: FloatArray) -> FloatArray:
+        return np.asarray(self._weights[:, None] * self._whitener.whiten(np.ascontiguousarray(columns)))
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
-        o = self.observation
-        columns = [o.response(id, shape, self.stage.values) for shape in shapes]
-        return self._whitener.whiten(np.column_stack(columns))
+        return self._whiten(np.column_stack([self.response(id, shape) for shape in shapes]))
+
+    def response(self, id: str, shape: Mapping[str, float]) -> FloatArray:
+        """An effect's response to a unit of its amplitude [deg/h], shape (m,)."""
+        declared = effect(id)
+        if AT_AMPLITUDE not in shape:
+            return self.rows.response(declared, shape, None, self._values)
+        about = shape[AT_AMPLITUDE]
+        return self.rows.changed_output(declared, about, self._values) / about
 
 
 class Together(Rehearsed):
     """Several runs of one unit, whose constants and effects are the same in all."""
 
     def __init__(self, runs: Sequence[Rehearsed]) -> None:
-        self.stage, self._runs = runs[0].stage, runs
-        self.fixed = np.concatenate([run.fixed for run in runs])
+        self._runs = runs
+        constants = np.concatenate([run.constants for run in runs])
+        super().__init__(runs[0].stage, constants, block_diag(*(run.nuisances for run in runs)))
 
     def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
         """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
         return np.concatenate([run.white(id, shapes) for run in self._runs])
+
+
+def _reading_noise(rows: Rows, sensors: Sensors, values: Mapping[str, float]) -> FloatArray:
+    """What noise and last digit of the sensors make of the replay, a standard deviation [deg/h], shape (m,)."""
+    variance = np.zeros(len(rows.kept))
+    for name, slope in slopes(rows, values).items():
+        place = rows.even.place(name)
+        if place is not None:
+            errors = sensors.of(place)
+            variance += (slope * math.hypot(errors.noise, errors.resolution / math.sqrt(12.0))) ** 2
+    return rows.of(np.sqrt(variance))
 
 
 def mounted(facts: Facts, design: Design) -> Facts:

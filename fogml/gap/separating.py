@@ -13,13 +13,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import permutations
 from typing import Any
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.model import Candidate, EffectValue
+from fogml.gap.model import EffectValue
 from fogml.gap.programme_design import Mounting
 from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
@@ -29,7 +30,9 @@ from fogml.gap.shapes import Node, grid, usual_shape
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.effect import Effect
 from fogml.twin.quantities import Quantity
+from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 
 LEAST_DISTANCE = 3.0
@@ -46,7 +49,7 @@ class Member:
     """An effect to be told from others: as it is, and all that it may be."""
 
     value: EffectValue
-    candidate: Candidate
+    candidate: Effect
     nodes: tuple[Node, ...]
 
 
@@ -161,21 +164,20 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
     if twice:
         raise InputError(f"effect '{twice[0]}' is named twice among those to be told apart")
     rehearsal = Rehearsal(on, family, family.starts()[-1])
-    o = rehearsal.observation
+    rows = rehearsal.rows
     spans = {
-        "s": o.run.span_s,
-        "degC": max(float(np.ptp(o.temperature)), 1.0),
-        "sample": max(o.row_s, o.run.sample_s),
+        "s": rows.run.span_s,
+        "degC": max(float(np.ptp(rows.temperature)), 1.0),
+        "sample": max(rows.row_s, rows.run.sample_s),
     }
     found = []
     for value in members:
-        candidate = on.candidate(value.id)
+        candidate = effect(value.id)
         if value.amplitude == 0.0:
             raise InputError(f"effect '{value.id}' has a size of 0; give the size that is to be told")
         usual = usual_shape(candidate, on.model.grade)
         shape = usual | {name: number for name, number in value.shape.items() if name in usual}
-        response = _response(rehearsal, value.id)
-        nodes = grid(candidate, on.model.grade, response, spans)
+        nodes = grid(candidate, on.model.grade, partial(rehearsal.response, value.id), spans)
         kept = [nodes[i] for i in _thinned(len(nodes))]
         own = Node(shape, (shape,))
         found.append(Member(EffectValue(value.id, value.amplitude, shape), candidate, (*kept, own)))
@@ -249,12 +251,7 @@ def _thinned(count: int) -> Sequence[int]:
     return np.unique(np.linspace(0, count - 1, MOST_NODES).round().astype(int)).tolist()
 
 
-def _response(rehearsal: Rehearsal, id: str) -> Callable[[Mapping[str, float]], FloatArray]:
-    values, model = rehearsal.stage.values, rehearsal.observation.model
-    return lambda shape: model.response(id, shape, values)
-
-
-def _gain(gram: FloatArray, fit: FloatArray, candidate: Candidate) -> float:
+def _gain(gram: FloatArray, fit: FloatArray, candidate: Effect) -> float:
     """Squared length that columns take off a response; an amplitude of one sign stays so."""
     if len(fit) == 1:
         wrong = not candidate.amplitude.signed and candidate.amplitude.limits[0] >= 0.0 and fit[0] < 0.0

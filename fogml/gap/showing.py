@@ -18,6 +18,8 @@ from fogml.gap.separating import LEAST_DISTANCE, run_of
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 
 MOST_PROGRAMMES = 120
@@ -71,8 +73,7 @@ def showing_run(
     """
     on = stage(twin, noise, constants, facts=facts)
     family = Family(hours, (-40.0, 60.0), ("up", "north") if facts is None else (None,), True)
-    declared = [on.candidate(id) for id in ids]
-    usual = [stated_or_usual(on, one) for one in declared if not getattr(one, "digitises", False)]
+    usual = [stated_or_usual(on, effect(id)) for id in ids if _may_show(effect(id))]
     if not usual:
         return None
 
@@ -89,6 +90,13 @@ def showing_run(
     least = float(min(length for _, length in shown))
     run = run_of(family, finals[:1], [id for id, _ in shown], least, "showing-run")
     return replace(run, aim="show")
+
+
+def _may_show(declared: Effect) -> bool:
+    """Whether a programme may show it: not the steps of a record, nor a random error."""
+    if isinstance(declared, NoiseEffect):
+        return declared.steady
+    return not getattr(declared, "digitises", False)
 
 
 def lengths(rehearsal: Rehearsal, values: Sequence[EffectValue]) -> FloatArray:
