@@ -15,7 +15,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from experiments.gap_blind.per_case import write_page
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
 from fogml.blind.realities import SAME_TWIN
 from fogml.blind.score import gather, marks_of
@@ -28,6 +27,7 @@ from fogml.blind.truth import read_truth
 from fogml.cli.blind import MakeSettings, RunSettings
 from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
+from fogml.outputs import whole_file
 from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
@@ -67,7 +67,8 @@ def main() -> None:
         figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
         digest = hashlib.sha256(hashes.encode()).hexdigest()
         record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})
-    write_page("by_reality", page(values))
+    with whole_file(HERE / "by_reality.md") as partial:
+        partial.write_text(page(values), encoding="utf-8")
     with (HERE / "by_reality.json").open("w", encoding="utf-8") as file:
         json.dump(values, file, indent=1)
         file.write("\n")

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
+from typing import Any
+
 from fogml.cli.diagnose import DiagnoseSettings
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.terminal import Terminal, number
@@ -61,13 +65,29 @@ def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
         (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 
 
+def rehearsal_rows(rehearsal: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
+    """Head and rows of a table of what runs would name."""
+    head = ["if this acted", "shape", "size", "whitened length", "it would be", "as"]
+    return head, [
+        [
+            r["effect"],
+            r["form"],
+            r["size"],
+            number(r["length"]),
+            r["outcome"],
+            ", ".join(r["named_as"]) or "–",
+        ]
+        for r in rehearsal
+    ]
+
+
 def _print(found: Diagnosis, terminal: Terminal) -> None:
     terminal.say(f"Verdict: {found.verdict.replace('_', ' ')}")
     if found.found:
         rows = [
             [
                 f.effect,
-                ", ".join([*f.others, *(f"{m} (left out)" for m in f.left_out)]) or "–",
+                ", ".join(f.others) or "–",
                 f"{f.probability:.2f}",
                 f"{number(f.amplitude.value)} ± {number(f.amplitude.se)} {f.amplitude.unit}",
             ]
@@ -97,12 +117,8 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
     for said in found.headline:
         terminal.say(said)
     if found.rehearsal:
-        rows = [
-            [r.effect, r.form, r.size, number(r.length), r.outcome, ", ".join(r.named_as) or "–"]
-            for r in found.rehearsal
-        ]
-        head = ["if this acted", "shape", "size", "whitened length", "it would be", "as"]
-        terminal.table("What these runs would name", head, rows)
+        table = rehearsal_rows([asdict(r) for r in found.rehearsal])
+        terminal.table("What these runs would name", *table)
     if found.held_out_is_part:
         terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
     for name, reason in found.unusable:

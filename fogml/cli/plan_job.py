@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from fogml.cli.diagnose_job import rehearsal_rows
 from fogml.cli.plan import PlanSettings
 from fogml.cli.terminal import Terminal, number
 from fogml.gap.plan import plan_runs
@@ -37,6 +38,7 @@ def plan_and_write(settings: PlanSettings, terminal: Terminal) -> Plan:
                 mountings=None if settings.input_axis else ("up", "north"),
                 power_steps=settings.power_steps,
                 seed=settings.seed,
+                rehearsed=True,
                 progress=work.doing,
             )
         values = plan_values(plan)
@@ -88,6 +90,8 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         terminal.say(
             f"{what}: distance {item['distance']:.3g}, {told} (from {values['least_distance']:g} on)"
         )
+    if values["rehearsal"]:
+        terminal.table("What a diagnosis of these runs would name", *rehearsal_rows(values["rehearsal"]))
     hidden = [e["name"] for e in values["wanted"] if not e["shown"]]
     if hidden:
         terminal.note(f"{', '.join(hidden)}: does not show at its usual size, or no better than beforehand")

@@ -15,7 +15,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.rehearsal import Rehearsed, Stage
+from fogml.gap.rehearsal import ExpectedRuns, Stage
 from fogml.gap.shapes import usual_shape
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
@@ -152,7 +152,7 @@ def stated_or_usual(on: Stage, declared: Effect) -> EffectValue:
     return EffectValue(declared.id, held.amplitude, {name: held.shape[name] for name in shape})
 
 
-def responses(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
+def responses(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
     """Whitened responses of the output to each unknown in its scale, shape (m, p)."""
     scales = {p.name: p.scale for p in of.parameters}
     blocks = [rehearsal.constants]
@@ -164,7 +164,7 @@ def responses(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
     return np.concatenate(blocks, axis=1)
 
 
-def information(rehearsal: Rehearsed, of: Unknowns) -> FloatArray:
+def information(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
     """Fisher information of runs beside what is always a little off, priors included, in scales.
 
     Shape (p, p).

@@ -1,8 +1,7 @@
 """What a diagnosis asks of a model of a gyro: any that offers this can take the twin's place.
 
 A model is linear in a few constants with priors, replays a run's inputs, and offers candidate
-effects, each linear in its amplitude at given shape parameters. `fogml.gap.twin_model.TwinModel` is
-the twin in this form.
+effects, each linear in its amplitude at given shape parameters.
 """
 
 from __future__ import annotations
@@ -12,9 +11,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Protocol, runtime_checkable
-
-import numpy as np
-from numpy.typing import NDArray
 
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.quantities import Quantity
@@ -104,15 +100,11 @@ def amplitudes_about(candidate: Candidate) -> Sequence[float]:
     return tuple(getattr(candidate, "amplitudes", ()))
 
 
-class Responding(Protocol):
-    """What gives responses of candidates."""
+class ModelOnRun(Protocol):
+    """A model with the inputs that one run recorded."""
 
     def response(self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]) -> FloatArray:
         """Change of the output [deg/h] per unit of a candidate's amplitude, about 0, shape (n,)."""
-
-
-class ModelOnRun(Responding, Protocol):
-    """A model with the inputs that one run recorded."""
 
     def columns(self) -> Mapping[str, FloatArray]:
         """Response of the output [deg/h] to a unit of each constant, each of shape (n,).
@@ -130,59 +122,6 @@ class ModelOnRun(Responding, Protocol):
         """What is always a little off, one standard deviation of each [deg/h], shape (n,); may be empty.
 
         The names must be the same on every run that has them.
-        """
-
-
-@runtime_checkable
-class OtherOrders(Protocol):
-    """A `ModelOnRun` that also knows how it would be with another thermal structure."""
-
-    def other_orders(
-        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
-    ) -> list[FloatArray]:
-        """A candidate's response with other thermal orders, shape (n,) each; empty where all are alike."""
-
-
-@runtime_checkable
-class FeltWithin(Protocol):
-    """A `ModelOnRun` that knows that a sensor sits elsewhere than what its temperature acts on."""
-
-    def felt_within(
-        self, id: str, shape: Mapping[str, float], constants: Mapping[str, float]
-    ) -> FloatArray | None:
-        """What a response changes by where it is felt deeper within the gyro than it is measured.
-
-        One standard deviation [deg/h per unit of the amplitude], shape (n,); None where it is the same there.
-        The same candidate has it on every run, or on none.
-        """
-
-
-@runtime_checkable
-class Foreseeable(Protocol):
-    """A `ModelOnRun` that knows which responses stay as they are at other constants."""
-
-    def depends_on_constants(self, id: str, shape: Mapping[str, float]) -> bool:
-        """Whether a candidate's response is another one at other constants."""
-
-
-@runtime_checkable
-class Decimating(Protocol):
-    """A `ModelOnRun` that also gives responses on means over blocks of samples."""
-
-    def shapes_to_compare(self, id: str) -> Sequence[Mapping[str, float]]:
-        """Shapes at which a response on means has to agree with the mean of the response over samples.
-
-        None where a candidate may change within a block, or there is nothing to gain. A candidate that
-        has some must not depend on the constants.
-        """
-
-    def on_means(self, starts: NDArray[np.intp]) -> Responding:
-        """The model on block means of its inputs: responses have shape (b,).
-
-        Parameters
-        ----------
-        starts
-            First sample of each block, shape (b,), from 0 on; a block ends where the next one starts.
         """
 
 

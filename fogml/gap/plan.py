@@ -6,11 +6,14 @@ Runs are planned one after another, each for what those before it leave open.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.gap.families.ahead import rehearse
+from fogml.gap.families.inference import foreseen
+from fogml.gap.families.priors import Priors
 from fogml.gap.fisher import (
     UNSEEN,
     Criterion,
@@ -21,14 +24,17 @@ from fogml.gap.fisher import (
     unknowns,
     usual_value,
 )
+from fogml.gap.how_far_result import Rehearsed
 from fogml.gap.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
 from fogml.gap.programme_design import Design, Mounting
 from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
-from fogml.gap.rehearsal import COARSE_S, FINE_S, Rehearsal, Rehearsed, Stage, Together, mounted, stage
+from fogml.gap.rehearsal import COARSE_S, FINE_S, ExpectedRuns, Rehearsal, Stage, Together, mounted, stage
 from fogml.gap.separating import Member, distances, least_distance, log_distance, members_of
+from fogml.gap.twin_model import TwinModel
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
+from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import NAMES
 from fogml.twin.twin import Twin
 
@@ -44,7 +50,7 @@ class _Goal:
     groups: tuple[tuple[Member, ...], ...]
     criterion: Criterion
 
-    def merit(self, rehearsed: Rehearsed) -> float:
+    def merit(self, rehearsed: ExpectedRuns) -> float:
         """Logarithm of how well it is reached, each part counting the same."""
         total = 0.0
         if self.of is not None:
@@ -53,7 +59,7 @@ class _Goal:
             total += log_distance(least_distance(rehearsed, group)) / len(self.groups)
         return total
 
-    def outlook(self, rehearsed: Rehearsed) -> Outlook:
+    def outlook(self, rehearsed: ExpectedRuns) -> Outlook:
         """What runs are expected to tell."""
         separations = []
         for group in self.groups:
@@ -87,6 +93,7 @@ def plan_runs(
     power_steps: bool = True,
     seed: int = 0,
     most: int = MOST_RUNS,
+    rehearsed: bool = False,
     progress: Callable[[str], None] | None = None,
 ) -> Plan:
     """Programmes that make wanted parameters identifiable, or pull effects apart, within so many hours.
@@ -125,6 +132,8 @@ def plan_runs(
         Of the search.
     most
         Programmes that are tried at most for each run.
+    rehearsed
+        Whether to tell what a diagnosis of all planned runs would name of each candidate.
     progress
         Told what is being done.
 
@@ -165,7 +174,30 @@ def plan_runs(
         noise,
         tuple(planned),
         (*on.assumed, *assumed, _EXACT),
+        _rehearsed(twin, noise, planned, columns, seed, progress) if rehearsed else (),
     )
+
+
+def _rehearsed(
+    twin: Twin,
+    noise: NoiseModel,
+    planned: Sequence[PlannedRun],
+    columns: Sequence[str] | None,
+    seed: int,
+    progress: Callable[[str], None] | None,
+) -> tuple[Rehearsed, ...]:
+    """What a diagnosis of the planned runs, their sensors as the twin's, would name of each candidate."""
+    if progress is not None:
+        progress("rehearsing each candidate")
+    quiet = replace(twin, noise=NoiseConstants())
+    runs = [
+        quiet.simulate(
+            p.programme, sample_s=FINE_S, facts=p.facts, columns=None if columns is None else tuple(columns),
+            seed=seed + i,
+        ).run
+        for i, p in enumerate(planned)
+    ]  # fmt: skip
+    return rehearse(foreseen(TwinModel(quiet), runs, noise, Priors()))
 
 
 def _next_run(
@@ -179,7 +211,7 @@ def _next_run(
 ) -> PlannedRun:
     earlier = [run.rehearsal for run in before]
 
-    def together(design: Design, sample_s: float) -> Rehearsed:
+    def together(design: Design, sample_s: float) -> ExpectedRuns:
         new = Rehearsal(on, family, design, sample_s)
         return Together([*earlier, new]) if earlier else new
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -43,6 +44,7 @@ def plan_values(plan: Plan) -> dict[str, Any]:
         "least_distance": LEAST_DISTANCE,
         **_outlook(plan.outlook),
         "runs": [_run(number, run) for number, run in enumerate(plan.runs)],
+        "rehearsal": [{**asdict(r), "named_as": list(r.named_as)} for r in plan.rehearsal],
         "assumed": list(plan.assumed),
     }
 

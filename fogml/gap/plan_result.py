@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from fogml.gap.fisher import Criterion
+from fogml.gap.how_far_result import Rehearsed
 from fogml.gap.rehearsal import Rehearsal
 from fogml.gap.separating import LEAST_DISTANCE
 from fogml.runs.facts import Facts
@@ -126,6 +127,8 @@ class Plan:
         In order; the last one's outlook is the plan's.
     assumed
         What was assumed, in words.
+    rehearsal
+        What a diagnosis of all runs would name of each candidate, where that was asked for.
     """
 
     twin: str
@@ -136,6 +139,7 @@ class Plan:
     noise: NoiseModel
     runs: tuple[PlannedRun, ...]
     assumed: tuple[str, ...]
+    rehearsal: tuple[Rehearsed, ...] = ()
 
     @property
     def outlook(self) -> Outlook:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from fogml.gap.families.frame import LONGEST_RUNS, fixed_columns
+from fogml.gap.families.frame import fixed_columns, whitener_of
 from fogml.gap.families.linear_gaussian import LinearGaussian
 from fogml.gap.families.making_rows import rows_of
 from fogml.gap.families.places import Scene
@@ -22,7 +22,6 @@ from fogml.gap.twin_model import TwinModel
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
-from fogml.signals.whitening import Whitener
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.plant.power import SelfHeating
 from fogml.twin.registry import effect
@@ -104,7 +103,7 @@ def stage(
     )
 
 
-class Rehearsed:
+class ExpectedRuns:
     """Whitened columns of one run or of several together.
 
     Attributes
@@ -132,7 +131,7 @@ class Rehearsed:
         return self.beside_all.gram(columns)
 
 
-class Rehearsal(Rehearsed):
+class Rehearsal(ExpectedRuns):
     """A run of a design as a diagnosis would see it.
 
     Parameters
@@ -159,9 +158,7 @@ class Rehearsal(Rehearsed):
         run = run.with_columns(gyro=np.where(np.isfinite(run.gyro), 0.0, np.nan))
         self.rows = rows = rows_of(run, model.twin, len(run))
         self._values = on.values
-        span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
-        ladder = on.noise.ladder(rows.row_s, LONGEST_RUNS * span)
-        self._whitener = Whitener(on.noise, rows.end_s, rows.row_s, ladder)
+        self._whitener = whitener_of(on.noise, rows)
         reading = _reading_noise(rows, on.sensors, on.values)
         self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
         scene, none = Scene((rows,), 1, on.model.grade), dict[str, float]()
@@ -185,10 +182,10 @@ class Rehearsal(Rehearsed):
         return self.rows.changed_output(declared, about, self._values) / about
 
 
-class Together(Rehearsed):
+class Together(ExpectedRuns):
     """Several runs of one unit, whose constants and effects are the same in all."""
 
-    def __init__(self, runs: Sequence[Rehearsed]) -> None:
+    def __init__(self, runs: Sequence[ExpectedRuns]) -> None:
         self._runs = runs
         constants = np.concatenate([run.constants for run in runs])
         super().__init__(runs[0].stage, constants, block_diag(*(run.nuisances for run in runs)))
@@ -199,7 +196,7 @@ class Together(Rehearsed):
 
 
 def _reading_noise(rows: Rows, sensors: Sensors, values: Mapping[str, float]) -> FloatArray:
-    """What noise and last digit of the sensors make of the replay, a standard deviation [deg/h], shape (m,)."""
+    """Standard deviation that noise and last digit of the sensors make of the replay [deg/h], shape (m,)."""
     variance = np.zeros(len(rows.kept))
     for name, slope in slopes(rows, values).items():
         place = rows.even.place(name)

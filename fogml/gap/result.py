@@ -6,17 +6,19 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.confidence import Support
 from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehearsed, WhatIf
-from fogml.gap.model import EffectValue, GyroModel, NoisePrior
+from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
 from fogml.runs.run import FloatArray
+
+if TYPE_CHECKING:
+    from fogml.gap.twin_model import AnyModel
 
 NAMED = 0.5
 """An effect is named from this probability on."""
@@ -57,12 +59,6 @@ class Found:
         In the card's unit; its standard error holds what the true form may differ by.
     parameters
         Shape parameters by name.
-    support
-        What its probability follows; the margin is less what is `unrealised`.
-    unrealised
-        Gain that the evidence credits it with, and that its own form as fitted does not bring [nats].
-    left_out
-        Ids of effects that are no candidates, and that look like it.
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -92,9 +88,6 @@ class Found:
     share: float | None = None
     place: str = ""
     times_usual: float | None = None
-    support: Support = field(default_factory=Support)
-    unrealised: float = 0.0
-    left_out: tuple[str, ...] = ()
     grows: float | None = None
     onset: Onset | None = None
     log_odds: tuple[float, float] | None = None
@@ -112,14 +105,10 @@ class Found:
 
 @dataclass(frozen=True)
 class Unknown:
-    """What no candidate explains: its probability, and what it looks like in plain words.
-
-    ``log_odds`` are those of the evidence, before calibration.
-    """
+    """What no candidate explains: its probability, and what it looks like in plain words."""
 
     probability: float
     looks_like: str
-    log_odds: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -296,7 +285,7 @@ class Diagnosis:
         """The effects that are named."""
         return tuple(found for found in self.found if found.named)
 
-    def write_model(self, model: GyroModel, path: Path) -> None:
+    def write_model(self, model: AnyModel, path: Path) -> None:
         """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``."""
         noise, spread = self.noise.coefficients, self.noise.relative_se
         factors = {f"factor_{name}": max(math.exp(spread.get(name, 0.0)), 1.0) for name in "NBK"}

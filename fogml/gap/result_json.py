@@ -55,7 +55,6 @@ def _found(found: Found) -> dict[str, Any]:
     return {
         "effect": found.effect,
         "class": list(found.members),
-        "left_out": list(found.left_out),
         "probability": found.probability,
         "amplitude": asdict(found.amplitude),
         "parameters": {name: asdict(value) for name, value in found.parameters.items()},
@@ -70,8 +69,6 @@ def _found(found: Found) -> dict[str, Any]:
         "share": found.share,
         "place": found.place,
         "times_usual": found.times_usual,
-        **asdict(found.support),
-        "unrealised": found.unrealised,
     }
 
 

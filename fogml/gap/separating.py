@@ -24,7 +24,7 @@ from fogml.gap.model import EffectValue
 from fogml.gap.programme_design import Mounting
 from fogml.gap.programme_family import Family
 from fogml.gap.programme_search import MOST_RUNS, Tried, finely, search
-from fogml.gap.rehearsal import FINE_S, Rehearsal, Rehearsed, Stage, stage
+from fogml.gap.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, stage
 from fogml.gap.result import SeparatingRun
 from fogml.gap.shapes import Node, grid, usual_shape
 from fogml.runs.facts import Facts
@@ -184,7 +184,7 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
     return tuple(found)
 
 
-def distances(rehearsal: Rehearsed, members: Sequence[Member], *, refined: bool = False) -> FloatArray:
+def distances(rehearsal: ExpectedRuns, members: Sequence[Member], *, refined: bool = False) -> FloatArray:
     """Distance of each member (row) from each other one (column), shape (k, k).
 
     On the diagonal stands the length of each beside the constants. `refined` fits shapes between the nodes
@@ -222,7 +222,7 @@ def distances(rehearsal: Rehearsed, members: Sequence[Member], *, refined: bool 
     return found
 
 
-def least_distance(rehearsal: Rehearsed, members: Sequence[Member], *, refined: bool = False) -> float:
+def least_distance(rehearsal: ExpectedRuns, members: Sequence[Member], *, refined: bool = False) -> float:
     """The least distance over pairs, or the length of a single member."""
     found = distances(rehearsal, members, refined=refined)
     if len(members) == 1:
@@ -262,7 +262,7 @@ def _gain(gram: FloatArray, fit: FloatArray, candidate: Effect) -> float:
     return float(np.sum(along**2 / values[keep]))
 
 
-def _refined(rehearsal: Rehearsed, true: FloatArray, member: Member, node: Node, gain: float) -> float:
+def _refined(rehearsal: ExpectedRuns, true: FloatArray, member: Member, node: Node, gain: float) -> float:
     """The gain with the shape fitted from a node on, where it is free there."""
     from scipy.optimize import minimize
 

@@ -24,8 +24,6 @@ NODES = {1: 9, 2: 5, 3: 4}
 """Nodes for each parameter that needs a grid, by how many there are."""
 CYCLES_BETWEEN_NODES = 0.3
 """Spacing of lines on a grid, in cycles over the longest run."""
-FINER_LINE, FINER = 5, {1: 3, 2: 3, 3: 2}
-"""What a node that stands out is parted into: a line, others along each parameter that needs a grid."""
 WHOLE = ("harmonic",)
 """Parameters that are whole numbers."""
 NARROW, BEYOND = 3.0, 1.3
@@ -114,63 +112,6 @@ def corners(candidate: Candidate, grade: str) -> tuple[dict[str, float], ...]:
     usual = usual_shape(candidate, grade)
     ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))  # type: ignore[arg-type]
     return tuple({**shape, **at} for shape in (usual, *ends))
-
-
-def finer(candidate: Candidate, nodes: Sequence[Node], node: Node) -> tuple[Node, ...]:
-    """A node parted into several nearby ones, which share what it stands for: a line's in frequency alone.
-
-    Parameters
-    ----------
-    candidate
-        The candidate.
-    nodes
-        Its grid.
-    node
-        One of it.
-    """
-    declared = {q.name: q for q in candidate.shape}
-    axes = {name: sorted({n.shape[name] for n in nodes}) for name in node.shape}
-    bent = [name for name, values in axes.items() if len(values) > 1 and name not in WHOLE]
-    lines = [name for name in bent if node.frequency_hz is not None and _is_in_time(declared.get(name))]
-    bent = lines or bent
-    if not bent:
-        return (node,)
-    parts = FINER_LINE if lines else FINER.get(len(bent), 1)
-    places = (np.arange(parts) + 0.5) / parts - 0.5
-    near = [_about(declared.get(name), axes[name], node.shape[name], places) for name in bent]
-    found = []
-    for values in product(*near):
-        at = dict(zip(bent, values))
-        shape = {**node.shape, **at}
-        draws = tuple({**draw, **at} for draw in node.draws)
-        frequency = _frequency([declared[name] for name in lines], values)
-        found.append(replace(node, shape=shape, draws=draws, frequency_hz=frequency))
-    return tuple(found)
-
-
-def _about(
-    quantity: Quantity | None, values: Sequence[float], value: float, places: FloatArray
-) -> list[float]:
-    """Values about one of an axis, at shares of the way to its neighbours; none beyond the axis' ends."""
-    inverse = quantity is not None and is_line(quantity) and "period" in quantity.name
-    geometric = not inverse and values[0] > 0.0 and _is_geometric(values)
-    to, back = (
-        (np.log, np.exp) if geometric else (np.reciprocal, np.reciprocal) if inverse else (np.copy, np.copy)
-    )
-    axis = np.sort(to(np.array(values, dtype=np.float64)))
-    middle = float(to(np.float64(value)))
-    i = int(np.argmin(np.abs(axis - middle)))
-    below, above = axis[max(i - 1, 0)], axis[min(i + 1, len(axis) - 1)]
-    moved = middle + np.where(places < 0.0, (middle - below) * places, (above - middle) * places)
-    # The node itself stays what it is to the last digit.
-    found = np.where(moved == middle, value, back(moved))
-    return sorted({float(x) for x in found})
-
-
-def _is_geometric(values: Sequence[float]) -> bool:
-    """Whether an axis is evenly spaced in the logarithm."""
-    steps = np.diff(np.log(values))
-    return len(steps) > 1 and bool(np.ptp(steps) < 1e-6 * steps.max())
 
 
 def _grid(

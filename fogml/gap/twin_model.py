@@ -6,12 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from fogml.gap.model import Candidate, Constant, EffectValue, NoisePrior
-from fogml.gap.seen_as import AS_CANDIDATE
-from fogml.gap.twin_on_run import TwinOnRun, with_effects
-from fogml.runs.run import Run
+import numpy as np
+
+from fogml.gap.model import Candidate, Constant, EffectValue, GyroModel, NoisePrior
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, UNITS, NominalConstants
-from fogml.twin.registry import effects
+from fogml.twin.registry import effect, effects
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
 
@@ -50,14 +49,10 @@ class TwinModel:
         """Candidates of the catalogue that are not on yet and don't conflict with what is."""
         on = set(self.twin.settings)
         return {
-            id: AS_CANDIDATE[id](declared) if id in AS_CANDIDATE else declared
+            id: declared
             for id, declared in effects().items()
             if declared.candidate and id not in on | self.lacks and not on & set(declared.conflicts)
         }
-
-    def on(self, run: Run) -> TwinOnRun:
-        """The twin with a run's inputs."""
-        return TwinOnRun(self.twin, run)
 
     def write(
         self,
@@ -81,3 +76,22 @@ class TwinModel:
             noise_factor={"N": noise.factor_N, "B": noise.factor_B, "K": noise.factor_K},
         )
         save_twin(twin, path)
+
+
+AnyModel = TwinModel | GyroModel
+"""What can be diagnosed: the twin, whose own inputs the families know, or another model in its place."""
+
+
+def with_effects(twin: Twin, constants: Mapping[str, float], effects: tuple[EffectValue, ...]) -> Twin:
+    """The twin with constants set and effects on, each within what is physical."""
+    changed = twin.with_nominal(**{name: float(value) for name, value in constants.items()})
+    for value in effects:
+        declared = effect(value.id)
+        held = {
+            q.name: float(np.clip(value.shape[q.name], *q.limits))
+            for q in declared.shape
+            if q.name in value.shape
+        }
+        amplitude = float(np.clip(value.amplitude, *declared.amplitude.limits))
+        changed = changed.with_effect(value.id, amplitude, **held)
+    return changed

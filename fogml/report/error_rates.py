@@ -1,7 +1,7 @@
 """How often a diagnosis is right: what the check on withheld effects found, told beside each diagnosis.
 
-``error_rates.json`` holds the rates. ``python -m experiments.families DIR...`` writes them of development cases,
-``python -m experiments.gap_blind DIR --final`` of cases that nothing was developed on.
+``error_rates.json`` holds the rates. ``python -m experiments.families DIR...`` writes them of development
+cases, ``python -m experiments.gap_blind DIR --final`` of cases that nothing was developed on.
 """
 
 from __future__ import annotations
@@ -63,8 +63,8 @@ def error_sentences(found: Diagnosis) -> list[str]:
         + (
             "."
             if rates["final"]
-            else ": synthetic all of them, and the diagnosis was worked on with these in view, so that it may "
-            "err more often elsewhere."
+            else ": synthetic all of them, and the diagnosis was worked on with these in view, so that it "
+            "may err more often elsewhere."
         )
         + " Take a name as a hint for the next run."
     ]

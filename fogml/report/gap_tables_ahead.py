@@ -51,9 +51,9 @@ def _what_if(w: WhatIf, names: dict[str, str]) -> Row:
     )
 
 
-def rehearsal_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
-    """What these runs would name if each candidate acted alone; None where it was not asked for."""
-    if not found.rehearsal:
+def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Table | None:
+    """What runs would name if each candidate acted alone; None where it was not asked for."""
+    if not rehearsal:
         return None
     return Table(
         columns=(
@@ -64,8 +64,8 @@ def rehearsal_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
             ("It would be", "", "text"),
             ("Probability", "", "number"),
         ),
-        rows=tuple(_rehearsed(r, names) for r in _worst_first(found.rehearsal)),
-        caption="Each candidate is put into replays of these very runs, without noise, and judged by the "
+        rows=tuple(_rehearsed(r, names) for r in _worst_first(rehearsal)),
+        caption="Each candidate is put into replays of these runs, without noise, and judged by the "
         "evidence of one cause. Under a length of 3 nothing can be told.",
     )
 

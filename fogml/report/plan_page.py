@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from fogml.gap.how_far_result import Rehearsed
 from fogml.report.figures_plan import errors_drawing, programme_drawing
+from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, listed, number, plural, stated
+from fogml.twin.registry import effects
 
 
 def plan_page(values: Mapping[str, Any]) -> str:
@@ -32,6 +35,10 @@ def plan_page(values: Mapping[str, Any]) -> str:
         wanted=_wanted(values),
         correlations=_correlations(values),
         separations=_separations(values),
+        rehearsal=rehearsal_table(
+            [Rehearsed(**{**r, "named_as": tuple(r["named_as"])}) for r in values.get("rehearsal", ())],
+            {id: declared.title for id, declared in effects().items()},
+        ),
         about=_about(values),
     )
 

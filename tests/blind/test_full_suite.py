@@ -10,9 +10,6 @@ import pytest
 import yaml
 
 from experiments.gap_blind import __main__ as full
-from experiments.gap_blind import per_case
-from experiments.gap_blind.calibrate import may_be_learned_from
-from fogml.blind.make import make_cases
 from fogml.blind.plan import plans
 from fogml.blind.scoring.marks_file import write_marks
 from fogml.blind.scoring.table import ENOUGH, FIGURES
@@ -47,14 +44,6 @@ def test_the_parts_never_meet_and_give_every_wanted_row_enough() -> None:
             if plan.kind in figure.kinds and (plan.mix or not figure.of_mix)
         )
         assert cases >= ENOUGH, (figure.key, cases)
-
-
-def test_a_final_seed_is_learned_from_when_another_is_kept() -> None:
-    kept = CONFIG["final"]["seed"]
-    used = {use["seed"] for use in uses(full.HERE / "final_uses.json")}
-    assert may_be_learned_from(1) and not may_be_learned_from(kept)
-    assert all(may_be_learned_from(seed) for seed in used - {kept})
-    assert not may_be_learned_from(max(used | {kept}) + 1)
 
 
 def test_a_part_is_scored_with_the_marks_that_are_there(
@@ -95,19 +84,3 @@ def test_a_part_is_scored_with_the_marks_that_are_there(
         "marks-old.json.gz",
         "marks-one.json.gz",
     ]
-
-
-def test_what_is_measured_of_a_part_joins_the_other_parts_of_its_seed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    home = tmp_path / "home"
-    home.mkdir()
-    monkeypatch.setattr(per_case, "HERE", home)
-    for part, seed, first in (("mix", 3, 1), ("one", 3, 2001), ("old", 4, 1)):
-        make_cases(tmp_path / part, 1, seed, sample_s=30.0, workers=1, kinds=["nothing"], first=first)
-        monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / part), "--workers", "1"])
-        found = per_case.measure_cases("limits", lambda folder, case: [case], "", "").cases
-    assert found == [["0001"]]
-    monkeypatch.setattr(sys, "argv", ["limits", str(tmp_path / "one"), "--workers", "1"])
-    last = per_case.measure_cases("limits", lambda folder, case: [case], "", "")
-    assert last.cases == [["0001"], ["2001"]]

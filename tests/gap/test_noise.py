@@ -1,32 +1,32 @@
-"""The noise that a diagnosis judges by: of a static run, of the runs themselves, and what is refused."""
+"""The noise that a diagnosis starts from: of a static run or of the model, and what is refused."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.dictionary import unknown_groups
-from fogml.gap.noise import UNIT_FACTOR, noise_of, prior_of
-from fogml.gap.observation import observe
+from fogml.gap.noise import UNIT_FACTOR, prior_of
+from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
-from tests.gap.small_model import NOISE, SmallModel, ramps, recorded
+from fogml.twin.noise import NoiseConstants
+from fogml.twin.twin_file import load_twin
 
-MODEL = SmallModel()
-
-
-def coloured(time, step, seed, noise=NOISE):
-    ladder = noise.ladder(step, 30.0 * (time[-1] - time[0] + step))
-    whitener = Whitener(noise, time, step, ladder)
-    return whitener.colour(np.random.default_rng(seed).standard_normal((len(time), 1)))[:, 0]
+NOISE = NoiseModel(0.02, 0.03, 0.05)
+TWIN = load_twin("nominal")
+MODEL = TwinModel(replace(TWIN, noise=NoiseConstants(N=NOISE.N, B=NOISE.B, K=NOISE.K)))
 
 
 def static(count=4000, seed=1, noise=NOISE, **more) -> Run:
     time = 5.0 * np.arange(count)
+    whitener = Whitener(noise, time, 5.0, noise.ladder(5.0, 30.0 * (time[-1] + 5.0)))
+    coloured = whitener.colour(np.random.default_rng(seed).standard_normal((count, 1)))[:, 0]
     columns = {"T": np.full(count, 25.0)} | more
-    return Run.from_columns("static", time=time, gyro=3.0 + coloured(time, 5.0, seed, noise), **columns)
+    return Run.from_columns("static", time=time, gyro=3.0 + coloured, **columns)
 
 
 def test_a_static_run_tells_the_noise_whatever_was_expected():
@@ -43,7 +43,7 @@ def test_a_static_run_tells_the_noise_whatever_was_expected():
 def test_without_a_static_run_the_prior_is_the_models():
     prior, _ = prior_of(MODEL, None)
     assert (prior.centre.N, prior.centre.B, prior.centre.K) == (NOISE.N, NOISE.B, NOISE.K)
-    assert prior.factor == (3.0, 3.0, 3.0)
+    assert prior.factor == tuple(TWIN.noise_factor[name] for name in "NBK")
 
 
 def test_drift_with_temperature_is_no_noise_of_a_static_run():
@@ -66,21 +66,3 @@ def test_drift_with_temperature_is_no_noise_of_a_static_run():
 def test_what_is_no_noise_run_is_refused(run, message):
     with pytest.raises(InputError, match=message):
         prior_of(MODEL, run)
-
-
-def test_what_moves_with_temperature_is_kept_out_of_the_runs_noise():
-    found = []
-    for wave in (0.0, 2.0):
-        runs = []
-        for name, turns, seed in (("a", 2, 3), ("b", 3, 4)):
-            run = ramps(name, count=1500, step=5.0, turns=turns)
-            bend = wave * np.tanh((run.temperature() - 18.0) / 6.0)
-            noise = coloured(run.time, 5.0, seed) + bend
-            runs.append(observe(recorded(run, MODEL, {"offset": 1.0}, noise=noise), MODEL))
-        prior, source = prior_of(MODEL, None)
-        noise = noise_of(runs, MODEL.constants, unknown_groups(runs), prior, source)
-        assert pytest.approx(NOISE.N, rel=0.05) == noise.model.N
-        assert (noise.fit.standard_errors > 0.0).all()
-        found.append(noise.model)
-    flat, bent = found
-    assert bent.B < 1.5 * flat.B and bent.K < 2.0 * flat.K

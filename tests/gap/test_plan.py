@@ -61,7 +61,8 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
     size = np.sqrt(np.diag(expected))
     white = responses(rehearsal, of)
     found = white.T @ white
-    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=0.02)
+    # Windows of DeltaT are integrals there and sums of samples in a replay.
+    np.testing.assert_allclose(found / np.outer(size, size), expected / np.outer(size, size), atol=0.04)
     names = [of.parameters[i].name for i in of.wanted]
     assert names == [
         "k1",
@@ -87,7 +88,7 @@ def test_merits_are_those_of_the_covariance(rehearsed):
 
 
 def test_a_plan_promises_what_it_finds_and_repeats():
-    ask = {"hours": 10.0, "most": 20, "seed": 2, "separate": [["thermal_hysteresis", "stress_relaxation"]]}
+    ask = {"hours": 10.0, "most": 12, "seed": 2, "separate": [["thermal_hysteresis", "stress_relaxation"]]}
     plan = plan_runs(load_twin("nominal"), ["thermal_hysteresis.half_width", "k1"], runs=2, **ask)
     assert [e.name for e in plan.outlook.errors] == ["k1", "thermal_hysteresis.half_width"]
     assert all(run.programme.total_hours <= 10.0 for run in plan.runs)
@@ -101,7 +102,7 @@ def test_a_plan_promises_what_it_finds_and_repeats():
 
 
 def test_scale_factor_is_planned_with_turns():
-    plan = plan_runs(TWIN, ["k1"], hours=6.0, most=80, criterion="A", facts=FACTS)
+    plan = plan_runs(TWIN, ["k1"], hours=6.0, most=30, criterion="A", facts=FACTS)
     assert any(plan.runs[0].programme.schedule.table_rate.values)
     error = plan.outlook.errors[0]
     assert error.se < 0.01 * error.prior

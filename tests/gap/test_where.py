@@ -6,21 +6,33 @@ import numpy as np
 import pytest
 
 from fogml.gap.noise import Noise
-from fogml.gap.observation import observe
 from fogml.gap.where import SHORTEST_SEGMENT_S, GapOnRun, where
 from fogml.runs.regimes import regimes
+from fogml.runs.run import Run
 from fogml.signals.noise_fit import NoiseFit, NoisePrior
-from tests.gap.small_model import NOISE, SmallModel, noise_of, ramps
+from fogml.signals.noise_model import NoiseModel
 
+NOISE = NoiseModel(0.02, 0.03, 0.05)
 KNOWN = Noise(NOISE, NoiseFit(NOISE, np.diag([1e-4, 1e-3, 1e-2]), NoisePrior(NOISE), 0.0, 1), "known")
-RUN = ramps("a", count=1000, step=10.0, turns=2)
-TIME = RUN.time
+TIME = 10.0 * np.arange(1000)
+TEMPERATURE = np.interp(TIME, [0.0, 0.5 * TIME[-1], TIME[-1]], [0.0, 40.0, 0.0])
+RUN = Run.from_columns("a", time=TIME, gyro=np.zeros(1000), T=TEMPERATURE)
+ROOT = np.linalg.cholesky(NOISE.covariance(TIME, 10.0, NOISE.ladder(10.0, 30.0 * (TIME[-1] + 10.0))))
 
 
-def located(added, seed=0, systematic=None, stages=None, run=RUN):
-    gap = added + noise_of(run, np.random.default_rng(seed))
-    o = observe(run, SmallModel())
-    part = GapOnRun(o, gap, added if systematic is None else systematic)
+class Rows:
+    """The run, a row a sample."""
+
+    run, time, row_s, temperature = RUN, TIME, 10.0, TEMPERATURE
+    regime = regimes(RUN).labels
+
+    def __len__(self):
+        return len(TIME)
+
+
+def located(added, seed=0, systematic=None, stages=None):
+    gap = added + ROOT @ np.random.default_rng(seed).standard_normal(len(RUN))
+    part = GapOnRun(Rows(), gap, added if systematic is None else systematic)
     return where([part], {"bias": 1.0} if stages is None else stages, KNOWN)
 
 

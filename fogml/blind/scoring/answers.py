@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
@@ -10,7 +10,6 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from fogml.blind.folders import OUTCOME, read_json
 from fogml.blind.truth import Amount
 from fogml.errors import InputError
-from fogml.gap.confidence import Support
 from fogml.strict import Strict, strictly
 
 NAMED = 0.5
@@ -38,21 +37,6 @@ class Listed(_Answered):
     members: tuple[str, ...] = Field(alias="class")
     probability: float = Field(ge=0.0, le=1.0)
     amplitude: Fitted | None = None
-    margin: float | None = None
-    form_share: float = 0.0
-    rest: float = 0.0
-    length: float = 0.0
-    outside: int = 0
-    joint: float = 0.0
-    others: float = 0.0
-
-    @property
-    def support(self) -> Support | None:
-        """What its probability follows; None of a method that states no margin."""
-        if self.margin is None:
-            return None
-        stated = {f.name: getattr(self, f.name) for f in fields(Support)}
-        return Support(**stated)
 
     @property
     def named(self) -> bool:
@@ -62,7 +46,6 @@ class Listed(_Answered):
 
 class _Unknown(_Answered):
     probability: float = Field(ge=0.0, le=1.0)
-    log_odds: float | None = None
 
 
 class _Stretch(_Answered):

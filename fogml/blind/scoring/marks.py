@@ -8,14 +8,13 @@ structure is what is wrong. A case that failed is a wrong answer in every figure
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
 
 from fogml.blind.scoring.answers import Answer, Gap, Listed
 from fogml.blind.scoring.statistics import overlap
 from fogml.blind.truth import Truth
-from fogml.gap.confidence import Support
 from fogml.intervals import Z90
 
 Relative = Callable[[str], bool]
@@ -27,14 +26,13 @@ _RIGHT_VERDICTS = ("no_gap", "unknown")
 
 @dataclass(frozen=True)
 class Judged:
-    """An item of ``which``: what it names, how certain, whether named, whether right, what supports it."""
+    """An item of ``which``: what it names, how certain, whether named, whether right."""
 
     effect: str
     members: tuple[str, ...]
     probability: float
     named: bool
     right: bool
-    support: Support | None = None
 
 
 @dataclass(frozen=True)
@@ -71,8 +69,6 @@ class Mark:
         Relatives of what was left out that it lists.
     code
         State of the code that answered.
-    log_odds
-        Of the unknown by the evidence, where the method states them.
     suspected
         What is more likely than not, and not named.
     """
@@ -94,7 +90,6 @@ class Mark:
     samples: int | None = None
     relatives: tuple[str, ...] = ()
     code: str | None = None
-    log_odds: float | None = None
     suspected: tuple[Judged, ...] = ()
 
     @property
@@ -149,7 +144,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
             near = [id for id in item.members if asked(id)]
             relatives.extend(near)
             right = bool(near)
-        return Judged(item.effect, item.members, item.probability, item.named, right, item.support)
+        return Judged(item.effect, item.members, item.probability, item.named, right)
 
     items = tuple(judged(item) for item in gap.which)
     standing = _standing(truth, items)
@@ -169,13 +164,7 @@ def mark(truth: Truth, answer: Answer, relative: Relative | None = None) -> Mark
         samples=answer.samples,
         relatives=tuple(relatives),
         code=answer.code,
-        log_odds=gap.unknown.log_odds,
     )
-
-
-def renamed(found: Mark, items: tuple[Judged, ...]) -> Mark:
-    """The same case, had these items been listed, most certain first, and nothing been suspected."""
-    return replace(found, items=items, suspected=(), **asdict(_standing(found.truth, items)))
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,11 @@ from scipy.special import expit
 
 from fogml.gap.families.card import card_of
 from fogml.gap.families.closing import Foretold
+from fogml.gap.families.frame import Field
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.posterior import Judgement, at_cost
 from fogml.gap.families.repeating import repeat_run
+from fogml.gap.families.search import Search
 from fogml.gap.how_far_result import Rehearsed
 from fogml.gap.model import EffectValue
 from fogml.gap.result import NAMED, Found, SeparatingRun
@@ -91,45 +93,45 @@ def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectVal
 
 
 def rehearse(
-    found: Inference, items: Sequence[Found], cost_of_false_name: float = 1.0
+    search: Search, items: Sequence[Found] = (), cost_of_false_name: float = 1.0
 ) -> tuple[Rehearsed, ...]:
-    """What a diagnosis of these runs would name, miss or mistake if one candidate acted alone.
+    """What a diagnosis of the runs of a search would name, miss or mistake if one candidate acted alone.
 
     Each is put into replays of these very runs, at its usual size and, if it was found, at that, in several
     forms. The data are what it is expected to make, without noise (G. Cowan et al., Eur. Phys. J. C 71 (2011)
     1554), judged beside the constants by the evidence of one cause.
     """
-    setting = found.setting
+    setting = search.field.setting
     grade = setting.scene.grade
     sizes = {f.effect: abs(f.amplitude.value) for f in items if f.named}
     rows = []
-    for f in found.search.families_of("known"):
-        declared = setting.scene.candidates[found.columns.families[f].id]
+    for f in search.families_of("known"):
+        declared = setting.scene.candidates[search.families[f].id]
         if isinstance(declared, NoiseEffect) and not declared.steady:
             continue
         usual = declared.amplitude.typical(grade)  # type: ignore[arg-type]
         asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
         for form, shape in zip(FORMS, corners(declared, grade)):
-            response = _response(found, declared.id, shape)
+            response = _response(search.field, declared.id, shape)
             for size, amplitude in asked:
-                rows.append(_judged(found, f, form, size, amplitude * response, cost_of_false_name))
+                rows.append(_judged(search, f, form, size, amplitude * response, cost_of_false_name))
             if not declared.shape:
                 break
     return tuple(rows)
 
 
-def _response(found: Inference, id: str, shape: dict[str, float]) -> FloatArray:
+def _response(held: Field, id: str, shape: dict[str, float]) -> FloatArray:
     """Whitened response of an effect to a unit of its amplitude on the fit runs."""
-    scene = found.setting.scene
+    scene, values = held.setting.scene, held.setting.values
     declared = scene.candidates[id]
     bare = {name: value for name, value in shape.items() if name in {q.name for q in declared.shape}}
-    parts = [r.response(declared, bare, None, found.setting.values) for r in scene.runs[: scene.fitted]]
-    return found.field.whitening.stacked(parts)
+    parts = [r.response(declared, bare, None, values) for r in scene.runs[: scene.fitted]]
+    return held.whitening.stacked(parts)
 
 
-def _judged(found: Inference, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
-    search, priors, families = found.search, found.setting.priors, found.columns.families
-    basis = found.field.base.basis
+def _judged(search: Search, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
+    priors, families = search.priors, search.families
+    basis = search.field.base.basis
     length = math.sqrt(max(float(data @ data) - float(np.sum((basis.T @ data) ** 2)), 0.0))
     scores = search.alone_on(data)
     known = {f: s for f, s in scores.items() if families[f].kind == "known"}

@@ -28,10 +28,9 @@ from fogml.gap.families.reports import (
 )
 from fogml.gap.families.shares import cause_shares
 from fogml.gap.how_far_result import Nearest, WhatIf
-from fogml.gap.model import GyroModel
 from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.twin_model import AnyModel, TwinModel
 from fogml.gap.where import GapOnRun, where
 from fogml.runs.epochs import with_epoch
 from fogml.runs.run import FloatArray, Run
@@ -45,7 +44,7 @@ NEAREST = 5
 
 
 def diagnose(
-    model: Twin | GyroModel,
+    model: Twin | AnyModel,
     fit: Sequence[Run],
     held_out: Sequence[Run] = (),
     *,
@@ -58,12 +57,22 @@ def diagnose(
     cost_of_false_name: float = 1.0,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Where the gap lies, which causes make it, how far it closes; as `fogml.gap.diagnosis.diagnose`.
+    """Where the gap lies, which causes make it, how far it closes; on recordings.
 
     Parameters
     ----------
     model
         The twin, or any model of a gyro in its place.
+    fit
+        Runs of one unit to fit on.
+    held_out
+        Runs for the final figure; if none, the last quarter of the last fit run.
+    noise
+        A static run of the unit.
+    without
+        Ids of effects that are no candidates.
+    seed
+        Of the draws behind intervals.
     priors
         What is taken for granted.
     plan
@@ -72,6 +81,8 @@ def diagnose(
         Whether to tell what these runs would name of each candidate.
     cost_of_false_name
         Of a false name over that of a missed one: a cause is named from odds of this on.
+    progress
+        Told what is being done.
 
     Raises
     ------
@@ -98,9 +109,10 @@ def diagnose(
         found = infer(model, fit, held_out, noise, without, priors or Priors(), tell)
         moved = max(float(np.ptp(r.temperature)) for r in found.setting.scene.runs[: len(fit)])
         if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in found.setting.scene.runs):
+            names = ", ".join(r.run.name for r in found.setting.scene.runs[: len(fit)])
             raise InputError(
-                f"temperature moves by {moved:.2g} degC in all; a diagnosis needs a run in which it moves by "
-                f"{LEAST_MOTION_DEGC:g} degC or more"
+                f"{names}: temperature moves by {moved:.2g} degC in all; a diagnosis needs a run in which it "
+                f"moves by {LEAST_MOTION_DEGC:g} degC or more"
             )
         tell("judging on held-out runs")
         judged = judge(found)
@@ -111,7 +123,7 @@ def diagnose(
             answer = replace(answer, separating_run=run)
         if rehearsed:
             tell("rehearsing each candidate")
-            answer = replace(answer, rehearsal=rehearse(found, answer.found, cost_of_false_name))
+            answer = replace(answer, rehearsal=rehearse(found.search, answer.found, cost_of_false_name))
         return answer
 
 
@@ -146,7 +158,7 @@ def _answer(
     evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
     what_if = _what_if(found, named, held_out)
     nearest = _nearest(found, what_if, judged)
-    unknown = doubted(Unknown(judged.unknown, looks_like(found, judged), 0.0), items)
+    unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing)
     shown = () if verdict == "unknown" else tuple(f for f in items)
     from fogml.gap.noise import Noise
@@ -171,7 +183,7 @@ def _answer(
         separating_run=None,
         constants=constants_of(found, after),
         evidence=evidence,
-        noise=noise_of(found),
+        noise=noise_of(found, after),
         effects=fitted_values(found, judged, named, cards),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,

@@ -116,6 +116,12 @@ class Setting:
         return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
 
 
+def whitener_of(noise: NoiseModel, rows: Rows) -> Whitener:
+    """The whitener of a run's rows at a noise."""
+    span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
+    return Whitener(noise, rows.end_s, rows.row_s, noise.ladder(rows.row_s, LONGEST_RUNS * span))
+
+
 class Whitening:
     """Whitens series over the rows of the fit runs by one noise; readings' noise adds to it."""
 
@@ -123,8 +129,7 @@ class Whitening:
         self.noise = noise
         self._whiteners, self._weights = [], []
         for rows in setting.scene.runs[: setting.scene.fitted]:
-            span = float(rows.end_s[-1] - rows.end_s[0]) + rows.row_s
-            held = Whitener(noise, rows.end_s, rows.row_s, noise.ladder(rows.row_s, LONGEST_RUNS * span))
+            held = whitener_of(noise, rows)
             extra = (1.0 / rows.weight**2 - 1.0) * noise.white_density / rows.row_s
             self._whiteners.append(held)
             self._weights.append(1.0 / np.sqrt(1.0 + extra / held.deviation**2))

@@ -28,9 +28,8 @@ from fogml.gap.families.places import Scene, outstanding_lines
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search
-from fogml.gap.model import GyroModel
 from fogml.gap.noise import prior_of
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.twin_model import AnyModel, TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin import Twin
@@ -70,7 +69,7 @@ class Inference:
         Runs that could not be used, with the reason.
     """
 
-    model: GyroModel
+    model: AnyModel
     plant: Twin
     setting: Setting
     columns: Columns
@@ -86,7 +85,7 @@ class Inference:
 
 
 def infer(
-    model: GyroModel,
+    model: AnyModel,
     fit: Sequence[Run],
     held_out: Sequence[Run],
     noise: Run | None,
@@ -149,12 +148,22 @@ def _gap_length(setting: Setting, noise: NoiseModel) -> float:
     return math.sqrt(max(float(left[0, 0]) - len(data), 0.0))
 
 
+def foreseen(model: TwinModel, runs: Sequence[Run], noise: NoiseModel, priors: Priors) -> Search:
+    """A search on runs that hold no gap: it tells what they would, of noise that is known."""
+    most = min(priors.most_rows, priors.most_of_all // len(runs))
+    rows = tuple(rows_of(run, model.twin, most) for run in runs)
+    scene = Scene(rows, len(rows), model.grade, candidates=candidates_of(model))
+    setting = _setting(model, model.twin, scene, priors, noise)
+    columns = Columns.of(families_of(model.twin, scene, ()), scene, setting.values)
+    return Search(Field(setting, columns, noise))
+
+
 def _nodes(explanations: Sequence[Explanation]) -> list[int]:
     return sorted({n for e in explanations for n, _ in e.nodes})
 
 
 def _rows(
-    runs: Sequence[Run], model: GyroModel, plant: Twin, most: int
+    runs: Sequence[Run], model: AnyModel, plant: Twin, most: int
 ) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
     own = None if isinstance(model, TwinModel) else model
@@ -166,7 +175,7 @@ def _rows(
     return usable, unusable
 
 
-def _setting(model: GyroModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
+def _setting(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
     """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
     constants = model.constants
     values = {c.name: c.mean for c in constants}

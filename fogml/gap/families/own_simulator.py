@@ -22,7 +22,7 @@ from fogml.gap.model import (
     drawn_per_run,
     told_by,
 )
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.twin_model import AnyModel, TwinModel
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
@@ -110,7 +110,7 @@ class OwnOnRun:
         return np.asarray(self.on.output(constants, (value,))) - self.output(constants)
 
 
-def candidates_of(model: GyroModel) -> dict[str, Effect]:
+def candidates_of(model: AnyModel) -> dict[str, Effect]:
     """What may be named: a model's own candidates, or the catalogue's where it offers none.
 
     A candidate that bears an id of the catalogue's has that one's family, and its own sizes.
@@ -142,7 +142,7 @@ def _declared(candidate: Candidate, alike: Effect | None) -> Effect:
     return type("Own", (OwnEffect,), told)()
 
 
-def plant_of(model: GyroModel) -> Twin:
+def plant_of(model: AnyModel) -> Twin:
     """The twin whose plant tells temperatures that were not recorded: the model's, or the nominal one."""
     if isinstance(model, TwinModel):
         return model.twin

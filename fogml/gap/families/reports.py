@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from fogml.gap.averages import averages
+from fogml.gap.families.frame import whitener_of
 from fogml.gap.families.inference import FAR_OFF, Inference
 from fogml.gap.families.search import Member
-from fogml.gap.how_far import averages
 from fogml.gap.result import CandidateEvidence, ConstantFit, NoiseReport, RunSeries
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import floor_square
+from fogml.signals.whiteness import whiteness
 from fogml.twin.effect import NoiseEffect
 
 if TYPE_CHECKING:
@@ -29,6 +32,8 @@ if TYPE_CHECKING:
     from fogml.gap.families.inference import Inference
     from fogml.gap.families.posterior import Judgement
 
+FEWEST_CHECKED = 64
+"""Held-out rows under which the noise can't be checked."""
 POSSIBLE = 0.05
 """A candidate is possible from this probability on."""
 STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor"}
@@ -110,13 +115,34 @@ def constants_of(found: Inference, after: Foretold) -> tuple[ConstantFit, ...]:
     )
 
 
-def noise_of(found: Inference) -> NoiseReport:
-    """The noise that the diagnosis judged by."""
+def noise_of(found: Inference, after: Foretold) -> NoiseReport:
+    """The noise that the diagnosis judged by, and whether held-out runs' innovations are white by it."""
     model, errors = found.field.whitening.noise, found.points.fit.standard_errors
-    return NoiseReport(
+    told = NoiseReport(
         {"N": model.N, "B": model.B, "K": model.K},
         dict(zip("NBK", map(float, errors))),
         found.points.source,
+    )
+    scene, parts = found.setting.scene, []
+    for i in range(scene.fitted, len(scene.runs)):
+        rows = scene.runs[i]
+        gap = rows.gap - after.on(i)
+        parts.append(whitener_of(model, rows).whiten(gap - np.mean(gap)))
+    count = sum(map(len, parts))
+    if count < FEWEST_CHECKED:
+        return told
+    step = scene.runs[scene.fitted].row_s
+    check = whiteness(parts, sample_s=step)
+    return replace(
+        told,
+        white=bool(check.white),
+        p_value=float(check.p_value),
+        failed=tuple(check.failed),
+        lags_s=tuple(float(x) * step for x in check.lags),
+        autocorrelation=tuple(map(float, check.autocorrelation)),
+        scales_s=tuple(float(x) * step for x in check.scales),
+        variance_ratio=tuple(map(float, check.variance_ratio)),
+        samples=count,
     )
 
 
