@@ -87,7 +87,7 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
         rows = [
             [
                 f.effect,
-                ", ".join(f.others) or "–",
+                ", ".join([*f.others, *(f"{m} (left out)" for m in f.left_out)]) or "–",
                 f"{f.probability:.2f}",
                 f"{number(f.amplitude.value)} ± {number(f.amplitude.se)} {f.amplitude.unit}",
             ]

@@ -59,6 +59,8 @@ class Found:
         In the card's unit; its standard error holds what the true form may differ by.
     parameters
         Shape parameters by name.
+    left_out
+        Ids of effects that are no candidates, and that look like it.
     by_run
         The amplitude from each run that can show it.
     consistent
@@ -88,6 +90,7 @@ class Found:
     share: float | None = None
     place: str = ""
     times_usual: float | None = None
+    left_out: tuple[str, ...] = ()
     grows: float | None = None
     onset: Onset | None = None
     log_odds: tuple[float, float] | None = None

@@ -55,6 +55,7 @@ def _found(found: Found) -> dict[str, Any]:
     return {
         "effect": found.effect,
         "class": list(found.members),
+        "left_out": list(found.left_out),
         "probability": found.probability,
         "amplitude": asdict(found.amplitude),
         "parameters": {name: asdict(value) for name, value in found.parameters.items()},

@@ -14,7 +14,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.averages import Averages, InRows, averages
+from fogml.gap.how_far import Averages, InRows, averages
 from fogml.gap.noise import Noise
 from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.intervals import Z90

@@ -49,6 +49,7 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
             f"{name.replace('_', ' ')} {estimate_words(value)}" for name, value in f.parameters.items()
         )
         others = [title_of(m, names) for m in f.others]
+        others += [f"{title_of(m, names)}, which was left out" for m in f.left_out]
         cells = (
             f"{'Suspected: ' if is_suspected else ''}{title_of(f.effect, names)} ({f.effect})",
             probability_words(f.probability),

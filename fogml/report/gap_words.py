@@ -137,8 +137,16 @@ def verdict_sentences(found: Diagnosis) -> list[str]:
                 "another run can tell which it is."
                 for f in alike
             ]
+    doubted = [f for f in found.named if f.left_out]
     unknown = f"with probability {probability_words(found.unknown.probability)}"
-    if found.verdict == "partly_explained":
+    if doubted:
+        sentences += [
+            f"{listed([title_of(m, names) for m in f.left_out], 5)} would look like "
+            f"{title_of(f.effect, names)} in these runs, but was left out of the candidates: {unknown} "
+            "something acts that no candidate explains."
+            for f in doubted
+        ]
+    elif found.verdict == "partly_explained":
         sentences.append(f"Beside, {unknown}, something acts that no candidate explains{_looks(found)}.")
     if found.suspected:
         told = [f"{cause_words(f, names)} ({probability_words(f.probability)})" for f in found.suspected]

@@ -61,7 +61,7 @@ def plain(seed):
 
 def test_with_nothing_added_there_is_no_gap_and_a_run_that_can_not_be_used_says_why():
     a, b, c = plain(1)
-    found = diagnose(TWIN, [a, b, replace(b[:30], name="short.csv")], [c], noise=static(), plan=False)
+    found = diagnose(TWIN, [a, b, replace(b[:15], name="short.csv")], [c], noise=static(), plan=False)
     assert found.verdict == "no_gap" and not found.named
     (far,) = found.how_far
     assert far.after == far.recalibrated < 2.0 * far.floor < far.before
@@ -141,7 +141,7 @@ def of_unit(run, name):
         (lambda a, b, c: ([a, a], [c], {}), "the same samples as a.csv; give each run once"),
         (lambda a, b, c: ([a, of_unit(b, "other")], [c], {}), "runs are of different units"),
         (lambda a, b, c: ([still()], [c], {}), "temperature moves by 0 degC in all"),
-        (lambda a, b, c: ([a[:30]], [c], {}), "a diagnosis needs more"),
+        (lambda a, b, c: ([a[:15]], [c], {}), "a diagnosis needs more"),
         (lambda a, b, c: ([], [c], {}), "no run to diagnose"),
         (lambda a, b, c: ([a], [c], {"without": ["no_such"]}), "--without no_such: there is no such effect"),
         (lambda a, b, c: ([a], [c], {"noise": b}), "the table turns in it"),

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.averages import averages
+from fogml.gap.how_far import averages
 from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.twin_model import TwinModel
 from fogml.twin.twin_file import load_twin

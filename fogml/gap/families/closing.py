@@ -8,12 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fogml.gap.averages import averages
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
 from fogml.gap.families.noise_points import white_noise
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Member
+from fogml.gap.how_far import averages
 from fogml.gap.how_far_result import HowFar
 from fogml.gap.noise import UNIT_FACTOR
 from fogml.intervals import Z90

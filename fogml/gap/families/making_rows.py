@@ -38,8 +38,10 @@ class Unusable(InputError):
     """A run that a diagnosis can't use; others may do."""
 
 
-def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None) -> Rows:
+def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, exact: bool = False) -> Rows:
     """A run brought to `most` rows at most, replayed by the twin, or by another model in its place.
+
+    Of `exact` readings there is nothing to be smoothed.
 
     Raises
     ------
@@ -64,7 +66,7 @@ def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None) -> 
     spread = (row_s**2 - step**2) / 12.0
     samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
-    even, readings, noise = _even(samples, time, twin, replayer, row_s)
+    even, readings, noise = _even(samples, time, twin, replayer, exact)
     smooth = {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
     own = None
     if model is not None:
@@ -158,7 +160,7 @@ def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float) -> NDAr
 
 
 def _even(
-    samples: BySample, time: FloatArray, twin: Twin, replayer: Replayer, row_s: float
+    samples: BySample, time: FloatArray, twin: Twin, replayer: Replayer, exact: bool
 ) -> tuple[Inputs, dict[str, FloatArray], dict[str, Smoothness]]:
     recorded = samples.recorded
     at = samples.means(recorded.time)
@@ -166,7 +168,7 @@ def _even(
     for name, values in recorded.temperatures.items():
         means = np.interp(time, at, samples.means(values))
         readings[name] = means
-        smooth[name], noise[name] = smoothed(means)
+        smooth[name], noise[name] = (means, Smoothness(0.0, 0.0)) if exact else smoothed(means)
     drives = {name: samples.means(values) for name, values in recorded.drives.items()}
     if "angle" in drives:
         drives["angle"] = np.interp(time, recorded.time, recorded.drives["angle"])

@@ -162,10 +162,14 @@ class Scene:
 
 
 def steps_are_coarse(scene: Scene, twin: Twin) -> bool:
-    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's."""
+    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's.
+
+    Of those that the model is driven by: a chamber's set point goes in whole steps by itself.
+    """
     usual = max(COARSE_STEP_DEGC, 1.01 * twin.sensors.common.resolution)
     runs = scene.runs[: scene.fitted]
-    steps = [recorded_step(r.run.columns[n]) for r in runs for n in r.run.temperature_columns]
+    names = {n for r in runs for place in ("T", "T_in", "T_out") for n in r.run.sensors(place)}
+    steps = [recorded_step(r.run.columns[n]) for r in runs for n in names & set(r.run.columns)]
     return max(steps, default=0.0) > usual
 
 

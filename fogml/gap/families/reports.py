@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from fogml.gap.averages import averages
 from fogml.gap.families.frame import whitener_of
 from fogml.gap.families.inference import FAR_OFF, Inference
 from fogml.gap.families.search import Member
+from fogml.gap.how_far import averages
 from fogml.gap.result import CandidateEvidence, ConstantFit, NoiseReport, RunSeries
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import floor_square
