@@ -49,13 +49,13 @@ def ten_hour_runs(sample_s: float) -> tuple[list[Run], Run]:
 
 def one_diagnosis(sample_s: float) -> float:
     """Seconds of one diagnosis, its runs in memory."""
-    from fogml.gap.diagnosis import as_model, diagnose
+    from fogml.gap import diagnose
     from fogml.twin.twin_file import load_twin
 
     fit, held_out = ten_hour_runs(sample_s)
-    model = as_model(load_twin("nominal"))
+    twin = load_twin("nominal")
     begin = time.perf_counter()
-    diagnose(model, fit, [held_out], seed=1)
+    diagnose(twin, fit, [held_out], seed=1)
     return time.perf_counter() - begin
 
 

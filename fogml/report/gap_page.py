@@ -68,6 +68,7 @@ def gap_page(found: Diagnosis) -> str:
         causes=gap_tables.causes_table(found, names),
         classes=gap_tables.classes_table(found.found, names),
         how_far=gap_tables.how_far_table(found) if found.how_far else None,
+        nearest=gap_tables_ahead.nearest_table(found, names),
         what_if=gap_tables_ahead.what_if_table(found, names),
         rehearsal=gap_tables_ahead.rehearsal_table(found.rehearsal, names),
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],

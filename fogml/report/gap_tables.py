@@ -55,6 +55,9 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
             probability_words(f.probability),
             with_error(f.amplitude.value, f.amplitude.se),
             unit_words(f.amplitude.unit) or MISSING,
+            MISSING if f.times_usual is None else f"{number(f.times_usual, 2)} ×",
+            percent(f.share),
+            f.place or MISSING,
             shape or MISSING,
             "; ".join(others) or "nothing: alone in its class",
             _consistency(f),
@@ -68,6 +71,9 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
             ("Probability", "", "figure"),
             ("Amplitude", "± standard error", "figure"),
             ("Unit", "", "text"),
+            ("Size", "of the usual most", "figure"),
+            ("Of the gap", "share", "figure"),
+            ("Look at", "", "text"),
             ("Shape", "± standard error", "text"),
             ("Can't be told from", "", "text"),
             ("On the runs", "", "text"),
@@ -79,8 +85,16 @@ def causes_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
 
 
 def _consistency(found: Found) -> str:
-    if len(found.by_run) > 1:
-        count = len(found.by_run)
+    since = "" if found.onset is None else f"; from {found.onset.run}, {found.onset.time_s:.0f} s, on"
+    return _agreement(found) + since
+
+
+def _agreement(found: Found) -> str:
+    count = len(found.by_run)
+    if found.grows is not None:
+        way = "grows" if found.grows * found.amplitude.value > 0.0 else "fades"
+        return f"{way} by {number(abs(found.grows), 2)} {unit_words(found.amplitude.unit)} a day"
+    if count > 1:
         return (
             f"agree in sign and size ({count} runs)" if found.consistent else f"do not agree ({count} runs)"
         )

@@ -15,6 +15,25 @@ _SIZES = {"usual": "usual", "found": "as found"}
 _FORMS = {"usual": "middle of the ranges", "low": "low ends", "high": "high ends"}
 
 
+def nearest_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """The known causes that hold most of the gap; None where there is no gap, or none is known."""
+    if not found.nearest or found.verdict == "no_gap":
+        return None
+    rows = [
+        Row((title_of(n.effect, names), percent(n.share), probability_words(n.probability)))
+        for n in found.nearest
+    ]
+    return Table(
+        columns=(
+            ("Known cause", "", "text"),
+            ("Of the fit runs' gap", "", "figure"),
+            ("Probability", "", "figure"),
+        ),
+        rows=tuple(rows),
+        caption="What each holds alone, in whatever form its family has: it is no name.",
+    )
+
+
 def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
     """What the held-out runs keep with each candidate, the most closed first; None where not known."""
     if not found.what_if:
@@ -25,10 +44,10 @@ def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
         columns=(
             ("Candidate", "", "text"),
             ("Beside", "", "text"),
-            ("Of the fit runs' gap", "", "number"),
+            ("Of the fit runs' gap", "", "figure"),
             ("Run", "held out", "text"),
-            ("After", "deg/h", "number"),
-            ("Closed", "", "number"),
+            ("After", "deg/h", "figure"),
+            ("Closed", "", "figure"),
             ("90 % interval", "", "text"),
         ),
         rows=tuple(rows),
@@ -60,9 +79,9 @@ def rehearsal_table(rehearsal: Sequence[Rehearsed], names: dict[str, str]) -> Ta
             ("If this acted", "", "text"),
             ("Shape", "", "text"),
             ("Size", "", "text"),
-            ("Shows", "noise lengths", "number"),
+            ("Shows", "noise lengths", "figure"),
             ("It would be", "", "text"),
-            ("Probability", "", "number"),
+            ("Probability", "", "figure"),
         ),
         rows=tuple(_rehearsed(r, names) for r in _worst_first(rehearsal)),
         caption="Each candidate is put into replays of these runs, without noise, and judged by the "

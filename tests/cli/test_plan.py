@@ -24,11 +24,17 @@ def test_plan_then_simulate(tmp_path, invoke, invoke_json, monkeypatch):
     (apart,) = values["separations"]
     assert apart["distance"] == min(pair["distance"] for pair in apart["pairs"])
     assert "synthetic" in values["data"] and values["assumed"]
+    told = {r["effect"]: r for r in values["rehearsal"] if r["form"] == "usual"}
+    assert "thermal_hysteresis" in told and {r["size"] for r in told.values()} == {"usual"}
+    assert all((r["outcome"] == "missed") == (not r["named_as"]) for r in told.values())
+    # What hardly shows can't be named.
+    assert {r["outcome"] for r in told.values() if r["length"] < 2.0} == {"missed"}
     programme = load_programme(out / "programme.yaml")
     assert programme.total_hours == pytest.approx(values["runs"][0]["hours"])
     profile = values["runs"][0]["profile"]
     assert profile["set_point"]["time_s"][-1] == pytest.approx(3600.0 * programme.total_hours)
     page = (out / "plan.html").read_text()
+    assert "What a diagnosis of these runs would name" in page
     assert "Expected standard errors" in page and "http-equiv" in page and 'src="http' not in page
     run = tmp_path / "run.csv"
     invoke(
