@@ -179,7 +179,8 @@ class Rehearsal(ExpectedRuns):
         if AT_AMPLITUDE not in shape:
             return self.rows.response(declared, shape, None, self._values)
         about = shape[AT_AMPLITUDE]
-        return self.rows.changed_output(declared, about, self._values) / about
+        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+        return self.rows.changed_output(declared, bare, about, self._values) / about
 
 
 class Together(ExpectedRuns):

@@ -73,7 +73,7 @@ def test_with_nothing_added_there_is_no_gap_and_a_run_that_can_not_be_used_says_
 
 ADDED = {
     "thermal_hysteresis": (0.2, {"half_width": 8.0}),
-    "sf_nonlinearity": (400.0, {}),
+    "shupe_pure": (0.3, {}),
 }
 
 
