@@ -123,14 +123,6 @@ class MemsOnRun:
         found = effect(id).signature(self._inputs(), **shape)
         return np.asarray(found[len(found) - len(self.run) :], dtype=np.float64)
 
-    def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
-        """What the thermometer's noise makes of the replay [deg/h], shape (n,)."""
-        temperature = self.run.temperature()
-        noise = float(np.median(np.abs(np.diff(temperature, 2)))) / 0.6745 / np.sqrt(6.0)
-        v = (temperature - 25.0) / 50.0
-        slope = (constants["c1"] + 2.0 * constants["c2"] * v + 3.0 * constants["c3"] * v**2) / 50.0
-        return np.abs(slope) * noise
-
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """None: what the thermometer lags by is for the diagnosis to find."""
         return {}

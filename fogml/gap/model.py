@@ -115,9 +115,6 @@ class ModelOnRun(Protocol):
     def output(self, constants: Mapping[str, float], effects: tuple[EffectValue, ...] = ()) -> FloatArray:
         """The replay: noise-free output [deg/h], shape (n,)."""
 
-    def reading_noise(self, constants: Mapping[str, float]) -> FloatArray:
-        """What the noise of the inputs makes of the replay, as a standard deviation [deg/h], shape (n,)."""
-
     def nuisances(self, constants: Mapping[str, float]) -> Mapping[str, FloatArray]:
         """What is always a little off, one standard deviation of each [deg/h], shape (n,); may be empty.
 
