@@ -10,8 +10,10 @@ as seen from +z; without it states 1 to 4 are at 0, 180, 270 and 90 deg.
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -180,9 +182,10 @@ def _segments(path: Path, table: RawTable, cell: str) -> NDArray[np.str_]:
     if kind == "csv":
         dialect = csv_dialect(path)
         place = dialect.cells.index(cell)
-        with path.open(encoding=dialect.encoding, errors="replace", newline="") as file:
-            lines = csv.reader(file, delimiter=dialect.separator)
-            rows = [row for row in lines if any(field.strip() for field in row)][1:]
+        opened = dialect.source.open()
+        with io.TextIOWrapper(opened, encoding=dialect.encoding, errors="replace", newline="") as file:
+            lines = csv.reader(islice(file, dialect.skipped_lines, None), delimiter=dialect.separator)
+            rows = [row for row in lines if any(field.strip() for field in row)]
         marks = np.array([row[place].strip().lower() if place < len(row) else "" for row in rows])
     elif kind == "parquet":
         marks = np.char.lower(np.char.strip(parquet_marks(path, cell)))

@@ -262,6 +262,9 @@ def _internal_columns(
     notes = []
     if unknown:
         message = f"kept and not used by models: {_listed(unknown)}"
+        stated = dict(parse_header(cell) for cell in table.cells)
+        if any(stated[name] in ("degC", "K") for name in unknown):
+            message += "; a temperature is used once it is called T, T_in, T_out, T1 … or T_case"
         notes.append(Finding("unknown_column", message, column=unknown[0], count=len(unknown)))
     return columns, gyro_unit, tick_s, notes
 
@@ -281,6 +284,7 @@ def _check_clock_steps(file: str, time: FloatArray) -> None:
 def _facts(table: RawTable, path: Path) -> Facts:
     """Facts of the side file, which a person may have corrected, before those in the file itself."""
     beside = read_side_file(path)
-    if table.facts is None or beside != Facts():
-        return beside
-    return table.facts
+    facts = beside if table.facts is None or beside != Facts() else table.facts
+    if table.started is not None and facts.started is None:
+        facts = facts.model_copy(update={"started": table.started})
+    return facts

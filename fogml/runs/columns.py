@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fogml.errors import InputError, quoted
+from fogml.runs.units import canonical_unit, converted
 
 
 @dataclass(frozen=True)
@@ -80,24 +81,6 @@ def _specs() -> dict[str, ColumnSpec]:
 
 KNOWN = _specs()
 _COIL_SENSOR = re.compile(r"T([1-9][0-9]{0,3})\Z")
-# Spellings that loggers and spreadsheets use for the same unit.
-_ALIASES = {
-    "°C": "degC",
-    "C": "degC",
-    "°/h": "deg/h",
-    "°/s": "deg/s",
-    "°": "deg",
-    "µs": "us",
-    "μs": "us",
-    "µT": "uT",
-    "μT": "uT",
-    "sec": "s",
-    "º": "deg",
-    "ºC": "degC",
-    "º/h": "deg/h",
-    "º/s": "deg/s",
-    "counts": "count",
-}
 
 
 def coil_sensor_number(name: str) -> int | None:
@@ -127,8 +110,7 @@ def parse_header(cell: str) -> tuple[str, str | None]:
     name, bracket, rest = cell.partition("[")
     if not bracket or not rest.endswith("]") or "[" in rest or "]" in rest[:-1] or "]" in name:
         return cell, None
-    unit = rest[:-1].strip()
-    return name.strip(), _ALIASES.get(unit, unit)
+    return name.strip(), canonical_unit(rest[:-1])
 
 
 def header(name: str, unit: str | None = None) -> str:
@@ -155,8 +137,17 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
             f"{file}: column '{name}' states no unit; write '{name} [{spec.internal}]' "
             f"in the header (accepted: {accepted})"
         )
-    if unit not in spec.units:
+    found = spec.units.get(unit) or converted(unit, spec.internal)
+    if found is None:
         raise InputError(
             f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; use one of {accepted}"
         )
-    return spec.units[unit]
+    return found
+
+
+def is_accepted(name: str, unit: str | None) -> bool:
+    """Whether a column of the run format may be given in a unit, or in one that is not stated."""
+    spec = column_spec(name)
+    if spec is None or unit is None or unit in spec.units:
+        return spec is not None
+    return converted(unit, spec.internal) is not None

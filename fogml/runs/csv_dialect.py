@@ -1,8 +1,7 @@
-"""How a CSV file is written: encoding, separator, decimal mark, header, told from its first lines."""
+"""How a CSV file is written, told from its first lines: separator, marks in numbers, header, clock."""
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
@@ -13,17 +12,29 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
+from fogml.runs.csv_header import fields_of, find_header
+from fogml.runs.csv_source import CsvSource, csv_source
+from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import wanted_cells
+from fogml.runs.stamps import Stamps, stamps_of
 
-SEPARATORS = (",", ";", "\t")
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
 """What stands for a missing value, in lower case."""
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")
 _SEARCH_BYTES = 1 << 24
 _MARK = re.compile(rb"\d[.,]\d")
-_DECIMAL_POINT = re.compile(r"\s*[+-]?\d*\.\d+([eE][+-]?\d+)?\s*\Z")
-_DECIMAL_COMMA = re.compile(r"\s*[+-]?\d*,\d+([eE][+-]?\d+)?\s*\Z")
+_DECIMAL = {mark: re.compile(rf"\s*[+-]?\d*{re.escape(mark)}\d+([eE][+-]?\d+)?\s*\Z") for mark in ".,"}
+# Groups of three digits; with decimals, or of more than one mark, nobody takes them for anything else.
+_GROUPS = {
+    mark: re.compile(rf"\s*[+-]?\d{{1,3}}({group}\d{{3}})+({re.escape(mark)}\d*)?\s*\Z")
+    for mark, group in ((".", "[,'\u00a0\u202f ]"), (",", "[.'\u00a0\u202f ]"))
+}
+_EVIDENT = {
+    mark: re.compile(rf"\s*[+-]?\d{{1,3}}({group}\d{{3}})+({re.escape(mark)}\d+|{group}\d{{3}})\s*\Z")
+    for mark, group in ((".", "[,'\u00a0\u202f ]"), (",", "[.'\u00a0\u202f ]"))
+}
+_OTHER = {".": ",", ",": "."}
 
 
 @dataclass(frozen=True)
@@ -32,12 +43,20 @@ class CsvDialect:
 
     Attributes
     ----------
+    source
+        Where its bytes are.
     separator, decimal, encoding
         As Python's `csv` and `open` take them.
     header_line
         Line of the header, counted from 1.
+    skipped_lines
+        Lines before the data: the header's, and a row of units below it.
     cells
-        Header cells in order.
+        Header cells in order, spelled as in the run format.
+    grouped
+        Whether marks of thousands are within numbers.
+    stamps
+        The clock, where times are dates and times of day.
     blanks
         Empty fields that each line has beyond the header's, from separators at its end.
     text
@@ -46,19 +65,34 @@ class CsvDialect:
         Positions of other columns that are not read.
     """
 
+    source: CsvSource
     separator: str
     decimal: str
     encoding: str
     header_line: int
+    skipped_lines: int
     cells: tuple[str, ...]
+    grouped: bool = False
+    stamps: Stamps | None = None
     blanks: int = 0
     text: frozenset[int] = frozenset()
     unwanted: frozenset[int] = frozenset()
 
     @cached_property
+    def stamp_places(self) -> tuple[int, ...]:
+        """Positions of the columns that make the clock's stamps."""
+        return tuple(place for place, _ in self.stamps.columns) if self.stamps else ()
+
+    @cached_property
+    def time_cell(self) -> str:
+        """Header cell of the clock that stamps become."""
+        return self.cells[self.stamp_places[-1]]
+
+    @cached_property
     def read(self) -> tuple[int, ...]:
-        """Positions of the columns that are read."""
-        return tuple(i for i in range(len(self.cells)) if i not in self.text | self.unwanted)
+        """Positions of the columns of numbers that are read."""
+        left_out = self.text | self.unwanted | set(self.stamp_places)
+        return tuple(i for i in range(len(self.cells)) if i not in left_out)
 
     @cached_property
     def known(self) -> frozenset[int]:
@@ -74,6 +108,10 @@ class CsvDialect:
         """Name of the column at a position."""
         return parse_header(self.cells[i])[0]
 
+    def value(self, field: str) -> float | None:
+        """As `number`, by this dialect's marks."""
+        return number(field, self.decimal, self.grouped)
+
 
 def csv_dialect(path: Path) -> CsvDialect:
     """Tell the dialect from a file's first lines.
@@ -84,46 +122,62 @@ def csv_dialect(path: Path) -> CsvDialect:
         If the file is empty, no text, or begins with numbers in place of a header.
     """
     with path.open("rb") as file:
-        head = file.read(_HEAD_BYTES)
-    # UTF-16, which spreadsheets call "Unicode text", is full of zero bytes too.
-    if head[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        raise InputError(f"{path.name}: the text is UTF-16; save it as CSV in UTF-8")
-    if b"\x00" in head:
-        raise _no_text(path.name)
+        raw = file.read(_HEAD_BYTES)
+    source = csv_source(path, raw)
+    with source.open() as opened:
+        head = opened.read(_HEAD_BYTES)
     cut = len(head) == _HEAD_BYTES
     encoding = _encoding(head, cut)
     lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
-    first = next((i for i, line in enumerate(lines) if line.strip()), None)
-    if cut and (first is None or len(lines) == 1):
+    header = find_header(lines)
+    if cut and (header is None or len(lines) == 1):
         raise InputError(
             f"{path.name}: no line ends within the first {_HEAD_BYTES} bytes; a header such as "
             "'time [s],gyro [deg/h],T [degC]' and rows of numbers were expected"
         )
-    if first is None:
+    if header is None:
         raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
-    if any(ord(character) < 32 and character != "\t" for character in lines[first]):
+    is_padded = source.wide is None and b"\0" in raw
+    if any(ord(character) < 32 and character != "\t" for character in lines[header.line]) or (
+        is_padded and not header.is_sure
+    ):
         raise _no_text(path.name)
-    separator = max(SEPARATORS, key=lambda s: _outside_quotes(lines[first]).count(s))
-    cells = _cells(_fields(lines[first], separator))
-    rows = [_fields(line, separator) for line in lines[first + 1 :] if line.strip()]
-    dialect = CsvDialect(separator, _decimal_mark(path, rows, separator), encoding, first + 1, cells)
+    rows = [fields_of(line, header.separator) for line in lines[header.data :] if line.strip()]
+    decimal, grouped = _marks(source, rows, header.separator)
+    stamps = _stamps(header.cells, rows, decimal)
+    cells = list(header.cells)
+    for place in [column[0] for column in stamps.columns[-1:]] if stamps else []:
+        cells[place] = "time [s]"
+    dialect = CsvDialect(
+        source,
+        header.separator,
+        decimal,
+        encoding,
+        header.line + 1,
+        header.data,
+        tuple(cells),
+        grouped,
+        stamps,
+        _blanks(rows[0], len(cells)) if rows else 0,
+    )
     _check_header(path.name, dialect)
-    text = {
-        i
-        for i in set(range(len(cells))) - dialect.known
-        if any(i < len(row) and number(row[i], dialect.decimal) is None for row in rows)
-    }
-    blanks = _blanks(rows[0], len(cells)) if rows else 0
-    return CsvDialect(separator, dialect.decimal, encoding, first + 1, cells, blanks, frozenset(text))
+    unknown = set(range(len(cells))) - dialect.known
+    text = {i for i in unknown if any(i < len(row) and dialect.value(row[i]) is None for row in rows)}
+    return replace(dialect, text=frozenset(text))
 
 
-def number(field: str, decimal: str) -> float | None:
-    """The value of a field, NaN where it is missing, None where it is no number."""
+def number(field: str, decimal: str, grouped: bool = False) -> float | None:
+    """The value of a field, NaN where it is missing, None where it is no number.
+
+    Marks of thousands are taken out where they can be nothing else, or where a file is known to have them.
+    """
     field = field.strip()
     if field.lower() in MISSING:
         return np.nan
+    if (_GROUPS if grouped else _EVIDENT)[decimal].match(field):
+        field = "".join(c for c in field if c.isdigit() or c in f"+-{decimal}")
     if decimal == ",":
         # A point would be a thousands separator or a mix of both marks: nobody can tell.
         if "." in field:
@@ -138,19 +192,45 @@ def number(field: str, decimal: str) -> float | None:
         return None
 
 
-def _decimal_mark(path: Path, rows: Sequence[Sequence[str]], separator: str) -> str:
-    """The mark in the first rows; in the rest of the file, where those hold whole numbers only."""
+def _marks(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -> tuple[str, bool]:
+    """Decimal mark, and whether thousands have marks, from the first rows, else from the rest."""
     fields = [field for row in rows for field in row]
-    if any(_DECIMAL_COMMA.match(field) for field in fields if "," in field):
-        return ","
-    if separator == "," or any(_DECIMAL_POINT.match(field) for field in fields):
-        return "."
-    with path.open("rb") as file:
-        file.seek(_HEAD_BYTES)
+    for mark in ".,":
+        if any(_EVIDENT[mark].match(field) and mark in field and _OTHER[mark] in field for field in fields):
+            return mark, True
+    with_mark = {mark: [field for field in fields if _DECIMAL[mark].match(field)] for mark in ".,"}
+    for mark, other in _OTHER.items():
+        # Numbers such as 10.78 beside 1,000: all that have a comma are groups of three, and points are not.
+        grouped = with_mark[other] and all(_GROUPS[mark].match(field) for field in with_mark[other])
+        if grouped and any(not _GROUPS[other].match(field) for field in with_mark[mark]):
+            return mark, True
+    if with_mark[","]:
+        return ",", False
+    if separator == "," or with_mark["."]:
+        return ".", separator == "," and bool(with_mark["."])
+    with source.open() as file:
+        file.read(_HEAD_BYTES)
         while part := file.read(_SEARCH_BYTES):
             if found := _MARK.search(part):
-                return found[0][1:2].decode("ascii")
-    return "."
+                return found[0][1:2].decode("ascii"), False
+    return ".", False
+
+
+def _stamps(cells: Sequence[str], rows: Sequence[Sequence[str]], decimal: str) -> Stamps | None:
+    """The clock of dates and times of day in the first rows, in one column or two."""
+    names = [parse_header(cell)[0] for cell in cells]
+    dates = [i for i, name in enumerate(names) if name.lower() in DATE_NAMES]
+    times = [i for i, name in enumerate(names) if name == "time"]
+    places = times or dates
+    full = [row for row in rows if len(row) >= len(cells)]
+    if len(places) != 1 or not full or number(full[0][places[0]], decimal) is not None:
+        return None
+    texts = {i: [row[i] for row in full] for i in {*places, *dates}}
+    if times and len(dates) == 1:
+        both = stamps_of([(dates[0], texts[dates[0]]), (times[0], texts[times[0]])])
+        if both and [form.kind for _, form in both.columns] == ["date", "time"]:
+            return both
+    return stamps_of([(places[0], texts[places[0]])])
 
 
 def _encoding(head: bytes, cut: bool) -> str:
@@ -161,25 +241,12 @@ def _encoding(head: bytes, cut: bool) -> str:
         except UnicodeDecodeError:
             continue
         return "utf-8-sig"
-    return "latin-1"
-
-
-def _outside_quotes(line: str) -> str:
-    return re.sub(r'"[^"]*"', "", line)
-
-
-def _fields(line: str, separator: str) -> list[str]:
-    if line and '"' not in line:
-        return line.split(separator)
-    return next(csv.reader([line], delimiter=separator), [])
-
-
-def _cells(fields: Sequence[str]) -> tuple[str, ...]:
-    """Header cells; a column without a name is called by its place."""
-    cells = [field.strip() for field in fields]
-    while cells and not cells[-1]:
-        cells.pop()
-    return tuple(cell or f"column {i}" for i, cell in enumerate(cells, start=1))
+    # Both bytes of a Chinese sign are above 0xA0; the degree sign of Latin-1 stands before a plain letter.
+    try:
+        head[: head.rfind(b"\n") + 1 or len(head)].decode("gb2312")
+    except UnicodeDecodeError:
+        return "latin-1"
+    return "gb18030"
 
 
 def _blanks(row: Sequence[str], width: int) -> int:

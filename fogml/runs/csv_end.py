@@ -1,32 +1,64 @@
-"""The end of a CSV file: whether a recording was cut off within its last number."""
+"""The end of a CSV file: lines after the data, and whether a recording was cut off within its last number."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 from fogml.errors import InputError, quoted
-from fogml.runs.csv_dialect import number
+from fogml.runs.csv_dialect import CsvDialect, number
+from fogml.runs.csv_header import fields_of
+from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
 
 _TAIL_BYTES = 1 << 15
 _LEAST_LINES = 20
+_LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+\Z")
 
 
-def note_of_end(path: Path) -> list[Finding]:
+def without_footer(dialect: CsvDialect) -> tuple[CsvDialect, list[Finding]]:
+    """The dialect for reading a file's table alone, and a note of the lines of text below it, if any.
+
+    Such a line has neither a time nor a gyro's number in their places.
+    """
+    text = dialect.source.tail(_TAIL_BYTES).decode(dialect.encoding, errors="replace")
+    lines = _LINE.findall(text)[1:]  # the first of them may be a part of one
+    places = [i for i in dialect.known if dialect.name(i) == "time" or dialect.name(i).startswith("gyro")]
+    forms = dict(dialect.stamps.columns) if dialect.stamps else {}
+
+    def is_sample(line: str) -> bool:
+        fields = fields_of(line, dialect.separator)
+        held = [(i, fields[i]) for i in {*places, *forms} if i < len(fields) and fields[i].strip()]
+        return any(forms[i].matches(f) if i in forms else dialect.value(f) is not None for i, f in held)
+
+    # The longest last part of the lines without a sample; its blank lines stay.
+    last = next((n for n, line in enumerate(reversed(lines)) if line.strip() and is_sample(line)), None)
+    below = lines[len(lines) - last :] if last else []
+    told = [line.strip() for line in below if line.strip(' ",;\t\r\n')]
+    # An odd mark closes a quoted field of several lines, which belongs to the sample above.
+    if not below or "".join(below).count('"') % 2:
+        return dialect, []
+    count = "1 line" if len(told) == 1 else f"{len(told)} lines"
+    message = f"{count} below the last sample left out: {quoted(told[0])}" if told else ""
+    source = dialect.source.without("".join(below), dialect.encoding.removesuffix("-sig"))
+    return replace(dialect, source=source), [Finding("footer", message, count=len(told))] if told else []
+
+
+def note_of_end(source: CsvSource) -> list[Finding]:
     """A note where the last line has no end: a recording cut there reads as a shorter number."""
-    if _tail(path, 1) in (b"\r", b"\n"):
+    if source.tail(1) in (b"\r", b"\n"):
         return []
     message = "the last line has no line end; if the recording was cut there, its last value may be cut too"
     return [Finding("unfinished_line", message)]
 
 
-def cut_line(path: Path, separator: str | None, decimal: str) -> str | None:
+def cut_line(source: CsvSource, separator: str | None, decimal: str) -> str | None:
     """The last line where it is evidently cut within its last number, else None.
 
     Parameters
     ----------
-    path
+    source
         The file.
     separator
         Between fields; None for blanks.
@@ -38,7 +70,7 @@ def cut_line(path: Path, separator: str | None, decimal: str) -> str | None:
     It has no end, and its last number has fewer decimals (or, for whole numbers, fewer digits)
     than that of every one of at least 20 lines before it: what wrote these was stopped there.
     """
-    tail = _tail(path, _TAIL_BYTES)
+    tail = source.tail(_TAIL_BYTES)
     if tail.endswith((b"\r", b"\n")):
         return None
     # The first line of the tail may be a part of one.
@@ -60,12 +92,6 @@ def cut_error(path: Path, line: str, cure: str = "--repair drops the row") -> In
         f"{path.name}, last line: the file ends in the middle of a number, {shown}; "
         f"copy or export it again, or {cure}"
     )
-
-
-def _tail(path: Path, size: int) -> bytes:
-    with path.open("rb") as file:
-        file.seek(max(path.stat().st_size - size, 0))
-        return file.read(size)
 
 
 def _digits(field: str, decimal: str) -> tuple[int, int]:

@@ -10,11 +10,12 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
-from fogml.runs.csv_end import cut_error, cut_line, note_of_end
+from fogml.runs.csv_end import cut_error, cut_line, note_of_end, without_footer
 from fogml.runs.csv_lines import LineReader, line_of_row
 from fogml.runs.csv_quotes import quotes_are_plain
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
+from fogml.runs.stamps import StampClock
 
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
@@ -36,10 +37,12 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
-    dialect = csv_dialect(path)
+    dialect, notes = without_footer(csv_dialect(path))
     try:
-        _check_quotes(path, dialect)
-        table = arrow_csv.read_csv(path, **_options(dialect))
+        _check_quotes(dialect)
+        table = arrow_csv.read_csv(_opened(dialect), **_options(dialect))
+        clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
+        whole = _raw(path, dialect, table, 0, clock)
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
@@ -48,10 +51,10 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     else:
         if table.num_rows == 0:
             raise no_samples(path.name)
-        whole = _raw(path, dialect, table, 0)
-    cut = cut_line(path, dialect.separator, dialect.decimal)
+    cut = cut_line(dialect.source, dialect.separator, dialect.decimal)
+    whole = whole.noting(notes)
     if cut is None:
-        return whole.noting(note_of_end(path))
+        return whole.noting([] if notes else note_of_end(dialect.source))
     if not repair:
         raise cut_error(path, cut)
     message = f"the last row, cut off in the middle of a number, dropped: {whole.row_name(len(whole) - 1)}"
@@ -72,33 +75,40 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
-    dialect = csv_dialect(path).only(columns)
-    if (cut := cut_line(path, dialect.separator, dialect.decimal)) is not None:
+    dialect, notes = without_footer(csv_dialect(path).only(columns))
+    notes = notes or note_of_end(dialect.source)
+    if (cut := cut_line(dialect.source, dialect.separator, dialect.decimal)) is not None:
         raise cut_error(path, cut)
     start = 0
+    clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
     try:
-        _check_quotes(path, dialect)
-        with arrow_csv.open_csv(path, **_options(dialect, _STREAM_BYTES)) as reader:
+        _check_quotes(dialect)
+        with arrow_csv.open_csv(_opened(dialect), **_options(dialect, _STREAM_BYTES)) as reader:
             for table in _regrouped(reader, rows):
-                raw = _raw(path, dialect, table, start)
+                raw = _raw(path, dialect, table, start, clock)
                 start += table.num_rows
-                yield raw if start > table.num_rows else raw.noting(note_of_end(path))
+                yield raw if start > table.num_rows else raw.noting(notes)
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
         lines = LineReader(path, dialect)
         for raw in lines.tables(rows, skip=start):
+            yield raw.noting([*lines.findings(), *(notes if start == 0 else [])])
             start += len(raw)
-            yield raw.noting(lines.findings())
     if start == 0:
         raise no_samples(path.name)
 
 
-def _check_quotes(path: Path, dialect: CsvDialect) -> None:
+def _opened(dialect: CsvDialect) -> Any:
+    """What the fast parser reads: the file itself where its bytes are the table's."""
+    return dialect.source.path if dialect.source.is_plain else dialect.source.open()
+
+
+def _check_quotes(dialect: CsvDialect) -> None:
     """Leave a file to the exact reader where the fast one would read its quotation marks otherwise."""
     import pyarrow as arrow
 
-    if not quotes_are_plain(path, dialect.separator):
+    if not quotes_are_plain(dialect.source, dialect.separator):
         raise arrow.ArrowInvalid("quotation marks")
 
 
@@ -128,13 +138,14 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
     width = len(dialect.cells)
     names = [str(i) for i in range(width + dialect.blanks)]
     kinds = {str(i): arrow.float64() for i in dialect.read}
+    kinds |= {str(i): arrow.string() for i in dialect.stamp_places}
     # Anything in the empty fields at a line's end is a fault, which no column takes.
     blanks = dict.fromkeys(names[width:], arrow.null())
     spellings = {spelling for word in MISSING for spelling in (word, word.upper(), word.capitalize())}
     return {
         # Bytes of other encodings stand in text only, which is not read.
         "read_options": arrow_csv.ReadOptions(
-            skip_rows=dialect.header_line, column_names=names, block_size=block_bytes
+            skip_rows=dialect.skipped_lines, column_names=names, block_size=block_bytes
         ),
         "parse_options": arrow_csv.ParseOptions(delimiter=dialect.separator),
         "convert_options": arrow_csv.ConvertOptions(
@@ -147,15 +158,29 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
     }
 
 
-def _raw(path: Path, dialect: CsvDialect, table: Table, start: int) -> RawTable:
+def _raw(path: Path, dialect: CsvDialect, table: Table, start: int, clock: StampClock | None) -> RawTable:
     columns = {dialect.cells[i]: np.asarray(table.column(str(i)).to_numpy()) for i in dialect.read}
+    if clock is not None:
+        texts = [table.column(str(i)).combine_chunks() for i in dialect.stamp_places]
+        columns[dialect.time_cell] = clock.seconds(texts)
+        if np.isnan(columns[dialect.time_cell]).any():
+            # Line by line tells where the stamp is that is none.
+            raise _no_stamp()
     return RawTable(
         path.name,
         dialect.cells,
         columns,
-        row_name=lambda i: f"line {line_of_row(path, dialect, start + i)}",
+        row_name=lambda i: f"line {line_of_row(dialect, start + i)}",
         findings=tuple(text_column(dialect.name(i)) for i in sorted(dialect.text)),
+        started=dialect.stamps.started if dialect.stamps else None,
     )
+
+
+def _no_stamp() -> Exception:
+    import pyarrow as arrow
+
+    error: Exception = arrow.ArrowInvalid("a time that is no stamp of the first one's form")
+    return error
 
 
 def _unreadable(path: Path, error: OSError) -> InputError:

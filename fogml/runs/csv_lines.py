@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +13,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, quoted
-from fogml.runs.csv_dialect import CsvDialect, number
+from fogml.runs.csv_dialect import CsvDialect
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
+from fogml.runs.stamps import StampClock
 
 _CHUNK_ROWS = 1 << 16
 
 
-def line_of_row(path: Path, dialect: CsvDialect, row: int) -> int:
+def line_of_row(dialect: CsvDialect, row: int) -> int:
     """Line of a data row, both counted from 1 and 0; blank lines and quoted line ends count as they do."""
-    seen, quoted, line = -1, False, dialect.header_line
+    seen, quoted, line = -1, False, dialect.skipped_lines
     # Latin-1 decodes any bytes, and keeps line ends and quotation marks as they are.
-    with path.open("r", encoding="latin-1", newline="") as file:
+    with io.TextIOWrapper(dialect.source.open(), encoding="latin-1", newline="") as file:
         for line, text in enumerate(file, start=1):
-            if line <= dialect.header_line:
+            if line <= dialect.skipped_lines:
                 continue
             seen += not quoted and text not in ("\n", "\r\n", "\r")
             if seen == row:
@@ -68,12 +70,15 @@ class LineReader:
             Naming line and column of the first fault, unless it is repaired.
         """
         values: list[list[float]] = []
+        stamps: list[list[str]] = []
         lines: list[int] = []
+        clock = StampClock(self.dialect.stamps, self.path.name) if self.dialect.stamps else None
         for row, (line, fields) in enumerate(self._records()):
             if row < skip:
                 continue
             try:
                 values.append(self._values(fields, line))
+                stamps.append([fields[place] for place in self.dialect.stamp_places])
             except _Fault as fault:
                 if not self.repair:
                     cure = "correct the line, or --repair drops such rows"
@@ -83,10 +88,10 @@ class LineReader:
                 continue
             lines.append(line)
             if len(values) == rows:
-                yield self._table(values, lines)
-                values, lines = [], []
+                yield self._table(values, lines, stamps, clock)
+                values, lines, stamps = [], [], []
         if values:
-            yield self._table(values, lines)
+            yield self._table(values, lines, stamps, clock)
 
     def whole(self) -> RawTable:
         """The whole table, with what was noticed.
@@ -110,9 +115,7 @@ class LineReader:
             return names[part](int(i - lengths[part]))
 
         findings = [text_column(self.dialect.name(i)) for i in sorted(self.dialect.text)] + self.findings()
-        return RawTable(
-            self.path.name, self.dialect.cells, columns, row_name=row_name, findings=tuple(findings)
-        )
+        return replace(tables[0], columns=columns, row_name=row_name, findings=tuple(findings))
 
     def findings(self) -> list[Finding]:
         """What was noticed so far: rows dropped, text in columns of numbers."""
@@ -130,27 +133,41 @@ class LineReader:
             found.append(Finding("repaired_rows", message, row=row, count=self.dropped))
         return found
 
-    def _table(self, values: list[list[float]], lines: list[int]) -> RawTable:
-        table = np.array(values, dtype=np.float64)
+    def _table(
+        self, values: list[list[float]], lines: list[int], stamps: list[list[str]], clock: StampClock | None
+    ) -> RawTable:
+        table = np.array(values, dtype=np.float64).reshape(len(values), -1)
         columns: dict[str, NDArray[np.float64]] = {
             self.dialect.cells[i]: np.ascontiguousarray(table[:, j]) for j, i in enumerate(self.dialect.read)
         }
+        if clock is not None:
+            import pyarrow as arrow
+
+            texts = [arrow.array(column, arrow.string()) for column in zip(*stamps, strict=True)]
+            columns[self.dialect.time_cell] = clock.seconds(texts)
         places = np.array(lines)
-        return RawTable(self.path.name, self.dialect.cells, columns, row_name=lambda i: f"line {places[i]}")
+        return RawTable(
+            self.path.name,
+            self.dialect.cells,
+            columns,
+            row_name=lambda i: f"line {places[i]}",
+            started=clock.stamps.started if clock is not None else None,
+        )
 
     def _records(self) -> Iterator[tuple[int, list[str]]]:
         """First line and fields of each record; lines of nothing but spaces are none."""
         dialect = self.dialect
-        with self.path.open("r", encoding=dialect.encoding, errors="replace", newline="") as file:
-            for _ in range(dialect.header_line):
+        opened = dialect.source.open()
+        with io.TextIOWrapper(opened, encoding=dialect.encoding, errors="replace", newline="") as file:
+            for _ in range(dialect.skipped_lines):
                 file.readline()
             reader = csv.reader(_without_zero_bytes(file), delimiter=dialect.separator, strict=True)
-            begin = dialect.header_line + 1
+            begin = dialect.skipped_lines + 1
             try:
                 for fields in reader:
                     if len(fields) > 1 or (fields and fields[0].strip()):
                         yield begin, fields
-                    begin = dialect.header_line + reader.line_num + 1
+                    begin = dialect.skipped_lines + reader.line_num + 1
             except csv.Error as error:
                 raise InputError(
                     f"{self.path.name}, line {begin}: not readable as CSV ({error}); "
@@ -163,10 +180,16 @@ class LineReader:
         if len(fields) < width or any(text.strip() for text in fields[width:]):
             kind = "cut short" if len(fields) < width else "too long"
             raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind})")
+        for place, form in dialect.stamps.columns if dialect.stamps else ():
+            if not form.matches(fields[place]):
+                raise _Fault(
+                    f"line {line}, column {quoted(dialect.name(place))}: {quoted(fields[place].strip())} is "
+                    f"no {form.kind} as in the first row"
+                )
         values = []
         for i in dialect.read:
             text = fields[i]
-            value = number(text, dialect.decimal)
+            value = dialect.value(text)
             if value is None and i in dialect.known:
                 mark = "comma" if dialect.decimal == "," else "point"
                 raise _Fault(

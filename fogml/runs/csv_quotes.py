@@ -6,22 +6,22 @@ without a word, and joins what stands before and after a closing mark to one num
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
+
+from fogml.runs.csv_source import CsvSource
 
 _PART_BYTES = 1 << 24
 _MARK, _NEWLINE, _RETURN = b'"\n\r'
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
-def quotes_are_plain(path: Path, separator: str) -> bool:
+def quotes_are_plain(source: CsvSource, separator: str) -> bool:
     """Whether every quoted field is closed on its line and stands between separators (RFC 4180)."""
     rest = b"\n"
-    with path.open("rb") as file:
-        if file.read(len(_BYTE_ORDER_MARK)) != _BYTE_ORDER_MARK:
-            file.seek(0)
-        while part := file.read(_PART_BYTES):
+    with source.open() as file:
+        begin = file.read(_PART_BYTES).removeprefix(_BYTE_ORDER_MARK)
+        while part := begin or file.read(_PART_BYTES):
+            begin = b""
             part = rest + part
             if b'"' not in part:
                 rest = part[-1:]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError, listed, quoted
 from fogml.runs.csv_end import cut_error, cut_line
+from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_schema import ImportProfile
@@ -115,7 +116,7 @@ def read_logger_text(path: str | Path, profile: ImportProfile, profile_name: str
     """
     path = Path(path)
     content = _content(path, profile)
-    cut = cut_line(path, profile.text_separator, profile.decimal)
+    cut = cut_line(CsvSource(path), profile.text_separator, profile.decimal)
     if cut is not None and not profile.reject.not_numbers:
         raise cut_error(path, cut, "'reject: {not_numbers: true}' in the profile leaves the row out")
     return _Reader(path.name, profile, profile_name, is_cut=cut is not None).read(content)

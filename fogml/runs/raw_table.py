@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from datetime import datetime
 from typing import Any
 
 import numpy as np
@@ -177,6 +178,8 @@ class RawTable:
         Names the row at an index the way its user finds it.
     findings
         What was noticed so far.
+    started
+        When the clock was 0, where the file's times are dates.
     """
 
     file: str
@@ -185,6 +188,7 @@ class RawTable:
     facts: Facts | None = None
     row_name: Callable[[int], str] = numbered_row
     findings: tuple[Finding, ...] = field(default=())
+    started: datetime | None = None
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values()))) if self.columns else 0

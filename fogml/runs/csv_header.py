@@ -1,0 +1,120 @@
+"""Where the header of a CSV file is: below title lines, above a row of units, behind a comment mark."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from fogml.runs.columns import parse_header
+from fogml.runs.header_spelling import DATE_NAMES, canonical_cells, uncommented, with_units_below
+from fogml.runs.stamps import stamp_form
+
+SEPARATORS = (",", ";", "\t")
+_MOST_TITLE_LINES = 100
+_SEPARATOR_LINE = re.compile(r'\s*"?sep\s*=\s*(\S|\t)"?\s*\Z', re.IGNORECASE)
+_NUMBER_LIKE = re.compile(r"\s*[+-]?[\d.,' ]*\d[\d.,' ]*([eE][+-]?\d+)?\s*\Z")
+
+
+@dataclass(frozen=True)
+class Header:
+    """A header found among a file's first lines.
+
+    Attributes
+    ----------
+    line
+        Its index among the lines.
+    data
+        Index of the first line below it that may hold data: behind a row of units.
+    separator
+        Between fields.
+    cells
+        Header cells, spelled as in the run format.
+    """
+
+    line: int
+    data: int
+    separator: str
+    cells: tuple[str, ...]
+
+    @property
+    def is_sure(self) -> bool:
+        """Whether it names a time and a gyro."""
+        names = {parse_header(cell)[0] for cell in self.cells}
+        is_gyro = any(name == "gyro" or name.startswith("gyro_") for name in names)
+        return is_gyro and ("time" in names or any(name.lower() in DATE_NAMES for name in names))
+
+
+def find_header(lines: Sequence[str]) -> Header | None:
+    """The header among a file's first lines; None where all of them are blank.
+
+    It is the first line that names a time and a gyro, else the last line of text above the first numbers that
+    has as many fields as these, else the first line.
+    """
+    filled = [i for i, line in enumerate(lines) if line.strip()]
+    stated = None
+    if filled and (match := _SEPARATOR_LINE.match(lines[filled[0]])):
+        stated = match[1]
+        filled = filled[1:]
+    if not filled:
+        return None
+    plain = []
+    for i in filled[:_MOST_TITLE_LINES]:
+        found = _header(lines, i, stated)
+        if found.is_sure:
+            return found
+        plain.append(found)
+    above = _above_numbers(lines, filled[:_MOST_TITLE_LINES], plain, stated)
+    return above or plain[0]
+
+
+def fields_of(line: str, separator: str) -> list[str]:
+    """The fields of one line."""
+    if line and '"' not in line:
+        return line.split(separator)
+    return next(csv.reader([line], delimiter=separator), [])
+
+
+def is_number_like(field: str) -> bool:
+    """Whether a field is a number with any marks, or a date or a time of day."""
+    return bool(_NUMBER_LIKE.match(field)) or stamp_form([field]) is not None
+
+
+def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
+    text = uncommented(lines[i])
+    separator = separator or max(SEPARATORS, key=lambda s: re.sub(r'"[^"]*"', "", text).count(s))
+    cells = _cells(fields_of(text, separator))
+    below = next((j for j in range(i + 1, len(lines)) if lines[j].strip()), None)
+    if below is not None:
+        units = with_units_below(cells, fields_of(uncommented(lines[below]), separator))
+        if units is not None:
+            return Header(i, below + 1, separator, units)
+    return Header(i, i + 1, separator, canonical_cells(cells))
+
+
+def _cells(fields: Sequence[str]) -> tuple[str, ...]:
+    """Header cells; a column without a name is called by its place."""
+    cells = [field.strip() for field in fields]
+    while cells and not cells[-1]:
+        cells.pop()
+    return tuple(cell or f"column {i}" for i, cell in enumerate(cells, start=1))
+
+
+def _above_numbers(
+    lines: Sequence[str], filled: Sequence[int], found: Sequence[Header], stated: str | None
+) -> Header | None:
+    """The last header-like line before the first line of numbers."""
+    for place, i in enumerate(filled):
+        separator = stated or found[place].separator
+        fields = fields_of(lines[i], separator)
+        while fields and not fields[-1].strip():
+            fields.pop()
+        numbers = sum(is_number_like(field) for field in fields)
+        if not fields or 2 * numbers < len(fields):
+            continue
+        above = [h for h in found[:place] if len(h.cells) == len(fields) and h.separator == separator]
+        texts = [h for h in above if not any(is_number_like(cell) for cell in h.cells)]
+        with_units = [h for h in texts if h.data - 1 > h.line and h.data <= i]
+        return (with_units or texts or [None])[-1]  # type: ignore[list-item]
+    return None

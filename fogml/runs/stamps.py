@@ -1,0 +1,206 @@
+"""Dates and times of day as loggers and spreadsheets write them, as seconds since the first one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+
+if TYPE_CHECKING:
+    from pyarrow import Array
+
+FloatArray = NDArray[np.float64]
+
+_DATE = r"(?P<a>\d{4}|\d{1,2})[-/.年](?P<b>\d{1,2})[-/.月](?P<c>\d{4}|\d{1,2})日?"
+_TIME = (
+    r"(?P<H>\d{1,3}):(?P<M>\d{2})(?::(?P<S>\d{2})(?:[.,:](?P<F>\d{1,9}))?)?"
+    r"\s*(?P<p>[AaPp][Mm])?\s*(?P<z>Z|UTC|[+-]\d{2}:?\d{2})?"
+)
+_FORMS = {
+    "date and time": rf"^\s*{_DATE}(?:\s*T\s*|[\s_,;]+){_TIME}\s*$",
+    "date": rf"^\s*{_DATE}\s*$",
+    "time": rf"^\s*{_TIME}\s*$",
+}
+_NS = 1_000_000_000
+_DAY_NS = 86_400 * _NS
+
+
+@dataclass(frozen=True)
+class StampForm:
+    """How the stamps of a column are written.
+
+    Attributes
+    ----------
+    kind
+        Key of the forms: ``date and time``, ``date`` or ``time``.
+    order
+        Order of year, month and day: ``ymd``, ``dmy``, ``mdy``; ``?`` where day and month can't be told
+        apart.
+    """
+
+    kind: str
+    order: str = "ymd"
+
+    def matches(self, text: str) -> bool:
+        """Whether a text is such a stamp."""
+        return re.match(_FORMS[self.kind], text) is not None
+
+    def nanoseconds(self, texts: Array) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        """Nanoseconds since 1970 (of a time of day: since midnight), and which texts are no such stamps.
+
+        Parameters
+        ----------
+        texts
+            Arrow's texts, n of them.
+
+        Returns
+        -------
+        nanoseconds, wrong
+            Shape (n,).
+        """
+        import pyarrow.compute as compute
+
+        found = compute.extract_regex(texts, _FORMS[self.kind])
+        wrong = np.asarray(found.is_null().to_numpy(zero_copy_only=False), dtype=np.bool_)
+        parts = {field.name: found.field(field.name) for field in found.type}
+        total = np.zeros(len(texts), dtype=np.int64)
+        if "a" in parts:
+            days, bad = self._days(*(_whole(parts[key]) for key in "abc"))
+            total, wrong = total + days * _DAY_NS, wrong | bad
+        if "H" in parts:
+            seconds, bad = _seconds(parts)
+            total, wrong = total + seconds, wrong | bad
+        return total, wrong
+
+    def _days(self, a: Any, b: Any, c: Any) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+        by_order = {"ymd": (a, b, c), "dmy": (c, b, a), "mdy": (c, a, b)}
+        year, month, day = by_order["dmy" if self.order == "?" else self.order]
+        year = np.where(year < 100, year + 2000, year)
+        wrong = (month < 1) | (month > 12) | (day < 1) | (day > 31) | (year < 1900) | (year > 2200)
+        months = (np.where(wrong, 1970, year) - 1970) * 12 + np.where(wrong, 1, month) - 1
+        first = months.astype("datetime64[M]").astype("datetime64[D]").astype(np.int64)
+        return first + np.where(wrong, 1, day) - 1, wrong
+
+
+@dataclass(frozen=True)
+class Stamps:
+    """The clock of a file whose times are written as dates and times of day.
+
+    Attributes
+    ----------
+    columns
+        Positions of the columns with their forms: one, or one of dates and one of times of day.
+    first_ns
+        The first stamp [ns], which becomes 0.
+    zoned
+        Whether stamps state their zone, so that they are in UTC.
+    """
+
+    columns: tuple[tuple[int, StampForm], ...]
+    first_ns: int
+    zoned: bool
+
+    @property
+    def started(self) -> datetime | None:
+        """When the recording began, where the stamps state a date that can be told."""
+        if all(form.kind == "time" for _, form in self.columns) or any(
+            f.order == "?" for _, f in self.columns
+        ):
+            return None
+        moment = datetime(1970, 1, 1, tzinfo=UTC) + timedelta(microseconds=self.first_ns / 1000)
+        return moment if self.zoned else moment.replace(tzinfo=None)
+
+
+class StampClock:
+    """Turns the stamps of consecutive blocks into seconds since the first; days are counted over midnight."""
+
+    def __init__(self, stamps: Stamps, file: str) -> None:
+        self.stamps, self.file = stamps, file
+        self.is_open = any(form.order == "?" for _, form in stamps.columns)
+        self.last_ns, self.days = stamps.first_ns, 0
+        self.of_day = all(form.kind == "time" for _, form in stamps.columns)
+
+    def seconds(self, texts: Sequence[Array]) -> FloatArray:
+        """Seconds of each row, shape (n,); NaN where the texts, one array for each column, are no stamps."""
+        total = np.zeros(len(texts[0]), dtype=np.int64)
+        wrong = np.zeros(len(texts[0]), dtype=np.bool_)
+        for (_, form), column in zip(self.stamps.columns, texts, strict=True):
+            found, bad = form.nanoseconds(column)
+            total, wrong = total + found, wrong | bad
+        if self.is_open and np.any(~wrong & (total // _DAY_NS != self.stamps.first_ns // _DAY_NS)):
+            raise InputError(
+                f"{self.file}, column 'time': day and month of the dates can't be told apart and the "
+                "recording goes on over midnight; write them as year-month-day"
+            )
+        if self.of_day and len(total):
+            total = np.where(wrong, self.last_ns % _DAY_NS, total)
+            steps = np.diff(np.concatenate([[self.last_ns % _DAY_NS], total]))
+            midnights = np.cumsum((steps < -_DAY_NS // 2).astype(np.int64))
+            self.last_ns = int(total[-1])
+            total = total + (self.days + midnights) * _DAY_NS
+            self.days += int(midnights[-1])
+        return np.where(wrong, np.nan, (total - self.stamps.first_ns) / _NS)
+
+
+def stamp_form(texts: Sequence[str]) -> StampForm | None:
+    """The form of which texts are, the first of a column, or None where they are no stamps."""
+    kind = next((kind for kind in _FORMS if texts and StampForm(kind).matches(texts[0])), None)
+    if kind is None or kind == "time":
+        return None if kind is None else StampForm(kind)
+    found = [match for text in texts if (match := re.match(_FORMS[kind], text))]
+    if any(len(match["a"]) == 4 for match in found):
+        return StampForm(kind, "ymd")
+    if any(int(match["a"]) > 12 for match in found) or "." in texts[0].split()[0]:
+        return StampForm(kind, "dmy")
+    if any(int(match["b"]) > 12 for match in found) or found[0].groupdict().get("p"):
+        return StampForm(kind, "mdy")
+    return StampForm(kind, "?")
+
+
+def stamps_of(columns: Sequence[tuple[int, Sequence[str]]]) -> Stamps | None:
+    """The clock of columns, given by position with their first texts; None where these are no stamps."""
+    import pyarrow as arrow
+
+    forms = [(place, stamp_form(texts)) for place, texts in columns]
+    known = tuple((place, form) for place, form in forms if form is not None)
+    if not known or len(known) < len(columns):
+        return None
+    first = 0
+    for (_, form), (_, texts) in zip(known, columns, strict=True):
+        found, wrong = form.nanoseconds(arrow.array([texts[0]], arrow.string()))
+        if wrong[0]:
+            return None
+        first += int(found[0])
+    zoned = any(re.search(r"(Z|UTC|[+-]\d{2}:?\d{2})\s*\Z", texts[0]) for _, texts in columns)
+    return Stamps(known, first, zoned and not all(form.kind == "date" for _, form in known))
+
+
+def _whole(texts: Any) -> NDArray[np.int64]:
+    """Digits as whole numbers, 0 where there are none."""
+    import pyarrow as arrow
+    import pyarrow.compute as compute
+
+    digits = compute.if_else(compute.equal(texts, ""), None, texts)
+    return np.asarray(compute.fill_null(digits.cast(arrow.int64()), 0).to_numpy(zero_copy_only=False))
+
+
+def _seconds(parts: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Nanoseconds of times of day, their zone taken off, and which are none."""
+    import pyarrow.compute as compute
+
+    hour, minute, second = (_whole(parts[key]) for key in "HMS")
+    wrong = (minute > 59) | (second > 60)
+    half = np.asarray(compute.utf8_lower(compute.fill_null(parts["p"], "")).to_numpy(zero_copy_only=False))
+    hour = np.where(half == "pm", hour % 12 + 12, np.where(half == "am", hour % 12, hour))
+    fraction = _whole(compute.utf8_rpad(compute.fill_null(parts["F"], ""), 9, "0"))
+    zone = compute.replace_substring_regex(compute.fill_null(parts["z"], ""), "^(Z|UTC)$", "+0000")
+    zone = _whole(compute.replace_substring(compute.replace_substring(zone, ":", ""), "+", ""))
+    east = np.sign(zone) * (np.abs(zone) // 100 * 60 + np.abs(zone) % 100)
+    return ((hour * 60 + minute - east) * 60 + second) * _NS + fraction, wrong

@@ -1,0 +1,186 @@
+"""Headers, clocks and lines around the data as laboratories write them: the same run as from a plain file."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.columns import conversion
+from fogml.runs.header_spelling import canonical_cells
+from fogml.runs.reading import read_blocks, read_run
+
+COUNT = 30
+TIME = np.arange(COUNT) * 0.5
+GYRO = 1000.0 + np.arange(COUNT) ** 2 % 17 * 100 + 0.25
+INNER = 20.0 + np.arange(COUNT) / 8
+PLAIN = [f"{t},{g},{w}" for t, g, w in zip(TIME, GYRO, INNER, strict=True)]
+HEADER = "time [s],gyro [deg/h],T_in [degC]"
+
+
+def lines(header=HEADER, rows=PLAIN, above=(), below=()):
+    return "\n".join([*above, header, *rows, *below]) + "\n"
+
+
+def german(number):
+    return f"{number:,.3f}".translate(str.maketrans(",.", ".,"))
+
+
+def stamped(form):
+    moments = [datetime(2026, 3, 28, 23, 59, 50) + timedelta(seconds=t) for t in TIME]
+    return [f"{form(moment)},{g},{w}" for moment, g, w in zip(moments, GYRO, INNER, strict=True)]
+
+
+def semicolons(rows):
+    return [row.replace(",", ";") for row in rows]
+
+
+def thousandths(moment):
+    return f"{moment:%H:%M:%S},{moment.microsecond // 1000:03d}"
+
+
+SHORT = "Time;Gyro [dph];T_in [C]"
+DAYS = [r.replace("28/", "03/").replace("29/", "04/") for r in stamped(lambda m: f"{m:%d/%m/%Y %H:%M:%S}")]
+TWO = stamped(lambda moment: f"{moment:%d.%m.%Y},{moment:%H:%M:%S.%f}")
+FILES = {
+    "parentheses": lines("Time (s),Gyro (°/h),T_in (°C)"),
+    "case": lines("TIME [S],GYRO [DEG/H],T_IN [DEGC]"),
+    "signs": lines("time[sec],gyro[˚/h],T_in[℃]"),
+    "words": lines("time [seconds],gyro [dph],T_in [Celsius]"),
+    "other separators": lines("time / s,gyro in deg/hr,T_in_C"),
+    "comment mark": lines(f"# {HEADER}", above=["# Logger 1.2", "# Serial: 0417"]),
+    "title lines": lines(above=["Chamber test FOG-0417,,", "Operator: Li; second shift", ""]),
+    "row of units": lines("Time,Gyro,T in", rows=["s,deg/h,°C", *PLAIN]),
+    "separator line": lines(HEADER.replace(",", ";"), semicolons(PLAIN), above=["sep=;"]),
+    "separator at the end": lines(HEADER + ",", rows=[row + "," for row in PLAIN]),
+    "footer": lines(below=["", "End of file", "Samples: 30", "Mean,1.0;x,"]),
+    "empty rows below": lines(below=[",,", ",,"]),
+    "thousands": lines(rows=[row.replace("1000.25", '"1,000.25"') for row in PLAIN]),
+    "german thousands": lines(
+        HEADER.replace(",", ";"),
+        [f"{german(t)};{german(g)};{german(w)}" for t, g, w in zip(TIME, GYRO, INNER, strict=True)],
+    ),
+    "quotes": lines('"time [s]","gyro [deg/h]","T_in [degC]"', [f'"{r}"'.replace(",", '","') for r in PLAIN]),
+    "carriage returns": lines().replace("\n", "\r"),
+    "zero bytes in fields": lines(rows=[row + "\0\0" for row in PLAIN]),
+    "zero bytes at the end": lines() + "\0" * 5000,
+    "ISO": lines(rows=stamped(lambda m: m.isoformat(" "))),
+    "ISO with a zone": lines("Timestamp,gyro_dph,T_in_C", stamped(lambda m: f"{m.isoformat()}+02:00")),
+    "days first": lines(
+        SHORT.replace("Time", "Date/Time"), semicolons(stamped(lambda m: f"{m:%d/%m/%Y %T.%f}"))
+    ),
+    "month first": lines(rows=stamped(lambda m: f"{m:%m/%d/%Y %I:%M:%S.%f %p}")),
+    "time of day over midnight": lines(SHORT, semicolons(stamped(lambda m: f"{m:%H:%M:%S.%f}"))),
+    "milliseconds behind a comma": lines(
+        SHORT, [row.replace(";", ",", 1) for row in semicolons(stamped(thousandths))]
+    ),
+    "date and time": lines("Date,Time,Gyro [deg/h],T_in [°C]", TWO),
+}  # fmt: skip
+
+
+def check(run):
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(run.gyro, GYRO)
+    np.testing.assert_array_equal(run.columns["T_in"], INNER)
+
+
+@pytest.mark.parametrize("kind", FILES)
+def test_gives_the_plain_run(tmp_path, kind):
+    path = tmp_path / "log.csv"
+    path.write_bytes(FILES[kind].encode())
+    check(run := read_run(path))
+    said = {finding.code for finding in run.findings}
+    assert ("footer" in said) == (kind == "footer")
+    blocks = list(read_blocks(path, block_rows=7))
+    np.testing.assert_allclose(np.concatenate([block.time for block in blocks]), TIME, atol=1e-9)
+
+
+@pytest.mark.parametrize("encoding", ["utf-16", "utf-16-le", "utf-16-be", "utf-8-sig", "latin-1", "gb18030"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_encodings(tmp_path, encoding, end):
+    path = tmp_path / "log.csv"
+    above = ["Größe: 3" if encoding == "latin-1" else "FOG"]
+    text = lines("time [s],gyro [°/h],T_in [°C]", above=above, below=["fin"])
+    path.write_bytes(text.replace("\n", end).encode(encoding))
+    check(read_run(path))
+    path.write_bytes(text.replace("20.5", "twenty").replace("\n", end).encode(encoding))
+    with pytest.raises(InputError, match=r"log\.csv, line 7, column 'T_in': 'twenty'"):
+        read_run(path)
+
+
+def test_names_in_chinese(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_bytes(lines("时间 [s],陀螺 [°/h],温度 [°C]").encode("gbk"))
+    np.testing.assert_array_equal(read_run(path).columns["T"], INNER)
+
+
+@pytest.mark.parametrize(
+    ("cells", "right"),
+    [
+        (["t [s]", "gyro [dps]", "t [degC]"], ("time [s]", "gyro [deg/s]", "T [degC]")),
+        (["time_us", "gyro_dps", "Temperature (K)"], ("time [us]", "gyro [deg/s]", "T [K]")),
+        (["Time (min)", "Gyro (mdps)", "Temp [C]"], ("time [min]", "gyro [mdeg/s]", "T [degC]")),
+        (["time [s]", "gyro [dph]", "Temp [C]", "T1"], ("time [s]", "gyro [deg/h]", "Temp [degC]", "T1")),
+        (["IMU (left)", "B_x (G)", "vibration [g]"], ("IMU (left)", "B_x [G]", "vibration [g]")),
+        (["gyro [Hz]", "time", "T2 [℃]"], ("gyro [Hz]", "time", "T2 [degC]")),
+    ],
+)  # fmt: skip
+def test_cells(cells, right):
+    assert canonical_cells(cells) == right
+
+
+@pytest.mark.parametrize(
+    ("name", "unit", "value", "internal"),
+    [
+        ("gyro", "mdeg/s", 1.0, 3.6),
+        ("gyro", "arcsec/s", 1.0, 1.0),
+        ("gyro", "mrad/s", 1.0, 0.18 / np.pi * 3600),
+        ("T", "degF", 212.0, 100.0),
+        ("time", "day", 1.0, 86400.0),
+        ("B_x", "mT", 1.0, 1000.0),
+    ],
+)
+def test_units_that_are_not_listed(name, unit, value, internal):
+    factor, offset = conversion(name, unit, "log.csv")
+    assert value * factor + offset == pytest.approx(internal, rel=1e-9)
+
+
+@pytest.mark.parametrize("unit", ["Hz", "m/s", "deg", "nonsense", "deg**9999999999/h", "1/h"])
+def test_units_that_are_none_of_a_gyro(unit):
+    with pytest.raises(InputError, match="not accepted here"):
+        conversion("gyro", unit, "log.csv")
+
+
+def test_when_a_recording_began(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(FILES["ISO with a zone"])
+    assert read_run(path).facts.started == datetime(2026, 3, 28, 21, 59, 50, tzinfo=UTC)
+    path.write_text(FILES["date and time"])
+    assert read_run(path).facts.started == datetime(2026, 3, 28, 23, 59, 50)
+    path.with_suffix(".yaml").write_text("started: 2026-01-01T00:00:00\n")
+    assert read_run(path).facts.started == datetime(2026, 1, 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        (lines().replace("21.125", "OVF"), r"line 11, column 'T_in': 'OVF'"),
+        (FILES["ISO"].replace("23:59:55.5", "23h59"), r"line 13, column 'time'.*is no date and time"),
+        (lines(rows=DAYS), "day and month"),
+        (lines("Time,Gyro,T"), r"'time' states no unit; write 'time \[s\]'"),
+    ],
+)  # fmt: skip
+def test_faults_are_named_with_their_place(tmp_path, text, told):
+    path = tmp_path / "log.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=told):
+        read_run(path)
+
+
+def test_a_row_cut_short_is_no_footer(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(lines(below=["15.0"]))
+    with pytest.raises(InputError, match="line 32"):
+        read_run(path)
