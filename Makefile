@@ -11,7 +11,7 @@ $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --upgrade -c constraints.txt pip setuptools
 	$(PIP) install --quiet -c constraints.txt torch
-	$(PIP) install --quiet -c constraints.txt -e '.[hdf5,sweep,cluster,export,test]'
+	$(PIP) install --quiet -c constraints.txt -e '.[readers,sweep,cluster,export,test]'
 	touch $(READY)
 
 ## Train on one leg of a real thermal cycle, judge on another, and say which page to open.
@@ -27,7 +27,7 @@ test: $(READY)
 oldest newest:
 	test -x .venv-$@/bin/python || $(PYTHON) -m venv .venv-$@
 	if [ $@ = oldest ]; then $(PYTHON) .ci/oldest.py > .venv-$@/constraints.txt; else : > .venv-$@/constraints.txt; fi
-	.venv-$@/bin/python -m pip install --quiet --upgrade -c .venv-$@/constraints.txt -e '.[hdf5,export,sweep,cluster,test]'
+	.venv-$@/bin/python -m pip install --quiet --upgrade -c .venv-$@/constraints.txt -e '.[readers,export,sweep,cluster,test]'
 	.venv-$@/bin/python -m pytest -n 2 --dist loadfile
 
 ## The documentation as a site and as a zip, warnings as errors; both work without a network.

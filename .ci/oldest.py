@@ -8,7 +8,8 @@ from pathlib import Path
 
 project = tomllib.loads((Path(__file__).parents[1] / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 # Libraries alone: with which version of its tools a test runs tells nothing of the library.
-extras = (project["optional-dependencies"][name] for name in ("hdf5", "export", "sweep", "cluster"))
+READERS = ("hdf5", "xlsx", "tdms", "mdf", "ulog", "dataflash", "ros", "mcap", "miniseed")
+extras = (project["optional-dependencies"][name] for name in (*READERS, "export", "sweep", "cluster"))
 for requirement in sorted({*project["dependencies"], *(each for extra in extras for each in extra)}):
     name, floor = re.fullmatch(r"([\w-]+)(?:\[\w+\])?>=([\d.]+)", requirement).groups()
     print(f"{name}=={floor}")

@@ -42,8 +42,8 @@ _HOMES = {
 }
 
 _PACKAGES = (
-    "blind", "export", "features", "fleet", "gap", "lab", "models", "report", "runs", "signals", "testing",
-    "tuning", "twin", "validation",
+    "blind", "export", "features", "fleet", "gap", "lab", "models", "readers", "report", "runs", "signals",
+    "testing", "tuning", "twin", "validation",
 )  # fmt: skip
 
 __all__ = ["__version__", *_HOMES]

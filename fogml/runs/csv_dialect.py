@@ -168,6 +168,13 @@ def csv_dialect(path: Path) -> CsvDialect:
     return replace(dialect, text=frozenset(text))
 
 
+def is_sure(content: bytes) -> bool:
+    """Whether a text has a header that names a time and a gyro."""
+    head = content[:_HEAD_BYTES].decode("utf-8", errors="ignore")
+    header = find_header(_LINE_END.split(head))
+    return header is not None and header.is_sure
+
+
 def number(field: str, decimal: str, grouped: bool = False) -> float | None:
     """The value of a field, NaN where it is missing, None where it is no number.
 

@@ -27,7 +27,8 @@ from fogml.runs.raw_table import (
     embedded_facts,
     stored_blocks,
 )
-from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits, StoredArray, stored_file
+from fogml.runs.reader_process import StoredArray, stored_file
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 
 

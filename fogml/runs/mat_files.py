@@ -24,7 +24,8 @@ from fogml.runs.columns import parse_header
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
 from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, stored_blocks
-from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits, stored_file
+from fogml.runs.reader_process import stored_file
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 
 _USER_BLOCK = 512

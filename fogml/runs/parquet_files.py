@@ -15,7 +15,8 @@ from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import Facts
 from fogml.runs.raw_table import FACTS_KEY, RawTable, embedded_facts, stored_blocks, text_column
-from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits, StoredArray, StoredFile, stored_file
+from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
 
 def parquet_blocks(

@@ -1,15 +1,16 @@
-"""Reads HDF5, MATLAB and Parquet files for `fogml.runs.reader_process`, in a process of its own, as a script.
+"""Reads files of `fogml.readers` for `fogml.runs.reader_process`, in a process of its own, as a script.
 
 The libraries behind these formats are written for sound files: a damaged one may end the process, hang it
-or take all memory. Here that ends no more than this process. It needs the standard library, NumPy and the
-format's own package alone, so that it starts quickly. Requests come as lines of JSON on standard input; each
-is answered by a line of JSON on standard output, and for samples by their bytes after it.
+or take all memory. Here that ends no more than this process. It needs the standard library, NumPy, the module
+of the format's reader and the package behind it alone, so that it starts quickly. Requests come as lines of
+JSON on standard input; each is answered by a line of JSON on standard output, and for samples by their bytes
+after it.
 """
 
 from __future__ import annotations
 
 import contextlib
-import importlib.util
+import importlib
 import json
 import os
 import sys
@@ -17,16 +18,14 @@ import warnings
 from pathlib import Path
 from typing import Any
 
-_FORMATS = Path(__file__).with_name("reader_formats.py")
+ROOT = Path(__file__).resolve().parents[2]
 
 
-def formats() -> Any:
-    """The module beside this script: no other of its folder is to be found, as it is no package here."""
-    specification = importlib.util.spec_from_file_location(_FORMATS.stem, _FORMATS)
-    assert specification is not None and specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+def reader(place: str, package: str) -> Any:
+    """The class of a reader, ``module:Class``, once the package that it needs is loaded."""
+    importlib.import_module(package)
+    module, _, name = place.partition(":")
+    return getattr(importlib.import_module(module), name)
 
 
 def limit_memory(more: int) -> None:
@@ -66,9 +65,7 @@ def end_with_parent(parent: int) -> None:
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
 
 
-def answer(
-    request: dict[str, Any], files: dict[int, Any], known: Any
-) -> tuple[dict[str, Any], bytes | memoryview]:
+def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, Any], bytes | memoryview]:
     """The answer to a request, and the bytes after it."""
     number = int(request["file"])
     limit_time(request["cpu_s"])
@@ -76,17 +73,19 @@ def answer(
         files.pop(number).close()
         return {}, b""
     if request["do"] == "open":
-        kind, package = known.KINDS[request["kind"]]
         # What a reader needs is loaded before memory is limited.
-        __import__(package)
+        kind = reader(request["reader"], request["package"])
         limit_memory(request["memory"])
         files[number] = kind(request["path"], request["keys"])
         return files[number].told, b""
     array, names = files[number].arrays[request["array"]], []
+    if request["do"] == "text":
+        part = array.content[request["start"] : request["stop"]]
+        return {"count": len(part), "names": names}, part
     if request["do"] == "marks":
         names, found = array.marks()
     else:
-        found = known.samples(array, request["start"], request["stop"])
+        found = reader("fogml.readers.stored:samples", "numpy")(array, request["start"], request["stop"])
     return {"count": len(found), "names": names}, found.data.cast("B") if len(found) else b""
 
 
@@ -95,12 +94,13 @@ def main(parent: int) -> None:
     end_with_parent(parent)
     warnings.simplefilter("ignore")
     files: dict[int, Any] = {}
-    known = formats()
+    # The readers are found; nothing beside them hides another package.
+    sys.path.append(str(ROOT))
     output = sys.stdout.buffer
     sys.stdout = sys.stderr  # whatever a library prints is no answer
     for line in sys.stdin.buffer:
         try:
-            told, content = answer(json.loads(line), files, known)
+            told, content = answer(json.loads(line), files)
         except MemoryError:
             told, content = {"memory": True}, b""
         except Exception as error:  # libraries raise whatever the damage leads to

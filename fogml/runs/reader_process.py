@@ -1,4 +1,4 @@
-"""HDF5, MATLAB and Parquet files, read in a process of its own with limits on time and memory.
+"""Files of `fogml.readers`, read in a process of its own with limits on time and memory.
 
 What a file holds is parsed by `fogml.runs.reader_child`; here come its names and samples, and where it ends
 without an answer, a message that names the file.
@@ -7,6 +7,7 @@ without an answer, a message that names the file.
 from __future__ import annotations
 
 import contextlib
+import importlib.util
 import json
 import os
 import signal
@@ -18,63 +19,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, printable
+from fogml.readers import extra_hint, reader_of
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
+
+__all__ = [
+    "CHILD", "DEFAULT_LIMITS", "ReaderProcess", "ReadingLimits", "StoredArray", "StoredFile", "stored_file",
+]  # fmt: skip
 
 CHILD = Path(__file__).with_name("reader_child.py")
 _LONGEST_ANSWER = 1 << 26
-_LABELS = {"hdf5": "HDF5 file of numbers", "mat": "MATLAB file", "parquet": "Parquet file"}
-
-
-@dataclass(frozen=True)
-class ReadingLimits:
-    """What reading a file may take before it counts as damaged.
-
-    Attributes
-    ----------
-    cpu_s
-        Time of computing for one answer [s]: a catalogue, or one column's samples of a block. A million
-        samples take 0.1 s; ten slow machines' worth of that is spared.
-    cpu_s_per_mb
-        More of it for each megabyte of the file [s]; MATLAB files are unpacked whole, at over 50 MB/s.
-    wall_s
-        Time for one answer by the clock [s], for a drive that does not answer.
-    memory_mb
-        Memory beside that of the program itself [MB]: a block of a million rows of 30 columns takes 240.
-    memory_per_byte
-        More of it for each byte of the file: MATLAB files are held whole, and recorded noise does not pack
-        to less than a tenth.
-    expansion
-        Most bytes that a byte of the file stands for; deflate's own limit is 1032 (zlib technical details).
-    spare_mb
-        What a file may stand for in any case [MB].
-    """
-
-    cpu_s: float = 10.0
-    cpu_s_per_mb: float = 0.2
-    wall_s: float = 600.0
-    memory_mb: float = 1024.0
-    memory_per_byte: float = 20.0
-    expansion: float = 1032.0
-    spare_mb: float = 16.0
-
-    def check_size(self, path: Path, values: float) -> None:
-        """Refuse a file that states more values of 8 bytes than it can hold.
-
-        Raises
-        ------
-        InputError
-            Naming the file.
-        """
-        if 8.0 * values > self.expansion * path.stat().st_size + 1e6 * self.spare_mb:
-            raise InputError(
-                f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "
-                "hold; copy or export it again"
-            )
 
 
 @dataclass(frozen=True)
@@ -91,14 +50,12 @@ class StoredArray:
     type_name: str
     shape: tuple[int, ...]
     fault: str | None
+    group: str = ""
 
     @property
     def is_vector(self) -> bool:
         """Whether it has one axis alone that is longer than 1."""
         return bool(self.shape) and sum(size != 1 for size in self.shape) <= 1
-
-
-DEFAULT_LIMITS = ReadingLimits()
 
 
 class StoredFile:
@@ -141,7 +98,20 @@ class StoredFile:
         names = self.ask({"do": "marks", "array": array.index}, codes)["names"]
         return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
 
-    def ask(self, request: Mapping[str, Any], into: NDArray[np.float64] | None = None) -> dict[str, Any]:
+    def text(self, array: StoredArray) -> bytes:
+        """The text of a worksheet, as of a CSV file.
+
+        Raises
+        ------
+        InputError
+            If the file is damaged.
+        """
+        self.limits.check_size(self.path, max(array.shape) / 8)
+        content = np.empty(max(array.shape), dtype=np.uint8)
+        self.ask({"do": "text", "array": array.index, "start": 0, "stop": len(content)}, content)
+        return content.tobytes()
+
+    def ask(self, request: Mapping[str, Any], into: NDArray[Any] | None = None) -> dict[str, Any]:
         """The answer to a request."""
         megabytes = self.path.stat().st_size / 1e6 if self.path.exists() else 0.0
         cpu_s = self.limits.cpu_s + self.limits.cpu_s_per_mb * megabytes
@@ -170,9 +140,7 @@ class _Fault(Exception):
 
 
 @contextlib.contextmanager
-def stored_file(
-    path: Path, kind: Literal["hdf5", "mat", "parquet"], keys: Sequence[str], limits: ReadingLimits
-) -> Iterator[StoredFile]:
+def stored_file(path: Path, kind: str, keys: Sequence[str], limits: ReadingLimits) -> Iterator[StoredFile]:
     """A file opened in the other process; `keys` are the attributes that are read.
 
     Raises
@@ -180,17 +148,22 @@ def stored_file(
     InputError
         If it is damaged, takes longer or more memory than `limits`, or its reader ends.
     """
+    reader = reader_of(kind)
+    if reader.extra is not None and importlib.util.find_spec(reader.package.partition(".")[0]) is None:
+        raise InputError(extra_hint(reader, path))
+    limits = limits.at_least(reader.cpu_s_per_mb, reader.memory_per_byte)
     process = _processes.of_thread()
     stored = StoredFile(path, process, next(_numbers), limits)
     try:
-        request = {"do": "open", "path": os.path.abspath(path), "kind": kind, "keys": list(keys)}
+        request = {"do": "open", "path": os.path.abspath(path), "keys": list(keys)}
+        request |= {"reader": reader.place, "package": reader.package}
         stored.told = stored.ask({**request, "memory": stored.memory})
         stored.arrays = tuple(_array(i, told) for i, told in enumerate(stored.told["arrays"]))
         yield stored
     except _Fault as fault:
         told = printable(str(fault), 120)
         raise InputError(
-            f"{path.name}: damaged or no {_LABELS[kind]} ({told}); copy or export it again"
+            f"{path.name}: damaged or no {reader.label} file ({told}); copy or export it again"
         ) from None
     finally:
         if process.is_alive:
@@ -208,6 +181,7 @@ def _array(index: int, told: Mapping[str, Any]) -> StoredArray:
         str(told.get("type", "")),
         tuple(int(size) for size in told.get("shape", ())),
         told["fault"],
+        str(told.get("group", "")),
     )
 
 
@@ -239,7 +213,7 @@ class ReaderProcess:
         return self.is_alive and self._process.poll() is None
 
     def ask(
-        self, request: Mapping[str, Any], into: NDArray[np.float64] | None, wall_s: float
+        self, request: Mapping[str, Any], into: NDArray[Any] | None, wall_s: float
     ) -> dict[str, Any] | None:
         """The answer to a request, its samples read into `into`; None where the process ended."""
         assert self._process.stdin is not None and self._process.stdout is not None
@@ -265,7 +239,7 @@ class ReaderProcess:
             if not done:
                 self._end_now()
 
-    def _fill(self, into: NDArray[np.float64]) -> bool:
+    def _fill(self, into: NDArray[Any]) -> bool:
         assert self._process.stdout is not None
         rest = into.data.cast("B") if len(into) else memoryview(b"")
         while len(rest) and (got := self._process.stdout.readinto(rest)):  # type: ignore[attr-defined]

@@ -4,34 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator
 from pathlib import Path
-from typing import Literal
 
 from fogml.errors import InputError, listed, quoted
+from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
 from fogml.runs.raw_table import RawTable
-from fogml.runs.reader_process import DEFAULT_LIMITS, ReadingLimits
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 
-Format = Literal["csv", "parquet", "hdf5", "mat"]
 BLOCK_ROWS = 1_000_000
 _HEAD_BYTES = 1024
-_LABELS: dict[Format, str] = {"csv": "CSV", "parquet": "Parquet", "hdf5": "HDF5", "mat": "MATLAB"}
-_SUFFIXES: dict[str, Format] = {
-    ".csv": "csv",
-    ".tsv": "csv",
-    ".parquet": "parquet",
-    ".pq": "parquet",
-    ".h5": "hdf5",
-    ".hdf5": "hdf5",
-    ".mat": "mat",
-}
+_CSV_SUFFIXES = (".csv", ".tsv")
 _FOREIGN = {
-    b"PK\x03\x04": "a zip archive or an Excel workbook; save the sheet as CSV",
+    b"PK\x03\x04": "a zip archive; unpack it first",
     b"\x1f\x8b": "compressed by gzip; unpack it first",
-    b"\xd0\xcf\x11\xe0": "an old Excel workbook; save the sheet as CSV",
     b"BZh": "compressed by bzip2; unpack it first",
     b"\xfd7zXZ": "compressed by xz; unpack it first",
     b"\x28\xb5\x2f\xfd": "compressed by zstd; unpack it first",
@@ -48,7 +37,7 @@ def read_run(
     most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Run:
-    """Read a run from CSV, Parquet, HDF5 or MATLAB, told by content and suffix.
+    """Read a run from CSV or a format of `fogml.readers`, told by content and suffix.
 
     Set-up facts come from the side file of the same stem, else from the file itself.
 
@@ -204,8 +193,8 @@ def read_table(path: Path) -> RawTable:
         return _read_table(path, file_format(path), False, DEFAULT_LIMITS)
 
 
-def file_format(path: Path) -> Format:
-    """Which of the formats a file has, told by its first bytes.
+def file_format(path: Path) -> str:
+    """Which of the formats a file has, told by its first bytes: ``csv`` or the name of a reader.
 
     Raises
     ------
@@ -214,23 +203,29 @@ def file_format(path: Path) -> Format:
         of another format than its suffix says.
     """
     kind = _format_of_content(path)
-    stated = _SUFFIXES.get(path.suffix.lower(), kind)
-    if stated == kind:
+    suffix = path.suffix.lower()
+    stated = [reader for reader in READERS if suffix in reader.suffixes]
+    if (kind == "csv" and (suffix in _CSV_SUFFIXES or not stated)) or kind in [r.name for r in stated]:
         return kind
     if kind == "csv":
-        label = _LABELS[stated]
+        label = stated[0].label
         raise InputError(f"{path.name}: damaged or no {label} file (its first bytes are not {label}'s)")
-    right = next(suffix for suffix, of_suffix in _SUFFIXES.items() if of_suffix == kind)
+    reader = reader_of(kind)
+    if not stated and suffix not in _CSV_SUFFIXES:
+        return kind
+    label = stated[0].label if stated else "CSV"
     raise InputError(
-        f"{path.name}: is a {_LABELS[kind]} file by its content, and named as {_LABELS[stated]}; "
-        f"rename it to '{path.stem}{right}'"
+        f"{path.name}: is a {reader.label} file by its content, and named as {label}; "
+        f"rename it to '{path.stem}{reader.suffixes[0]}'"
     )
 
 
-def _format_of_content(path: Path) -> Format:
+def _format_of_content(path: Path) -> str:
     try:
         if not path.exists():
             raise InputError(f"{path}: no such file")
+        if path.is_dir() and (path / "metadata.yaml").is_file():
+            raise InputError(f"{path}: is the folder of a ROS 2 bag; name its .db3 or .mcap file")
         if path.is_dir():
             raise InputError(f"{path}: is a folder; name a file")
         if not path.is_file():
@@ -241,29 +236,29 @@ def _format_of_content(path: Path) -> Format:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     if not head:
         raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
-    if head.startswith(b"PAR1"):
-        return "parquet"
-    if head.startswith(b"MATLAB"):
-        return "mat"
-    if head.startswith(b"\x89HDF\r\n\x1a\n"):
-        return "mat" if path.suffix.lower() == ".mat" else "hdf5"
+    if (reader := reader_of_content(head, path.suffix)) is not None:
+        return reader.name
     for magic, what in _FOREIGN.items():
         if head.startswith(magic):
             raise InputError(f"{path.name}: is {what}")
     return "csv"
 
 
-def _read_table(path: Path, kind: Format, repair: bool, limits: ReadingLimits) -> RawTable:
+def _read_table(path: Path, kind: str, repair: bool, limits: ReadingLimits) -> RawTable:
     if kind == "csv":
         from fogml.runs.csv_files import read_csv
 
         return read_csv(path, repair=repair)
+    if kind == "workbook":
+        from fogml.runs.container_files import sheet_table
+
+        return sheet_table(path, repair=repair, limits=limits)
     (table,) = _table_blocks(path, kind, None, None, limits)
     return table
 
 
 def _table_blocks(
-    path: Path, kind: Format, rows: int | None, columns: Collection[str] | None, limits: ReadingLimits
+    path: Path, kind: str, rows: int | None, columns: Collection[str] | None, limits: ReadingLimits
 ) -> Iterator[RawTable]:
     # Each format's reader, and the package behind it, is loaded only where it is used.
     if kind == "csv":
@@ -278,6 +273,12 @@ def _table_blocks(
         from fogml.runs.hdf5_files import hdf5_blocks
 
         return hdf5_blocks(path, rows, columns, limits)
-    from fogml.runs.mat_files import mat_blocks
+    if kind == "mat":
+        from fogml.runs.mat_files import mat_blocks
 
-    return mat_blocks(path, rows, columns, limits)
+        return mat_blocks(path, rows, columns, limits)
+    from fogml.runs.container_files import container_blocks, sheet_blocks
+
+    if kind == "workbook":
+        return sheet_blocks(path, rows or BLOCK_ROWS, columns, limits)
+    return container_blocks(path, kind, rows, columns, limits)

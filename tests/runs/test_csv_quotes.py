@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 from fogml.errors import InputError
 from fogml.runs.csv_quotes import quotes_are_plain
+from fogml.runs.csv_source import CsvSource
 from fogml.runs.reading import read_blocks, read_run
 
 HEADER = "time [s],gyro [deg/h],note"
@@ -53,7 +54,7 @@ def test_where_marks_are_plain_every_line_is_a_row(tmp_path, text, part):
     path = tmp_path / "any.csv"
     path.write_bytes(text.encode())
     with mock.patch("fogml.runs.csv_quotes._PART_BYTES", part):
-        plain = quotes_are_plain(path, ",")
+        plain = quotes_are_plain(CsvSource(path), ",")
     lines = [next(csv.reader([line]), []) for line in re.split("\r\n|\r|\n", text)]
     try:
         rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))

@@ -32,7 +32,7 @@ FAULTS = {
     "no time": (text_of(*ROWS, header="clock [s],gyro [deg/h],T [degC]"), ["'time'", "time [s]", "clock"]),
     "no gyro": (text_of(*ROWS, header="time [s],out [deg/h],T [degC]"), ["'gyro'", "gyro [deg/h]", "out"]),
     "no unit": (text_of(*ROWS, header="time [s],gyro [deg/h],T"), ["'T'", "T [degC]", "degC, K"]),
-    "unknown unit": (text_of(*ROWS, header="time [s],gyro [deg/h],T [F]"), ["'T'", "'F'", "degC, K"]),
+    "unknown unit": (text_of(*ROWS, header="time [s],gyro [deg/h],T [Hz]"), ["'T'", "'Hz'", "degC, K"]),
     "a column twice": (text_of(*ROWS, header="time [s],gyro [deg/h],gyro [deg/s]"), ["'gyro'", "twice"]),
     "time back": (spoiled("3.5,1.25,20.5"), ["'time'", "line 32", "goes back"]),
     "time repeats": (spoiled("29.0,1.25,20.5"), ["'time'", "line 32", "repeats"]),

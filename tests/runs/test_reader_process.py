@@ -47,7 +47,7 @@ def test_files_that_crash_or_hang_their_library_are_damaged_files():
         ("print('{\"count\"', flush=True)", "crashed"),
         ("print('[' * 5000, flush=True)", "crashed|no end"),
         ("print('{\"memory\": 1}', flush=True)", "takes more than 1024 MB"),
-        ('print(\'{"fault": "odd\\\\u001b"}\', flush=True)', r"no HDF5 file of numbers \(odd"),
+        ('print(\'{"fault": "odd\\\\u001b"}\', flush=True)', r"no HDF5 file \(odd"),
     ],
 )
 def test_however_the_process_ends_the_file_is_named(tmp_path, hdf5, monkeypatch, does, told):

@@ -17,7 +17,8 @@ FIRST = GROUND | {"features"}
 # For each package, the packages it may import besides itself.
 ALLOWED = {
     "signals": set(),
-    "runs": {"signals"},
+    "readers": set(),
+    "runs": {"signals", "readers"},
     "features": GROUND,
     "models": FIRST,
     "validation": FIRST | {"models"},

@@ -1,4 +1,4 @@
-"""What `fogml.runs.reader_child` reads: the arrays of HDF5, MATLAB and Parquet files, and what stands beside.
+"""Readers of HDF5, MATLAB and Parquet files: their arrays, and what stands beside them.
 
 Each format is a class with `arrays`, `told` (what the parent hears of them) and `close`.
 """
@@ -273,7 +273,3 @@ def plain_struct(value: Any) -> Any:
     if is_dataset(value):
         return plain(np.asarray(value)) if value.size == 1 else None
     return None if value is None else plain(value)
-
-
-KINDS = {"hdf5": (Hdf5, "h5py"), "mat": (Mat, "scipy.io"), "parquet": (Parquet, "pyarrow.parquet")}
-"""Each kind's class and the package that it needs."""

@@ -1,0 +1,115 @@
+"""Readers of binary files, one declaration each: suffixes, first bytes, package, extra, class.
+
+A reader runs in a process of its own with limits (`fogml.runs.reader_child`), as the libraries behind it are
+written for sound files. It gives named arrays in groups (a worksheet, a message type, a channel group), with
+units where the format has them; `fogml.runs` makes a run of them, or says which fields there are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+__all__ = ["READERS", "Reader", "reader_of", "reader_of_content"]
+
+
+@dataclass(frozen=True)
+class Reader:
+    """One format.
+
+    Attributes
+    ----------
+    name, label
+        What the format is called in the code, and in messages.
+    suffixes
+        Of file names; the first is the usual one.
+    magic
+        What a file begins with, any of these.
+    place
+        ``module:Class`` of its reader; the class takes a path and the names of wanted attributes, and has
+        `arrays`, `told` and `close` as `fogml.readers.stored` says.
+    package
+        Module that it needs, loaded before memory is limited.
+    extra
+        Extra of the distribution that installs the package; None where fogml needs it anyway.
+    cpu_s_per_mb
+        Time that reading may take [s] for each megabyte, where that is more than of a fast format.
+    memory_per_byte
+        Memory that reading may take for each byte, likewise.
+    """
+
+    name: str
+    label: str
+    suffixes: tuple[str, ...]
+    magic: tuple[bytes, ...]
+    place: str
+    package: str
+    extra: str | None = None
+    cpu_s_per_mb: float = 0.0
+    memory_per_byte: float = 0.0
+
+
+_STORED, _TABLES = "fogml.readers.stored", "fogml.readers.tables"
+_VEHICLES, _MESSAGES = "fogml.readers.vehicles", "fogml.readers.messages"
+READERS = (
+    Reader("parquet", "Parquet", (".parquet", ".pq"), (b"PAR1",), f"{_STORED}:Parquet", "pyarrow.parquet"),
+    Reader("hdf5", "HDF5", (".h5", ".hdf5"), (b"\x89HDF\r\n\x1a\n",), f"{_STORED}:Hdf5", "h5py", "hdf5"),
+    Reader("mat", "MATLAB", (".mat",), (b"MATLAB",), f"{_STORED}:Mat", "scipy.io"),
+    Reader("npz", "NumPy", (".npz",), (), f"{_TABLES}:Npz", "numpy"),
+    Reader("workbook", "Excel or OpenDocument", (".xlsx", ".xlsm", ".xlsb", ".xls", ".ods"),
+           (b"\xd0\xcf\x11\xe0",), f"{_TABLES}:Workbook", "python_calamine", "xlsx", 2.0, 400.0),
+    Reader("tdms", "TDMS", (".tdms",), (b"TDSm",), f"{_TABLES}:Tdms", "nptdms", "tdms"),
+    Reader("mdf", "MDF4", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), f"{_TABLES}:Mdf", "asammdf", "mdf",
+           1.0),
+    Reader("miniseed", "miniSEED", (".mseed", ".miniseed", ".ms"), (b"MS\x03",), f"{_TABLES}:MiniSeed",
+           "pymseed", "miniseed", 0.0, 60.0),
+    Reader("ulog", "ULog", (".ulg", ".ulog"), (b"ULog\x01\x12\x35",), f"{_VEHICLES}:ULog", "pyulog", "ulog",
+           2.0, 30.0),
+    Reader("dataflash", "DataFlash", (".bin",), (b"\xa3\x95\x80\x80",), f"{_VEHICLES}:DataFlash",
+           "pymavlink.DFReader", "dataflash", 3.0, 60.0),
+    Reader("rosbag", "ROS bag", (".bag", ".db3"), (b"#ROSBAG V2.0", b"SQLite format 3\0"),
+           f"{_MESSAGES}:RosBag", "rosbags.highlevel", "ros", 5.0, 60.0),
+    Reader("mcap", "MCAP", (".mcap",), (b"\x89MCAP0\r\n",), f"{_MESSAGES}:Mcap", "mcap.reader", "mcap",
+           5.0, 60.0),
+)  # fmt: skip
+"""Every format, in the order in which first bytes are compared."""
+_BY_NAME = {reader.name: reader for reader in READERS}
+
+
+def reader_of(name: str) -> Reader:
+    """The reader of a format by its name."""
+    return _BY_NAME[name]
+
+
+def reader_of_content(head: bytes, suffix: str) -> Reader | None:
+    """The reader of a file by its first bytes; by its suffix where several formats begin alike.
+
+    Parameters
+    ----------
+    head
+        The first 64 bytes or more.
+    suffix
+        Of the file's name, with its point.
+    """
+    suffix = suffix.lower()
+    named = [reader for reader in READERS if suffix in reader.suffixes]
+    if head.startswith(b"PK\x03\x04"):
+        inside = head[30:60]
+        if inside.startswith((b"[Content_Types]", b"mimetype", b"xl/", b"_rels/", b"docProps/")):
+            return _BY_NAME["workbook"]
+        return _BY_NAME["npz"] if b".npy" in head[30:1024] else (named or [None])[0]
+    if head.startswith(_BY_NAME["hdf5"].magic) and suffix == ".mat":
+        return _BY_NAME["mat"]
+    # Version 2 of miniSEED begins with a number of six digits, a quality and a blank.
+    if len(head) > 20 and head[:6].isdigit() and head[6:7] in b"DRQM" and head[7:8] in b" \0":
+        return _BY_NAME["miniseed"]
+    return next((reader for reader in READERS if reader.magic and head.startswith(reader.magic)), None)
+
+
+def extra_hint(reader: Reader, path: Path) -> str:
+    """What to say of a file whose reader's package is missing."""
+    package = reader.package.partition(".")[0]
+    return (
+        f"{path.name}: is a {reader.label} file; reading it needs the package {package}: "
+        f"pip install 'fogml-lab[{reader.extra}]', or in fogml's source pip install -e '.[{reader.extra}]'"
+    )

@@ -1,0 +1,82 @@
+"""Named columns in groups, read where they are asked for: what readers of container formats share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Slice = Callable[[int, int], Any]
+MOST_COLUMNS = 5000
+
+
+class Column:
+    """A column of `count` numbers that a function reads from one row to another."""
+
+    ndim = 1
+    dtype = np.dtype(np.float64)
+
+    def __init__(self, count: int, read: Slice) -> None:
+        self.shape = (count,)
+        self.read = read
+
+    def __getitem__(self, part: tuple[slice]) -> NDArray[np.float64]:
+        return np.asarray(self.read(part[0].start, part[0].stop), dtype=np.float64)
+
+
+class Container:
+    """Columns in groups, as `fogml.runs.reader_child` answers for them."""
+
+    def __init__(self) -> None:
+        self.arrays: list[Any] = []
+        self.described: list[dict[str, Any]] = []
+        self.origin_s: float | None = None
+        """Seconds from 1970 to the time 0 of its columns, where the format has a date."""
+
+    @property
+    def told(self) -> dict[str, Any]:
+        """What the parent hears."""
+        return {"arrays": self.described, "origin_s": self.origin_s}
+
+    def add(self, group: str, name: str, unit: str | None, array: Any) -> None:
+        """One more column."""
+        if len(self.arrays) >= MOST_COLUMNS:
+            raise ValueError(f"more than {MOST_COLUMNS} columns")
+        self.arrays.append(array)
+        self.described.append(
+            {
+                "group": str(group)[:200],
+                "name": str(name)[:200],
+                "unit": str(unit)[:60] if unit else None,
+                "fault": None,
+                "kind": "f",
+                "type": "numbers",
+                "shape": [int(array.shape[0])],
+            }
+        )
+
+    def add_values(self, group: str, name: str, unit: str | None, values: Any) -> None:
+        """A column that is held."""
+        held = np.asarray(values)
+        self.add(group, name, unit, Column(len(held), lambda start, stop: held[start:stop]))
+
+    def close(self) -> None:
+        """Let go of what is open."""
+        self.arrays.clear()
+
+
+class Kept:
+    """The last few results of a function of a key: columns of one group are read together, once."""
+
+    def __init__(self, make: Callable[[Any], Any], most: int = 1) -> None:
+        self.make, self.most = make, most
+        self.held: dict[Any, Any] = {}
+
+    def __call__(self, key: Any) -> Any:
+        if key not in self.held:
+            while len(self.held) >= self.most:
+                self.held.pop(next(iter(self.held)))
+            self.held[key] = self.make(key)
+        return self.held[key]

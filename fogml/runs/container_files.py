@@ -1,0 +1,262 @@
+"""Files whose columns stand in groups of one rate each: logs of vehicles and test benches, workbooks.
+
+The group that holds a clock and a gyro is the run; columns of the run format in other groups, of another
+rate, are brought to its times. Fields that a format's own documents name are known by these names.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import tempfile
+import weakref
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError, listed, printable, quoted
+from fogml.readers import reader_of
+from fogml.runs.columns import column_spec, conversion, parse_header
+from fogml.runs.csv_dialect import is_sure
+from fogml.runs.csv_files import csv_blocks, read_csv
+from fogml.runs.findings import Finding
+from fogml.runs.header_spelling import canonical_cells
+from fogml.runs.raw_table import RawTable, choose_vectors, stored_blocks
+from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
+from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
+
+FloatArray = NDArray[np.float64]
+
+_INSTANCE = r"(\.\d+)?"
+_XYZ = ("x", "y", "z")
+_ROS = {
+    **{f"angular_velocity.{axis}": f"gyro_{axis} [rad/s]" for axis in _XYZ},
+    **{f"magnetic_field.{axis}": f"B_{axis} [tesla]" for axis in _XYZ},
+    "temperature": "T [degC]",
+}
+# Reader, its groups, and what their fields are: units as PX4's msg/ folder, ArduPilot's log messages and the
+# sensor_msgs of ROS state them; an instrument code J of SEED is a rotation sensor's.
+_KNOWN_FIELDS: tuple[tuple[str, str, dict[str, str]], ...] = (
+    ("ulog", rf"sensor_gyro{_INSTANCE}", {"timestamp_sample": "time [us]", "temperature": "T [degC]",
+                                          **{axis: f"gyro_{axis} [rad/s]" for axis in _XYZ}}),
+    ("ulog", "sensor_combined", {"timestamp": "time [us]",
+                                 **{f"gyro_rad.{i}": f"gyro_{axis} [rad/s]" for i, axis in enumerate(_XYZ)}}),
+    ("dataflash", rf"IMU{_INSTANCE}", {"TimeUS": "time [us]", "T": "T [degC]",
+                                       **{f"Gyr{axis.upper()}": f"gyro_{axis} [rad/s]" for axis in _XYZ}}),
+    ("dataflash", rf"GYR{_INSTANCE}", {"SampleUS": "time [us]",
+                                       **{f"Gyr{axis.upper()}": f"gyro_{axis} [rad/s]" for axis in _XYZ}}),
+    ("rosbag", r".*", _ROS),
+    ("mcap", r".*", _ROS),
+)  # fmt: skip
+_ROTATION = re.compile(r"[A-Z]J(.)\Z")
+_AXIS_OF_CODE = {"X": "x", "E": "x", "1": "x", "Y": "y", "N": "y", "2": "y", "Z": "z", "3": "z"}
+
+
+@dataclass(frozen=True)
+class Group:
+    """Columns of one rate: header cells, spelled as in the run format, with their arrays."""
+
+    name: str
+    columns: tuple[tuple[str, StoredArray], ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the columns."""
+        return tuple(parse_header(cell)[0] for cell, _ in self.columns)
+
+    @property
+    def is_run(self) -> bool:
+        """Whether it holds a clock and a gyro."""
+        return "time" in self.names and any(n == "gyro" or n.startswith("gyro_") for n in self.names)
+
+    def column(self, name: str) -> tuple[str, StoredArray]:
+        """Header cell and array of a column."""
+        return self.columns[self.names.index(name)]
+
+
+def groups_of(stored: StoredFile, kind: str) -> list[Group]:
+    """The groups of a file, in its order."""
+    found: dict[str, list[StoredArray]] = {}
+    for array in stored.arrays:
+        found.setdefault(array.group, []).append(array)
+    rotations = [array.name for array in stored.arrays if kind == "miniseed" and _ROTATION.search(array.name)]
+    return [
+        Group(
+            name, tuple(zip(canonical_cells(_cells(kind, name, arrays, len(rotations))), arrays, strict=True))
+        )
+        for name, arrays in found.items()
+    ]
+
+
+def _cells(kind: str, group: str, arrays: Sequence[StoredArray], rotations: int) -> list[str]:
+    known: dict[str, str] = {}
+    for reader, pattern, fields in _KNOWN_FIELDS:
+        if reader == kind and re.fullmatch(pattern, group):
+            known = known or fields
+    names = {array.name for array in arrays}
+    if known and not any(cell == "time [us]" and name in names for name, cell in known.items()):
+        known = known | {"timestamp": "time [us]"}
+    cells = []
+    for array in arrays:
+        code = _ROTATION.search(array.name) if kind == "miniseed" else None
+        if code is not None:
+            axis = _AXIS_OF_CODE.get(code[1])
+            cells.append("gyro [count]" if rotations == 1 or axis is None else f"gyro_{axis} [count]")
+        else:
+            stated = array.name if array.unit is None else f"{parse_header(array.name)[0]} [{array.unit}]"
+            cells.append(known.get(array.name, stated))
+    return cells
+
+
+def container_blocks(
+    path: Path,
+    kind: str,
+    rows: int | None,
+    columns: Collection[str] | None = None,
+    limits: ReadingLimits = DEFAULT_LIMITS,
+) -> Iterator[RawTable]:
+    """The table of a file of groups in blocks of at most `rows` rows; whole for None.
+
+    Only time, gyro and `columns` are read where these are given.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged, reading it takes more than `limits`, or no group holds a clock and a gyro; the
+        message lists what it holds.
+    """
+    with stored_file(path, kind, (), limits) as stored:
+        groups = groups_of(stored, kind)
+        runs = [group for group in groups if group.is_run]
+        if not runs:
+            raise unknown_fields(path, kind, groups)
+        main, findings = runs[0], []
+        gyros = {name for name in main.names if name.startswith("gyro")}
+        if others := [group.name for group in runs[1:] if gyros & set(group.names)]:
+            message = f"the gyro of {quoted(main.name)} is read; an import profile reads {listed(others)}"
+            findings.append(Finding("other_gyros", message, count=len(others)))
+        vectors, left_out = choose_vectors(path.name, main.columns)
+        joined = [
+            (cell, group, array)
+            for group in groups
+            if group is not main and "time" in group.names and group.name not in others
+            for cell, array in group.columns
+            if _is_joined(cell, main) and (columns is None or parse_header(cell)[0] in columns)
+        ]
+        findings += [*left_out, *_joined_findings(joined)]
+        started = _moment(stored.told.get("origin_s"))
+        for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
+            yield replace(_with_joined(table, stored, joined), started=started)
+
+
+def _is_joined(cell: str, main: Group) -> bool:
+    name = parse_header(cell)[0]
+    is_known = column_spec(name) is not None or re.fullmatch("gyro_[xyz]", name) is not None
+    return is_known and name not in ("time", "gyro") and name not in main.names
+
+
+def _joined_findings(joined: Sequence[tuple[str, Group, StoredArray]]) -> Iterator[Finding]:
+    for cell, group, array in joined:
+        name = parse_header(cell)[0]
+        message = (
+            f"'{name}' of {quoted(group.name)}, {max(array.shape)} values, interpolated at its true times"
+        )
+        yield Finding("other_rate", message, column=name, count=max(array.shape))
+
+
+def _with_joined(
+    table: RawTable, stored: StoredFile, joined: Sequence[tuple[str, Group, StoredArray]]
+) -> RawTable:
+    """A block with the columns of other groups at its times."""
+    if not joined:
+        return table
+    time = next(cell for cell in table.columns if parse_header(cell)[0] == "time")
+    seconds = table.columns[time] * _factor(time, table.file)
+    columns = dict(table.columns)
+    for cell, group, array in joined:
+        clock, times = group.column("time")
+        count = min(max(times.shape), max(array.shape))
+        stored.limits.check_size(stored.path, 2.0 * count)
+        at = stored.read(times, 0, count) * _factor(clock, table.file)
+        columns[cell] = interpolated(seconds, at, stored.read(array, 0, count))
+    return replace(table, cells=tuple(columns), columns=columns)
+
+
+def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
+    """Values of one rate at the times of another; the first and last are held beyond."""
+    sound = np.isfinite(at) & np.isfinite(values)
+    if not sound.any():
+        return np.full(len(seconds), np.nan)
+    order = np.argsort(at[sound], kind="stable")
+    return np.interp(seconds, at[sound][order], values[sound][order])
+
+
+def _factor(cell: str, file: str) -> float:
+    return conversion("time", parse_header(cell)[1], file)[0]
+
+
+def _moment(origin_s: object) -> datetime | None:
+    if not isinstance(origin_s, int | float) or origin_s <= 0.0:
+        return None
+    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=origin_s)
+
+
+def sheet_blocks(
+    path: Path, rows: int, columns: Collection[str] | None = None, limits: ReadingLimits = DEFAULT_LIMITS
+) -> Iterator[RawTable]:
+    """The table of the worksheet with a clock and a gyro, else of the first, as `csv_blocks` reads CSV.
+
+    Raises
+    ------
+    InputError
+        As `container_blocks` and `csv_blocks`; rows of the sheet are called lines.
+    """
+    folder = _Folder()
+    for table in csv_blocks(_sheet(path, folder, limits), rows, columns):
+        yield _keeping(table, folder)
+
+
+def sheet_table(path: Path, *, repair: bool, limits: ReadingLimits = DEFAULT_LIMITS) -> RawTable:
+    """As `sheet_blocks`, whole, as `read_csv` reads CSV."""
+    folder = _Folder()
+    return _keeping(read_csv(_sheet(path, folder, limits), repair=repair), folder)
+
+
+class _Folder:
+    """A folder that is there as long as this object is."""
+
+    def __init__(self) -> None:
+        self.name = tempfile.mkdtemp(prefix="fogml-sheet-")
+        weakref.finalize(self, shutil.rmtree, self.name, ignore_errors=True)
+
+
+def _sheet(path: Path, folder: _Folder, limits: ReadingLimits) -> Path:
+    """The worksheet as a CSV file of the workbook's name."""
+    with stored_file(path, "workbook", (), limits) as stored:
+        if not stored.arrays:
+            raise InputError(f"{path.name}: holds no cells; a header and samples were expected")
+        texts = [stored.text(sheet) for sheet in stored.arrays]
+    file = Path(folder.name) / path.name
+    file.write_bytes(next((text for text in texts if is_sure(text)), texts[0]))
+    return file
+
+
+def _keeping(table: RawTable, folder: _Folder) -> RawTable:
+    """The table, with its file kept as long as it may be asked for the name of a row."""
+    named = table.row_name
+    return replace(table, row_name=lambda i: named(i) if folder else "")
+
+
+def unknown_fields(path: Path, kind: str, groups: Sequence[Group]) -> InputError:
+    """What to say of a file in which no group holds a clock and a gyro: what it holds, and the way on."""
+    label = reader_of(kind).label
+    fields = [f"{group.name}/{cell}" if group.name else cell for group in groups for cell, _ in group.columns]
+    return InputError(
+        f"{path.name}: a {label} file, and none of its groups has both 'time' and 'gyro' by name; it holds "
+        f"{listed(fields, 40) or 'nothing'}. 'fogml import {printable(path.name)} --draft -o profile.yaml' "
+        "writes a profile with guesses to correct, and --profile reads by it"
+    )

@@ -1,0 +1,66 @@
+"""What reading a file of strangers may take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from fogml.errors import InputError
+
+
+@dataclass(frozen=True)
+class ReadingLimits:
+    """What reading a file may take before it counts as damaged.
+
+    Attributes
+    ----------
+    cpu_s
+        Time of computing for one answer [s]: a catalogue, or one column's samples of a block. A million
+        samples take 0.1 s; ten slow machines' worth of that is spared.
+    cpu_s_per_mb
+        More of it for each megabyte of the file [s]; MATLAB files are unpacked whole, at over 50 MB/s.
+    wall_s
+        Time for one answer by the clock [s], for a drive that does not answer.
+    memory_mb
+        Memory beside that of the program itself [MB]: a block of a million rows of 30 columns takes 240.
+    memory_per_byte
+        More of it for each byte of the file: MATLAB files are held whole, and recorded noise does not pack
+        to less than a tenth.
+    expansion
+        Most bytes that a byte of the file stands for; deflate's own limit is 1032 (zlib technical details).
+    spare_mb
+        What a file may stand for in any case [MB].
+    """
+
+    cpu_s: float = 10.0
+    cpu_s_per_mb: float = 0.2
+    wall_s: float = 600.0
+    memory_mb: float = 1024.0
+    memory_per_byte: float = 20.0
+    expansion: float = 1032.0
+    spare_mb: float = 16.0
+
+    def at_least(self, cpu_s_per_mb: float, memory_per_byte: float) -> ReadingLimits:
+        """The limits for a format that takes so much more than others."""
+        return replace(
+            self,
+            cpu_s_per_mb=max(self.cpu_s_per_mb, cpu_s_per_mb),
+            memory_per_byte=max(self.memory_per_byte, memory_per_byte),
+        )
+
+    def check_size(self, path: Path, values: float) -> None:
+        """Refuse a file that states more values of 8 bytes than it can hold.
+
+        Raises
+        ------
+        InputError
+            Naming the file.
+        """
+        if 8.0 * values > self.expansion * path.stat().st_size + 1e6 * self.spare_mb:
+            raise InputError(
+                f"{path.name}: damaged: it states {values:.3g} values, more than a file of its size can "
+                "hold; copy or export it again"
+            )
+
+
+DEFAULT_LIMITS = ReadingLimits()

@@ -1,0 +1,143 @@
+"""Files of each format, written by the library behind its reader, give what was written."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.readers import READERS, reader_of
+from fogml.runs import reader_process
+from fogml.runs.reading import file_format, read_blocks, read_run, read_table
+from tests.readers import files
+from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
+
+STARTED = datetime.fromtimestamp(files.START_S, UTC)
+ZIP = b"PK\x03\x04" + bytes(26)
+HEADS = {"workbook": ZIP + b"[Content_Types].xml", "npz": ZIP + b"a.npy"}
+SLOW = np.interp(TIME, TIME[::10], WARM[::10])
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "warm"),
+    [
+        ("npz", "log.npz", WARM),
+        ("workbook", "log.xlsx", WARM),
+        ("tdms", "log.tdms", SLOW),
+        ("mdf", "log.mf4", SLOW),
+    ],
+)
+def test_one_gyro(tmp_path, kind, name, warm):
+    path = tmp_path / name
+    {"workbook": files.xlsx}.get(kind, getattr(files, kind, None))(path)
+    assert file_format(path) == kind
+    run = read_run(path)
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    np.testing.assert_allclose(run.gyro, GYRO, rtol=1e-15)  # openpyxl writes 16 digits
+    np.testing.assert_allclose(run.columns["T_in"], warm, atol=1e-9)
+    if kind == "tdms":
+        assert run.facts.started == STARTED
+    blocks = list(read_blocks(path, block_rows=50, columns=["T_in"]))
+    assert [len(block) for block in blocks] == [50, 50, 20]
+    np.testing.assert_allclose(np.concatenate([b.columns["T_in"] for b in blocks]), warm, atol=1e-9)
+
+
+@pytest.mark.parametrize("version", [2, 3])
+def test_a_rotation_seismometer(tmp_path, version):
+    path = tmp_path / "log.mseed"
+    files.miniseed(path, version)
+    run = read_run(path)
+    assert run.gyro_unit == "count" and run.facts.started == STARTED
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(run.gyro, np.round(1000.0 * GYRO))
+
+
+def bag2(path: Path) -> Path:
+    return files.rosbag(path, ros1=False)
+
+
+@pytest.mark.parametrize(
+    ("write", "name", "warm"),
+    [
+        (files.ulog, "log.ulg", WARM),
+        (files.dataflash, "log.bin", WARM),
+        (files.rosbag, "log.bag", SLOW),
+        (bag2, "log.db3", SLOW),
+        (files.mcap, "log.mcap", SLOW),
+    ],
+)
+def test_three_gyros(tmp_path, write, name, warm):
+    pytest.importorskip({"log.ulg": "pyulog", "log.bin": "pymavlink"}.get(name, "numpy"))
+    path = tmp_path / name
+    table = read_table(write(path) or path)
+    assert len(table) == COUNT
+    held = {cell.partition(" ")[0]: (cell, values) for cell, values in table.columns.items()}
+    scale = 1e-6 if "[us]" in held["time"][0] else 1.0
+    np.testing.assert_allclose(held["time"][1] * scale, TIME, atol=1e-6)
+    for axis, values in AXES.items():
+        cell, found = held[f"gyro_{axis}"]
+        assert cell == f"gyro_{axis} [rad/s]"
+        np.testing.assert_allclose(found, values, rtol=1e-6)
+    assert held["T"][0] == "T [degC]"
+    np.testing.assert_allclose(held["T"][1], warm, rtol=1e-6)
+
+
+def test_a_second_instance_is_named(tmp_path):
+    pytest.importorskip("pymavlink")
+    path = tmp_path / "log.bin"
+    files.dataflash(path)
+    (finding,) = (f for f in read_table(path).findings if f.code == "other_gyros")
+    assert "IMU.1" in finding.message
+
+
+def test_fields_that_nobody_can_know_are_listed_with_the_way_on(tmp_path):
+    path = tmp_path / "log.npz"
+    np.savez(path, data=np.c_[TIME, GYRO, WARM], volts=GYRO)
+    with pytest.raises(
+        InputError, match=r"log\.npz: a NumPy file.*data column 1.*volts.*import log\.npz --draft"
+    ):
+        read_run(path)
+
+
+@pytest.mark.parametrize(
+    "reader", [r for r in READERS if r.extra not in (None, "hdf5")], ids=lambda reader: reader.name
+)
+def test_a_missing_package_is_named_with_its_extra(tmp_path, monkeypatch, reader):
+    path = tmp_path / f"log{reader.suffixes[0]}"
+    if reader.name == "hdf5":
+        pytest.skip("said where the file is opened, test_hdf5_without_h5py")
+    path.write_bytes(HEADS.get(reader.name, b"".join(reader.magic[:1])) + bytes(50))
+    monkeypatch.setattr(reader_process.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=rf"is a {reader.label} file.*fogml-lab\[{reader.extra}\]"):
+        read_run(path)
+
+
+@pytest.mark.parametrize("reader", READERS, ids=lambda reader: reader.name)
+def test_a_damaged_file_is_named(tmp_path, reader):
+    pytest.importorskip(reader.package.partition(".")[0])
+    path = tmp_path / f"log{reader.suffixes[0]}"
+    path.write_bytes(
+        HEADS.get(reader.name, b"".join(reader.magic[:1])) + np.random.default_rng(0).bytes(3000)
+    )
+    with pytest.raises(InputError, match=r"log\.\w+: "):
+        read_run(path)
+
+
+def test_objects_in_a_numpy_archive_are_never_unpickled(tmp_path):
+    class Bomb:
+        def __reduce__(self):
+            return (Path.touch, (tmp_path / "ran",))
+
+    path = tmp_path / "log.npz"
+    np.savez(path, gyro=np.array([Bomb()], dtype=object), allow_pickle=True)
+    with pytest.raises(InputError, match=r"log\.npz"):
+        read_run(path)
+    assert not (tmp_path / "ran").exists()
+
+
+def test_readers_have_names_of_their_own():
+    assert len({reader.name for reader in READERS}) == len(READERS)
+    assert all(reader_of(reader.name) is reader for reader in READERS)
