@@ -97,7 +97,7 @@ def reader_of_content(head: bytes, suffix: str) -> Reader | None:
         inside = head[30:60]
         if inside.startswith((b"[Content_Types]", b"mimetype", b"xl/", b"_rels/", b"docProps/")):
             return _BY_NAME["workbook"]
-        return _BY_NAME["npz"] if b".npy" in head[30:1024] else (named or [None])[0]
+        return _BY_NAME["npz"] if b".npy" in head[30:1024] else next(iter(named), None)
     if head.startswith(_BY_NAME["hdf5"].magic) and suffix == ".mat":
         return _BY_NAME["mat"]
     # Version 2 of miniSEED begins with a number of six digits, a quality and a blank.

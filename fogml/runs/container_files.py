@@ -11,6 +11,7 @@ import shutil
 import tempfile
 import weakref
 from collections.abc import Collection, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -186,6 +187,59 @@ def _with_joined(
     return replace(table, cells=tuple(columns), columns=columns)
 
 
+def container_columns(
+    path: Path, kind: str, sources: Sequence[str | int], clock: str | int | None
+) -> tuple[dict[str | int, FloatArray], tuple[Finding, ...]]:
+    """Columns of a file of groups by ``GROUP/FIELD``, or by the field where there is one of that name.
+
+    All are brought to the times of the group that most of them are of, or that holds `clock`.
+
+    Raises
+    ------
+    InputError
+        If a source is not there, or a group of another rate has no clock.
+    """
+    with stored_file(path, kind, (), DEFAULT_LIMITS) as stored:
+        groups = {group.name: group for group in groups_of(stored, kind)}
+        found = {source: _source(path, stored, source) for source in sources}
+        names = [array.group for array in found.values()]
+        main = found[clock].group if clock is not None else max(names, key=names.count)
+        count = max(next(array for array in found.values() if array.group == main).shape)
+        columns: dict[str | int, FloatArray] = {}
+        findings = []
+        for source, array in found.items():
+            stored.limits.check_size(path, float(max(array.shape)))
+            values = stored.read(array, 0, max(array.shape))
+            if array.group != main:
+                at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
+                findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
+                values = interpolated(at, own, values)
+            columns[source] = values
+            if len(values) != count:
+                raise InputError(f"{path.name}: {quoted(str(source))} holds {len(values)} values of {count}")
+    return columns, tuple(findings)
+
+
+def _source(path: Path, stored: StoredFile, source: str | int) -> StoredArray:
+    if isinstance(source, int):
+        raise InputError(f"{path.name}: source {source}: columns of this format are named, 'GROUP/FIELD'")
+    whole = [array for array in stored.arrays if f"{array.group}/{array.name}" == source]
+    found = whole or [array for array in stored.arrays if array.name == source]
+    if len(found) != 1:
+        held = [f"{a.group}/{a.name}" if a.group else a.name for a in found or stored.arrays]
+        fault = "no column" if not found else "more than one column"
+        raise InputError(f"{path.name}: {fault} {quoted(source)}; it holds {listed(held, 40)}")
+    return found[0]
+
+
+def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
+    """Times of a group's samples [s]."""
+    if "time" not in group.names:
+        raise InputError(f"{path.name}: {quoted(group.name)} has no clock by which it could be joined")
+    cell, array = group.column("time")
+    return stored.read(array, 0, max(array.shape)) * _factor(cell, path.name)
+
+
 def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
     """Values of one rate at the times of another; the first and last are held beyond."""
     sound = np.isfinite(at) & np.isfinite(values)
@@ -224,6 +278,14 @@ def sheet_table(path: Path, *, repair: bool, limits: ReadingLimits = DEFAULT_LIM
     """As `sheet_blocks`, whole, as `read_csv` reads CSV."""
     folder = _Folder()
     return _keeping(read_csv(_sheet(path, folder, limits), repair=repair), folder)
+
+
+@contextmanager
+def sheet_file(path: Path) -> Iterator[Path]:
+    """A CSV file of the workbook's name with the worksheet that `sheet_blocks` reads, in the block alone."""
+    folder = _Folder()
+    yield _sheet(path, folder, DEFAULT_LIMITS)
+    shutil.rmtree(folder.name, ignore_errors=True)
 
 
 class _Folder:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,14 @@ from fogml.errors import InputError, listed, quoted
 from fogml.runs.csv_end import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
+from fogml.runs.logger_lines import Lines, single_blanks
 from fogml.runs.other_rate import is_of_another_rate
-from fogml.runs.profile_schema import ImportProfile
+from fogml.runs.profile_parts import TextLayout
+from fogml.runs.stamps import StampClock, Stamps, stamps_of
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
-_NEWLINE, _RETURN, _BLANK, _TAB, _STRAY = 10, 13, 32, 9, 31
 _SIGNATURE_LINES = 20
 
 
@@ -40,72 +41,35 @@ class LoggerTable:
         Data rows of the file, rejected ones included.
     findings
         The rejected rows, counted.
+    texts
+        Source to texts, shape (n,).
+    seconds
+        Times since the first stamp [s], shape (n,), where the clock is one of stamps.
+    stamps
+        That clock.
     """
 
     columns: Mapping[str | int, FloatArray]
     rows: IndexArray
     total_rows: int
     findings: tuple[Finding, ...] = ()
+    texts: Mapping[str | int, NDArray[np.str_]] = field(default_factory=dict)
+    seconds: FloatArray | None = None
+    stamps: Stamps | None = None
+
+    def kept(self, rows: NDArray[np.bool_] | slice, finding: Finding) -> LoggerTable:
+        """The table of some of its rows, with what is said of the others."""
+        return replace(
+            self,
+            columns={source: values[rows] for source, values in self.columns.items()},
+            texts={source: values[rows] for source, values in self.texts.items()},
+            seconds=None if self.seconds is None else self.seconds[rows],
+            rows=self.rows[rows],
+            findings=(*self.findings, finding),
+        )
 
 
-@dataclass(frozen=True)
-class _Lines:
-    """The bytes of a file and where its lines are."""
-
-    text: NDArray[np.uint8]
-    starts: IndexArray
-    ends: IndexArray  # without the line's end mark
-
-    @classmethod
-    def of(cls, content: bytes) -> _Lines:
-        text = np.frombuffer(content, dtype=np.uint8)
-        breaks = np.flatnonzero(text == _NEWLINE)
-        starts = np.concatenate([[0], breaks + 1])
-        ends = np.concatenate([breaks, [len(text)]])
-        if starts[-1] == len(text):
-            starts, ends = starts[:-1], ends[:-1]
-        returns = (ends > starts) & (text[np.maximum(ends - 1, 0)] == _RETURN)
-        ends = ends - returns
-        # A carriage return within a line is no line's end: it is a fault of the field that it stands in.
-        stray = text == _RETURN
-        stray[ends[returns]] = False
-        return cls(np.where(stray, _STRAY, text).astype(np.uint8), starts, ends)
-
-    def line(self, number: int) -> str:
-        return self.text[self.starts[number] : self.ends[number]].tobytes().decode()
-
-    def first_bytes(self) -> NDArray[np.uint8]:
-        """The first byte of each line that is no blank or tab; 0 for a blank line."""
-        visible = np.flatnonzero((self.text != _BLANK) & (self.text != _TAB))
-        if len(visible) == 0:
-            return np.zeros(len(self.starts), dtype=np.uint8)
-        at = np.searchsorted(visible, self.starts)
-        place = visible[np.minimum(at, len(visible) - 1)]
-        return np.where((at < len(visible)) & (place < self.ends), self.text[place], 0).astype(np.uint8)
-
-    def field_counts(self, separator: str | None) -> IndexArray:
-        """Fields of each line, shape (lines,)."""
-        if separator is not None:
-            marks = np.flatnonzero(self.text == ord(separator))
-            return np.searchsorted(marks, self.ends) - np.searchsorted(marks, self.starts) + 1
-        visible = (self.text != _BLANK) & (self.text != _TAB) & (self.text != _RETURN)
-        visible &= self.text != _NEWLINE
-        before = np.concatenate([[False], visible[:-1]])
-        field_starts = np.flatnonzero(visible & ~before)
-        return np.searchsorted(field_starts, self.ends) - np.searchsorted(field_starts, self.starts)
-
-    def keep(self, numbers: IndexArray) -> bytes:
-        """The chosen lines, in order, each closed by a newline."""
-        spans = np.zeros(len(self.text) + 1, dtype=np.int8)
-        spans[self.starts[numbers]] += 1
-        spans[np.minimum(self.ends[numbers] + 1, len(self.text))] -= 1
-        inside = np.cumsum(spans[:-1], dtype=np.int8) > 0
-        chosen = self.text[inside]
-        # The end mark of a line may be a carriage return and a newline: the return stays as the mark.
-        return np.where(chosen == _RETURN, _NEWLINE, chosen).astype(np.uint8).tobytes()
-
-
-def read_logger_text(path: str | Path, profile: ImportProfile, profile_name: str) -> LoggerTable:
+def read_logger_text(path: str | Path, profile: TextLayout, profile_name: str) -> LoggerTable:
     """Read the source columns of a logger's text file.
 
     Raises
@@ -122,7 +86,7 @@ def read_logger_text(path: str | Path, profile: ImportProfile, profile_name: str
     return _Reader(path.name, profile, profile_name, is_cut=cut is not None).read(content)
 
 
-def _content(path: Path, profile: ImportProfile) -> bytes:
+def _content(path: Path, profile: TextLayout) -> bytes:
     try:
         raw = path.read_bytes()
     except OSError as error:
@@ -143,7 +107,7 @@ def _content(path: Path, profile: ImportProfile) -> bytes:
 
 
 class _Reader:
-    def __init__(self, file: str, profile: ImportProfile, profile_name: str, is_cut: bool) -> None:
+    def __init__(self, file: str, profile: TextLayout, profile_name: str, is_cut: bool) -> None:
         self.file = file
         self.is_cut = is_cut
         self.profile = profile
@@ -151,7 +115,7 @@ class _Reader:
 
     def read(self, content: bytes) -> LoggerTable:
         profile = self.profile
-        lines = _Lines.of(content)
+        lines = Lines.of(content)
         signature = profile.signature
         if signature is not None:
             head = [lines.line(number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
@@ -162,6 +126,14 @@ class _Reader:
         first = lines.first_bytes()
         used = first != 0
         used[: profile.skip_lines] = False
+        if profile.header_text is not None:
+            found = (n for n in np.flatnonzero(used).tolist() if profile.header_text in lines.line(n))
+            header = next(found, None)
+            if header is None:
+                raise InputError(
+                    f"{self.file}: no line holds the header's text {quoted(profile.header_text)}; {self.hint}"
+                )
+            used[:header] = False
         if profile.comment is not None:
             for number in np.flatnonzero(
                 used & (first == profile.comment.encode(errors="replace")[0])
@@ -187,7 +159,7 @@ class _Reader:
     def _places(self, names: list[str] | None, fields: int) -> dict[str | int, int]:
         """Position of each source column."""
         places: dict[str | int, int] = {}
-        for source in self.profile.sources:
+        for source in (*self.profile.sources, *self.profile.text_sources):
             if isinstance(source, int):
                 places[source] = source
                 continue
@@ -208,7 +180,7 @@ class _Reader:
         return places
 
     def _table(
-        self, lines: _Lines, numbers: IndexArray, fields: int, places: dict[str | int, int]
+        self, lines: Lines, numbers: IndexArray, fields: int, places: dict[str | int, int]
     ) -> LoggerTable:
         counts = lines.field_counts(self.profile.text_separator)[numbers]
         short = counts != fields
@@ -220,8 +192,14 @@ class _Reader:
                 raise InputError(f"{self.file}: {fault} ({int(short.sum())} such rows); {self.hint}")
             findings.append(_rejected(f"without {fields} fields", short))
         rows = np.flatnonzero(~short)
-        values = self._values(lines.keep(numbers[rows]), fields, list(places.values()))
-        faulty = np.any(~np.isfinite(values[self._filled(places, values)]), axis=0)
+        content = lines.keep(numbers[rows])
+        sources = {source: place for source, place in places.items() if source in self.profile.sources}
+        values = self._values(content, fields, list(sources.values()))
+        texts = {s: self._texts(content, fields, places[s]) for s in self.profile.text_sources}
+        seconds, stamps = self._seconds(texts)
+        faulty = np.any(~np.isfinite(values[self._filled(sources, values)]), axis=0)
+        if seconds is not None:
+            faulty = (faulty if len(sources) else np.zeros(len(rows), dtype=bool)) | np.isnan(seconds)
         if self.is_cut and len(rows) and rows[-1] == len(numbers) - 1:
             faulty[-1] = True
         if faulty.any():
@@ -235,60 +213,83 @@ class _Reader:
             bad[rows[faulty]] = True
             findings.append(_rejected("with text or nothing in a number's place", bad))
             rows, values = rows[~faulty], values[:, ~faulty]
-        columns = dict(zip(places, values))
-        return LoggerTable(columns, rows, len(numbers), tuple(findings))
+            texts = {source: held[~faulty] for source, held in texts.items()}
+            seconds = None if seconds is None else seconds[~faulty]
+        columns = dict(zip(sources, values))
+        return LoggerTable(columns, rows, len(numbers), tuple(findings), texts, seconds, stamps)
+
+    def _seconds(
+        self, texts: Mapping[str | int, NDArray[np.str_]]
+    ) -> tuple[FloatArray | None, Stamps | None]:
+        """Times since the first stamp [s], NaN where a text is none; nothing without a clock of stamps."""
+        import pyarrow as pa
+
+        places = self.profile.stamps
+        if not places:
+            return None, None
+        columns = [texts[place] for place in places]
+        stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
+        if stamps is None:
+            raise InputError(
+                f"{self.file}: {quoted(str(columns[0][:1].tolist()))} is no date or time of day; {self.hint}"
+            )
+        clock = StampClock(stamps, self.file)
+        return clock.seconds([pa.array(column, pa.string()) for column in columns]), stamps
 
     def _filled(self, places: dict[str | int, int], values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which sources have a value in every row: those of another rate are empty in most, evenly so."""
-        clock = self.profile.columns["time"].source if "time" in self.profile.columns else None
+        clock = self.profile.columns["time"].number if "time" in self.profile.columns else None
         kinds = zip(places, values, strict=True)
         return np.array([source == clock or not is_of_another_rate(column) for source, column in kinds])
 
-    def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
-        """The source columns as numbers, shape (columns, rows); NaN where there is none."""
+    def _texts(self, content: bytes, fields: int, position: int) -> NDArray[np.str_]:
+        """A source column as texts without blanks and quotation marks about them, shape (rows,)."""
+        import pyarrow as pa
+
+        (column,) = self._fields(content, fields, [position], pa.string(), []).columns
+        return np.char.strip(np.array(column.to_pylist(), dtype=np.str_), ' \t"')
+
+    def _fields(
+        self, content: bytes, fields: int, positions: list[int], kind: Any, nulls: list[str] | None
+    ) -> Any:
+        """Fields by position, as Arrow reads them."""
         import pyarrow as pa
         from pyarrow import csv
 
         separator = self.profile.text_separator
         if separator is None:
-            content, separator = _single_blanks(content), " "
+            content, separator = single_blanks(content), " "
         names = [str(position) for position in range(fields)]
         wanted = [names[position] for position in positions]
+        return csv.read_csv(
+            pa.BufferReader(content),
+            csv.ReadOptions(column_names=names),
+            # A mark that is not closed must not swallow the lines below it.
+            csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
+            csv.ConvertOptions(
+                column_types=dict.fromkeys(wanted, kind),
+                include_columns=sorted(set(wanted)),
+                decimal_point=self.profile.decimal,
+                null_values=nulls,
+                strings_can_be_null=nulls is not None,
+            ),
+        )
 
-        def table(kind: pa.DataType, nulls: list[str] | None) -> pa.Table:
-            return csv.read_csv(
-                pa.BufferReader(content),
-                csv.ReadOptions(column_names=names),
-                # A mark that is not closed must not swallow the lines below it.
-                csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
-                csv.ConvertOptions(
-                    column_types=dict.fromkeys(wanted, kind),
-                    include_columns=sorted(set(wanted)),
-                    decimal_point=self.profile.decimal,
-                    null_values=nulls,
-                    strings_can_be_null=nulls is not None,
-                ),
-            )
+    def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
+        """The source columns as numbers, shape (columns, rows); NaN where there is none."""
+        import pyarrow as pa
 
+        if not positions:
+            return np.empty((0, content.count(b"\n")))
+        wanted = [str(position) for position in positions]
         try:
-            columns = table(pa.float64(), None)
+            columns = self._fields(content, fields, positions, pa.float64(), None)
         except pa.ArrowInvalid:
             # Some field is no plain number: read text, and let what is none become NaN.
-            text = table(pa.string(), [""])
+            text = self._fields(content, fields, positions, pa.string(), [""])
             numbers = [_numbers(text[name], self.profile.decimal) for name in text.column_names]
             columns = pa.table(numbers, names=text.column_names)
         return np.stack([columns[name].to_numpy() for name in wanted])
-
-
-def _single_blanks(content: bytes) -> bytes:
-    """The lines with every run of blanks and tabs between fields made one blank."""
-    text = np.frombuffer(content, dtype=np.uint8)
-    blank = (text == _BLANK) | (text == _TAB)
-    places = np.flatnonzero(~blank)
-    kept = text[places]
-    # A blank stays where something was left out between two characters of the same line.
-    gap = (np.diff(places) > 1) & (kept[:-1] != _NEWLINE) & (kept[1:] != _NEWLINE)
-    return np.insert(kept, np.flatnonzero(gap) + 1, _BLANK).tobytes()
 
 
 def _numbers(text: Any, decimal: str) -> Any:

@@ -8,80 +8,37 @@ from __future__ import annotations
 
 import codecs
 import re
-from fractions import Fraction
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any, Literal
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from fogml.errors import InputError, quoted
-from fogml.runs.columns import KNOWN, column_spec
+from fogml.runs.columns import KNOWN, column_spec, is_accepted
 from fogml.runs.facts import NAMES, Facts
+from fogml.runs.profile_parts import (
+    STAMP,
+    ImportColumn,
+    JoinedLog,
+    LeadingJump,
+    Leg,
+    LegByState,
+    LegByTime,
+    Reject,
+    RowFilter,
+    Source,
+    TextLayout,
+)
 from fogml.yaml_text import read_yaml
 
 PROFILE_FOLDER = Path(__file__).parent / "import_profiles"
 
-_DECIMAL = r"([-+]?\d{1,30}(?:\.\d{0,30})?(?:[eE][-+]?\d{1,3})?)"
-_QUOTIENT = re.compile(rf"\s*{_DECIMAL}\s*/\s*{_DECIMAL}\s*\Z", re.ASCII)
 _PART_OF_A_NAME = re.compile(r"\w[\w.+-]{0,39}\Z")
 _NO_TEXT = frozenset({"idna", "punycode", "unicode_escape", "raw_unicode_escape", "undefined", "utf_7"})
 """Codecs of Python that no logger writes; some take quadratic time."""
 
-SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "whitespace": None}
 
-
-def _number(value: Any) -> Any:
-    """A number, or the quotient of two written as text ("1/340")."""
-    if not isinstance(value, str):
-        return value
-    found = _QUOTIENT.match(value)
-    try:
-        return float(Fraction(found[1]) / Fraction(found[2])) if found else value
-    except (OverflowError, ZeroDivisionError):
-        raise ValueError("a number or a quotient such as '1/340' was expected") from None
-
-
-Quotient = Annotated[float, BeforeValidator(_number), Field(allow_inf_nan=False)]
-Source = str | Annotated[int, Field(ge=0, strict=True)]
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
-
-
-class ImportColumn(_Strict):
-    """One column of the run: value = source * scale + offset, in `unit`.
-
-    `source` is the column's name in the file's header, or its position where there is none.
-    """
-
-    source: Source | None = None
-    unit: str
-    scale: Quotient = 1.0
-    offset: Quotient = 0.0
-
-
-class LeadingJump(_Strict):
-    """Leading rows that do not belong to the recording, told by a jump that ends them.
-
-    Rows are dropped up to the last step of more than `more_than` (in the source's unit) between
-    neighbouring rows of `source`, looked for among the first `within` rows.
-    """
-
-    source: Source
-    more_than: float = Field(gt=0.0)
-    within: int = Field(default=50, ge=2)
-
-
-class Reject(_Strict):
-    """Which rows are dropped (and counted) where otherwise they would be an error."""
-
-    wrong_field_count: bool = False
-    not_numbers: bool = False
-    leading_jump: LeadingJump | None = None
-
-
-class ImportProfile(_Strict):
+class ImportProfile(TextLayout):
     """How a logger writes its files, and what of it becomes a run.
 
     Attributes
@@ -102,6 +59,8 @@ class ImportProfile(_Strict):
         Lines that begin with this are left out, blank lines are left out always.
     header_lines
         Lines of set-up numbers that follow, left out too.
+    header_text
+        Text of the header's line: the first line that holds it is the header, whatever stands above.
     header
         Whether the next line holds the names of the columns.
     strip_names
@@ -114,8 +73,17 @@ class ImportProfile(_Strict):
         Columns of the run by name.
     axes
         Axis name to the source column of the gyro; without it ``gyro`` states its source.
+    where
+        Which rows are kept, by the value of a column; the others are counted.
     legs
-        Leg name to [first row, row after the last]; each leg becomes a run of its own.
+        Leg name to [first row, row after the last], to ``{from_s: …, to_s: …}`` by time, or to
+        ``{source: …, equals: …}`` by a column of states; each leg becomes a run of its own.
+    keep
+        Other columns of the file that are kept under their own names.
+    join
+        Logs of another rate beside the recording, such as a thermometer's.
+    repair
+        Bring a faulty clock in order, as ``--repair`` does.
     sample_s
         Sample interval [s] where there is no clock, or none to trust.
     facts
@@ -128,21 +96,12 @@ class ImportProfile(_Strict):
 
     schema_: Literal["fogml.import/1"] = Field(alias="schema")
     description: str
-    encoding: str = "utf-8"
-    separator: Literal["comma", "semicolon", "tab", "whitespace"] = "comma"
-    decimal: Literal[".", ","] = "."
-    signature: str | None = None
-    skip_lines: int = Field(default=0, ge=0)
-    comment: str | None = Field(default=None, min_length=1)
-    header_lines: int = Field(default=0, ge=0)
-    header: bool = True
-    strip_names: bool = True
-    fields: int | None = Field(default=None, ge=1)
-    reject: Reject = Reject()
-    columns: dict[str, ImportColumn]
     axes: dict[str, Source] = {}
-    legs: dict[str, Annotated[tuple[int, int], Field(strict=False)]] = {}
+    legs: dict[str, Leg] = {}
     sample_s: float | None = Field(default=None, gt=0.0)
+    keep: list[str] = []
+    join: list[JoinedLog] = []
+    repair: bool = False
     facts: Facts = Facts()
     axis_facts: dict[str, Facts] = {}
     notes: list[str] = []
@@ -155,9 +114,13 @@ class ImportProfile(_Strict):
             if self.fields is None:
                 raise ValueError("key 'fields': without a header the number of fields must be stated")
             self._check_positions(self.fields)
-        for leg, (first, end) in self.legs.items():
-            if not 0 <= first < end:
+        for leg, part in self.legs.items():
+            if isinstance(part, tuple) and not 0 <= part[0] < part[1]:
                 raise ValueError(f"key 'legs.{leg}': [first row, row after the last] was expected")
+            if isinstance(part, LegByTime) and not part.from_s < part.to_s:
+                raise ValueError(f"key 'legs.{leg}': 'to_s' must be later than 'from_s'")
+        for log in self.join:
+            check_joined(log)
         for key, names in (("axes", self.axes), ("legs", self.legs)):
             for name in names:
                 # Files are named after them.
@@ -178,41 +141,65 @@ class ImportProfile(_Strict):
         return self
 
     def _check_positions(self, fields: int) -> None:
-        for source in self.sources:
+        for source in (*self.sources, *self.text_sources):
             if isinstance(source, str):
                 raise ValueError(f"source {quoted(source)}: without a header, columns are given by position")
             if source >= fields:
                 raise ValueError(f"source {source}: a row has only {fields} fields, counted from 0")
 
     @property
-    def sources(self) -> tuple[str | int, ...]:
-        """The source columns that the profile uses, each once."""
-        wanted = [column.source for column in self.columns.values() if column.source is not None]
-        jump = self.reject.leading_jump
-        wanted += [*self.axes.values(), *([jump.source] if jump else [])]
-        return tuple(dict.fromkeys(wanted))
+    def sources(self) -> tuple[Source, ...]:
+        """The columns of numbers that the profile uses, each once."""
+        states = [leg.source for leg in self.legs.values() if isinstance(leg, LegByState) and not leg.texts]
+        return tuple(dict.fromkeys([*super().sources, *self.axes.values(), *states, *self.keep]))
 
     @property
-    def text_separator(self) -> str | None:
-        """The separating character; None for any run of blanks and tabs."""
-        return SEPARATORS[self.separator]
+    def text_sources(self) -> tuple[Source, ...]:
+        """The columns of text that the profile uses."""
+        states = [leg.source for leg in self.legs.values() if isinstance(leg, LegByState) and leg.texts]
+        return tuple(dict.fromkeys([*super().text_sources, *states]))
+
+
+def check_joined(log: JoinedLog) -> None:
+    """Refuse a log beside the recording that is elsewhere, or holds no clock or nothing else.
+
+    Raises
+    ------
+    ValueError
+        Naming the key.
+    """
+    if "/" in log.file or "\\" in log.file or log.file.startswith("."):
+        raise ValueError(
+            f"key 'join.file': {quoted(log.file)}: a name in the recording's folder was expected"
+        )
+    if "time" not in log.columns or "gyro" in log.columns or len(log.columns) < 2:
+        raise ValueError("key 'join.columns': 'time' and columns beside 'gyro' were expected")
+    _check_units(log.columns)
 
 
 def _check_columns(profile: ImportProfile) -> None:
     if "gyro" not in profile.columns:
         raise ValueError("key 'columns': a run always needs 'gyro'")
+    _check_units(profile.columns)
     for name, column in profile.columns.items():
-        spec = column_spec(name)
-        if spec is None:
-            known = ", ".join([*KNOWN, "T1, T2 ..."])
-            raise ValueError(f"key 'columns.{name}': not a column of the run format; use one of {known}")
-        if column.unit not in spec.units:
-            accepted = ", ".join(spec.units)
-            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not one of {accepted}")
         if column.source is None and not (name == "gyro" and profile.axes):
             raise ValueError(f"key 'columns.{name}.source': missing")
         if name == "gyro" and column.source is not None and profile.axes:
             raise ValueError("key 'columns.gyro.source': give it here or under 'axes', not both")
+
+
+def _check_units(columns: dict[str, ImportColumn]) -> None:
+    for name, column in columns.items():
+        spec = column_spec(name)
+        if spec is None:
+            known = ", ".join([*KNOWN, "T1, T2 ..."])
+            raise ValueError(f"key 'columns.{name}': not a column of the run format; use one of {known}")
+        is_stamp = name == "time" and column.unit == STAMP
+        if isinstance(column.source, list) and not is_stamp:
+            raise ValueError(f"key 'columns.{name}.source': one column was expected")
+        if not is_stamp and not is_accepted(name, column.unit):
+            accepted = ", ".join([*spec.units, *([STAMP] if name == "time" else [])])
+            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not one of {accepted}")
 
 
 def _check_clock(profile: ImportProfile) -> None:
@@ -248,14 +235,19 @@ def load_profile(name_or_path: str | Path) -> ImportProfile:
         raise InputError(f"{path.name}: {_first_fault(error)}") from None
 
 
+_HOMES: dict[str, Any] = {
+    "reject": Reject, "leading_jump": LeadingJump, "columns": ImportColumn, "facts": Facts,
+    "axis_facts": Facts, "where": RowFilter, "join": JoinedLog, "legs": LegByState,
+}  # fmt: skip
+
+
 def _first_fault(error: ValidationError) -> str:
     first = error.errors()[0]
     key = ".".join(str(part) for part in first["loc"])
     if first["type"] == "extra_forbidden":
         home: Any = ImportProfile
         for part in first["loc"][:-1]:
-            home = {"reject": Reject, "leading_jump": LeadingJump, "columns": ImportColumn,
-                    "facts": Facts, "axis_facts": Facts}.get(str(part), home)  # fmt: skip
+            home = _HOMES.get(str(part), home)
         known = ", ".join(field.alias or name for name, field in home.model_fields.items())
         return f"unknown key {quoted(key)}; known keys are {known}"
     if first["type"] == "missing":

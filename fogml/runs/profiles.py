@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +11,20 @@ from numpy.typing import NDArray
 from fogml.errors import InputError, quoted
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
-from fogml.runs.columns import conversion
+from fogml.runs.columns import conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file, side_file
 from fogml.runs.findings import Finding
-from fogml.runs.logger_text import LoggerTable, read_logger_text
-from fogml.runs.profile_schema import ImportColumn, ImportProfile, LeadingJump, load_profile, profile_names
+from fogml.runs.logger_rows import (
+    chosen_rows,
+    internal,
+    interpolated,
+    joined_columns,
+    read_logger,
+    rows_of_leg,
+)
+from fogml.runs.logger_text import LoggerTable
+from fogml.runs.profile_parts import LeadingJump
+from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
 from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
@@ -69,10 +77,19 @@ def import_recording(
     profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
     _check_axis(profile, axis)
     with unchanged(*run_sources(path)):
-        table = read_logger_text(path, profile, name)
+        table = read_logger(path, profile, name)
+        joined = [joined_columns(path, log, table.stamps) for log in profile.join]
         facts = Facts() if beside is None else read_side_file(path)
     return runs_from_table(
-        table, profile, path.stem, path.name, axis, facts, repair=repair, most_dropped=most_dropped
+        table,
+        profile,
+        path.stem,
+        path.name,
+        axis,
+        facts,
+        joined=joined,
+        repair=repair or profile.repair,
+        most_dropped=most_dropped,
     )
 
 
@@ -93,6 +110,7 @@ def runs_from_table(
     axis: str | None = None,
     facts: Facts | None = None,
     *,
+    joined: Sequence[Mapping[str, FloatArray]] = (),
     repair: bool = False,
     most_dropped: float = MOST_DROPPED,
 ) -> list[Run]:
@@ -112,6 +130,8 @@ def runs_from_table(
         One axis, or all.
     facts
         Facts that override the profile's.
+    joined
+        Columns of logs beside the recording with their ``time``, in internal units.
     repair, most_dropped
         As for `fogml.runs.reading.read_runs`.
 
@@ -122,6 +142,7 @@ def runs_from_table(
     """
     _check_axis(profile, axis)
     table = _without_leading_rows(table, profile.reject.leading_jump)
+    table = chosen_rows(table, profile)
     runs = []
     for name, (leg, this_axis) in run_names(profile, stem).items():
         if axis is None or this_axis == axis:
@@ -131,9 +152,9 @@ def runs_from_table(
                 raise InputError(f"{file}: no rows are left; the profile rejects them all")
             findings = [*table.findings, *found]
             runs += runs_of_columns(
-                _columns(table, part, profile, this_axis, file),
+                _columns(table, part, profile, this_axis, file, joined),
                 Rows(file, lambda i, rows=rows: f"data row {int(rows[i]) + 1}"),  # type: ignore[misc]
-                _with_losses(_facts(profile, this_axis, facts), findings, len(rows), most_dropped),
+                _with_losses(_facts(profile, this_axis, facts, table), findings, len(rows), most_dropped),
                 name,
                 gyro_unit="count" if profile.columns["gyro"].unit == "count" else "deg/h",
                 tick_s=_tick_s(profile),
@@ -148,7 +169,11 @@ def runs_from_table(
 def _tick_s(profile: ImportProfile) -> float:
     """One count of the logger's clock [s]."""
     clock = profile.columns.get("time")
-    return 1.0 if clock is None else clock.scale * conversion("time", clock.unit, "import profile")[0]
+    return (
+        1.0
+        if clock is None or clock.stamps
+        else clock.scale * conversion("time", clock.unit, "import profile")[0]
+    )
 
 
 def _from_zero(run: Run) -> Run:
@@ -189,48 +214,45 @@ def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> Logge
         row=int(table.rows[0]) + 1,
         count=count,
     )
-    columns = {source: values[count:] for source, values in table.columns.items()}
-    return replace(table, columns=columns, rows=table.rows[count:], findings=(*table.findings, finding))
+    return table.kept(slice(count, None), finding)
 
 
 def _leg(
     table: LoggerTable, profile: ImportProfile, leg: str | None, file: str
-) -> tuple[slice, tuple[Finding, ...]]:
+) -> tuple[NDArray[np.intp], tuple[Finding, ...]]:
     """The rows of a leg, and how many rows of the file belong to none."""
     if leg is None:
-        return slice(0, len(table.rows)), ()
-    first, end = profile.legs[leg]
-    if end > table.total_rows:
-        raise InputError(
-            f"{file}: leg {quoted(leg)} ends at row {end}, the file has only {table.total_rows} rows; "
-            "the profile's 'legs' belong to another recording"
-        )
-    covered = np.zeros(table.total_rows, dtype=bool)
-    for leg_first, leg_end in profile.legs.values():
-        covered[leg_first:leg_end] = True
-    outside = ~covered[table.rows]
+        return np.arange(len(table.rows)), ()
+    inside = {name: rows_of_leg(table, profile, name, file) for name in profile.legs}
+    outside = ~np.any(list(inside.values()), axis=0)
     findings: tuple[Finding, ...] = ()
     if outside.any():
         count = int(np.count_nonzero(outside))
         message = f"{count} {'row' if count == 1 else 'rows'} of the file in no leg left out"
         row = int(table.rows[np.argmax(outside)]) + 1
         findings = (Finding("rejected_rows", message, row=row, count=count),)
-    start, stop = np.searchsorted(table.rows, [first, end])
-    return slice(int(start), int(stop)), findings
+    return np.flatnonzero(inside[leg]), findings
 
 
 def _columns(
-    table: LoggerTable, part: slice, profile: ImportProfile, axis: str | None, file: str
+    table: LoggerTable,
+    part: NDArray[np.intp],
+    profile: ImportProfile,
+    axis: str | None,
+    file: str,
+    joined: Sequence[Mapping[str, FloatArray]],
 ) -> dict[str, FloatArray]:
     columns: dict[str, FloatArray] = {}
     for name, column in profile.columns.items():
-        source = profile.axes[axis] if name == "gyro" and axis is not None else column.source
-        assert source is not None  # the profile's own check
-        columns[name] = _internal(table.columns[source][part], name, column)
+        source = profile.axes[axis] if name == "gyro" and axis is not None else column.number
+        if source is not None:
+            columns[name] = internal(table.columns[source][part], name, column)
     rows = table.rows[part]
-    with np.errstate(over="ignore", invalid="ignore"):
-        if profile.sample_s is not None:
+    if profile.sample_s is not None:
+        with np.errstate(over="ignore", invalid="ignore"):
             columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
+    elif table.seconds is not None:
+        columns["time"] = table.seconds[part]
     for name, values in columns.items():
         lost = np.isinf(values)
         if lost.any():
@@ -238,20 +260,22 @@ def _columns(
                 f"{file}: column '{name}' is no finite number at data row {int(rows[np.argmax(lost)]) + 1} "
                 "once it is scaled; correct 'scale', 'offset' or 'sample_s' in the profile"
             )
+    start = 0.0 if profile.sample_s is None or not len(rows) else float(rows[0]) * profile.sample_s
+    for log in joined:
+        for name in log.keys() - {"time"}:
+            columns[name] = interpolated(columns["time"] + start, log["time"], log[name])
+    for source in profile.keep:
+        columns[parse_header(source)[0]] = table.columns[source][part]
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]
     return {name: columns[name] for name in order}
 
 
-def _internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
-    factor, shift = conversion(name, column.unit, "import profile")
-    with np.errstate(over="ignore", invalid="ignore"):
-        return (values * column.scale + column.offset) * factor + shift
-
-
-def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None) -> Facts:
+def _facts(profile: ImportProfile, axis: str | None, overriding: Facts | None, table: LoggerTable) -> Facts:
     """Facts of the profile, then of the axis, then of the side file; notes are joined."""
     layers = [profile.facts, profile.axis_facts.get(axis or "", Facts()), overriding or Facts()]
     values: dict[str, object] = {"axis": axis}
+    if table.stamps is not None and table.stamps.started is not None and not profile.legs:
+        values["started"] = table.stamps.started
     for layer in layers:
         values.update({key: getattr(layer, key) for key in layer.model_fields_set})
     notes = [*profile.notes, *(layer.notes for layer in layers if layer.notes)]

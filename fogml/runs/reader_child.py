@@ -78,7 +78,8 @@ def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, An
         limit_memory(request["memory"])
         files[number] = kind(request["path"], request["keys"])
         return files[number].told, b""
-    array, names = files[number].arrays[request["array"]], []
+    array = files[number].arrays[request["array"]]
+    names: list[str] = []
     if request["do"] == "text":
         part = array.content[request["start"] : request["stop"]]
         return {"count": len(part), "names": names}, part

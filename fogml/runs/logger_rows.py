@@ -1,0 +1,173 @@
+"""What an import profile says of a logger's rows: filters, values for none, legs, logs beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError, quoted
+from fogml.runs.columns import conversion, is_temperature
+from fogml.runs.container_files import container_columns, interpolated, sheet_file
+from fogml.runs.findings import Finding
+from fogml.runs.logger_text import LoggerTable, read_logger_text
+from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout
+from fogml.runs.profile_schema import ImportProfile
+from fogml.runs.reading import file_format
+from fogml.runs.stamps import Stamps
+
+__all__ = ["chosen_rows", "internal", "interpolated", "joined_columns", "read_logger", "rows_of_leg"]
+
+FloatArray = NDArray[np.float64]
+
+
+def read_logger(path: Path, layout: TextLayout, name: str) -> LoggerTable:
+    """The source columns of a logger's file, a text or a container that a reader knows.
+
+    Raises
+    ------
+    InputError
+        If the file does not fit the layout.
+    """
+    kind = file_format(path) if path.is_file() and path.stat().st_size else "csv"
+    if kind == "workbook":
+        with sheet_file(path) as sheet:
+            return read_logger_text(sheet, layout, name)
+    if kind == "csv":
+        return read_logger_text(path, layout, name)
+    if layout.text_sources:
+        raise InputError(f"{path.name}: texts and stamps are read from text files; name columns of numbers")
+    columns, findings = container_columns(path, kind, layout.sources, _clock(layout))
+    count = len(next(iter(columns.values())))
+    return LoggerTable(columns, np.arange(count), count, findings)
+
+
+def _clock(layout: TextLayout) -> str | int | None:
+    return layout.columns["time"].number if "time" in layout.columns else None
+
+
+def internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
+    """A source's values in the internal unit of a column of the run format."""
+    factor, shift = conversion(name, column.unit, "import profile")
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray((values * column.scale + column.offset) * factor + shift)
+
+
+def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
+    """The rows that the profile's filters keep, without the values that stand for none."""
+    for rule in profile.where:
+        inside = matching(table, rule)
+        if not inside.all():
+            lost = int(np.count_nonzero(~inside))
+            message = f"{lost} rows left out by 'where' of {quoted(str(rule.source))}"
+            row = int(table.rows[np.argmin(inside)]) + 1
+            table = table.kept(inside, Finding("rejected_rows", message, row=row, count=lost))
+    for name, column in profile.columns.items():
+        source = column.number
+        if not column.missing or source is None or source not in table.columns:
+            continue
+        values = table.columns[source]
+        none = np.isin(values, column.missing)
+        lost = int(np.count_nonzero(none))
+        if lost == 0:
+            continue
+        row = int(table.rows[np.argmax(none)]) + 1
+        if is_temperature(name) and lost < len(none):
+            places = np.flatnonzero(~none)
+            filled = np.interp(np.arange(len(values)), places, values[places])
+            message = f"{lost} values of {quoted(str(source))} stand for none: interpolated"
+            columns = {**table.columns, source: filled}
+            table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
+            table = LoggerTable(
+                columns,
+                table.rows,
+                table.total_rows,
+                table.findings,
+                table.texts,
+                table.seconds,
+                table.stamps,
+            )
+        else:
+            message = f"{lost} rows in which {quoted(str(source))} stands for none left out"
+            table = table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
+    return table
+
+
+def matching(table: LoggerTable, rule: RowFilter) -> NDArray[np.bool_]:
+    """Which rows a filter keeps, shape (n,)."""
+    if rule.texts:
+        return np.isin(table.texts[rule.source], rule.texts)
+    values = table.columns[rule.source]
+    inside = np.ones(len(values), dtype=np.bool_)
+    if rule.at_least is not None:
+        inside &= values >= rule.at_least
+    if rule.at_most is not None:
+        inside &= values <= rule.at_most
+    if rule.numbers:
+        inside &= np.isin(values, rule.numbers)
+    return inside
+
+
+def rows_of_leg(table: LoggerTable, profile: ImportProfile, name: str, file: str) -> NDArray[np.bool_]:
+    """Which rows belong to a leg, shape (n,).
+
+    Raises
+    ------
+    InputError
+        If it ends beyond the file.
+    """
+    leg = profile.legs[name]
+    if isinstance(leg, LegByState):
+        return matching(table, leg)
+    if isinstance(leg, LegByTime):
+        seconds = _seconds(table, profile)
+        return (seconds >= leg.from_s) & (seconds < leg.to_s)
+    first, end = leg
+    if end > table.total_rows:
+        raise InputError(
+            f"{file}: leg {quoted(name)} ends at row {end}, the file has only {table.total_rows} rows; "
+            "the profile's 'legs' belong to another recording"
+        )
+    return (table.rows >= first) & (table.rows < end)
+
+
+def _seconds(table: LoggerTable, profile: ImportProfile) -> FloatArray:
+    """Time of each row since the first [s]."""
+    if table.seconds is not None:
+        return table.seconds - table.seconds[:1]
+    clock = _clock(profile)
+    if clock is None:
+        assert profile.sample_s is not None
+        return np.asarray(table.rows * profile.sample_s)
+    seconds = internal(table.columns[clock], "time", profile.columns["time"])
+    return seconds - seconds[:1]
+
+
+def joined_columns(path: Path, log: JoinedLog, stamps: Stamps | None) -> Mapping[str, FloatArray]:
+    """Columns of a log beside a recording in internal units, its ``time`` on the recording's clock [s].
+
+    Raises
+    ------
+    InputError
+        If it is missing or does not fit.
+    """
+    beside = path.parent / log.file.replace("{stem}", path.stem)
+    if not beside.is_file():
+        raise InputError(
+            f"{beside.name}: no such file beside {path.name}, which the profile joins; copy it there"
+        )
+    table = chosen_rows(read_logger(beside, log, f"join of {path.name}"), log)
+    columns = {
+        name: internal(table.columns[column.number], name, column)
+        for name, column in log.columns.items()
+        if column.number is not None
+    }
+    if table.seconds is not None:
+        apart = 0.0
+        if stamps is not None and table.stamps is not None:
+            apart = (table.stamps.first_ns - stamps.first_ns) / 1e9
+        columns["time"] = table.seconds + apart
+    columns["time"] = columns["time"] + log.offset_s
+    return columns

@@ -1,0 +1,162 @@
+"""What import profiles say of rows, clocks, legs and logs beside a recording."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.profiles import import_recording, load_profile
+from tests.readers import files
+
+COUNT = 40
+TIME = np.arange(COUNT) * 0.5
+BEGIN = datetime(2026, 3, 28, 23, 59, 50)
+STATE = ["up" if 8 <= i < 30 else "idle" for i in range(COUNT)]
+WARM = 20.0 + TIME / 4.0
+HEAD = """schema: fogml.import/1
+description: a bench
+header_text: Omega
+"""
+COLUMNS = """columns:
+  time: {source: [Date, Clock], unit: stamp}
+  gyro: {source: Omega, unit: dph}
+  T: {source: Temp, unit: ℃, missing: [-9999]}
+"""
+
+
+def log(warm=WARM):
+    rows = ["Bench 4,operator Li", "", "Date,Clock,Omega,Temp,State,Mode,P"]
+    for i, t in enumerate(TIME):
+        moment = BEGIN + timedelta(seconds=t)
+        rows.append(f"{moment:%d.%m.%Y},{moment:%H:%M:%S.%f},{i}.5,{warm[i]},{STATE[i]},{i // 10},{i * 2}")
+    return "\n".join(rows) + "\n"
+
+
+@pytest.fixture
+def read(tmp_path):
+    def read(profile, text=None, name="log.csv"):
+        (tmp_path / "own.yaml").write_text(profile)
+        if text is not None:
+            (tmp_path / name).write_text(text)
+        return import_recording(tmp_path / name, tmp_path / "own.yaml")
+
+    return read
+
+
+def test_header_by_text_stamps_in_two_columns_units_by_alias_and_columns_kept(read):
+    (run,) = read(HEAD + COLUMNS + "keep: [P]\n", log())
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(run.gyro, np.arange(COUNT) + 0.5)
+    np.testing.assert_array_equal(run.columns["T"], WARM)
+    np.testing.assert_array_equal(run.columns["P"], 2.0 * np.arange(COUNT))
+    assert run.facts.started == BEGIN
+
+
+@pytest.mark.parametrize(
+    ("where", "kept"),
+    [
+        ("{source: State, equals: up}", range(8, 30)),
+        ("{source: Mode, equals: [0, 3]}", [*range(10), *range(30, 40)]),
+        ("{source: P, at_least: 20, at_most: 40}", range(10, 21)),
+    ],
+)
+def test_rows_are_chosen_and_the_others_counted(read, where, kept):
+    (run,) = read(HEAD + COLUMNS + f"where: [{where}]\n", log())
+    np.testing.assert_array_equal(run.gyro, np.array(kept) + 0.5)
+    (finding,) = (f for f in run.findings if f.code == "rejected_rows")
+    assert finding.count == COUNT - len(kept)
+
+
+def test_values_that_stand_for_none(read):
+    warm = WARM.copy()
+    warm[[5, 6]] = -9999
+    (run,) = read(HEAD + COLUMNS, log(warm))
+    np.testing.assert_allclose(run.columns["T"], WARM, atol=1e-12)
+    assert [f.count for f in run.findings if f.code == "sentinel"] == [2]
+    gyro = COLUMNS.replace("unit: dph", "unit: dph, missing: [3.5, 4.5]")
+    (run,) = read(HEAD + gyro, log())
+    assert len(run) == COUNT - 2
+
+
+@pytest.mark.parametrize(
+    "legs",
+    [
+        "{a: [0, 8], b: [8, 30]}",
+        "{a: {from_s: 0, to_s: 4}, b: {from_s: 4, to_s: 15}}",
+        "{a: {source: P, at_most: 15}, b: {source: State, equals: up}}",
+    ],
+)
+def test_legs_by_row_time_and_state(read, legs):
+    a, b = read(HEAD + COLUMNS + f"legs: {legs}\n", log())
+    assert (a.name, b.name) == ("log-a", "log-b")
+    np.testing.assert_array_equal(a.gyro, np.arange(8) + 0.5)
+    np.testing.assert_array_equal(b.gyro, np.arange(8, 30) + 0.5)
+    assert a.time[0] == b.time[0] == 0.0
+
+
+JOIN = """join:
+  - file: "{stem}-oven.txt"
+    separator: tab
+    decimal: ","
+    columns:
+      time: {source: When, unit: stamp}
+      T_chamber: {source: Oven, unit: K}
+"""
+
+
+def test_a_thermometers_log_of_another_rate_is_joined_at_its_true_times(read, tmp_path):
+    moments = [BEGIN + timedelta(seconds=s) for s in (-3, 7, 17, 27)]
+    rows = "".join(f"{m:%Y-%m-%d %H:%M:%S}\t{300 + i},25\n" for i, m in enumerate(moments))
+    with pytest.raises(InputError, match=r"log-oven\.txt: no such file beside log\.csv"):
+        read(HEAD + COLUMNS + JOIN, log())
+    (tmp_path / "log-oven.txt").write_text("When\tOven\n" + rows)
+    (run,) = read(HEAD + COLUMNS + JOIN, log())
+    right = np.interp(TIME, [-3, 7, 17, 27], 300.25 + np.arange(4) - 273.15)
+    np.testing.assert_allclose(run.columns["T_chamber"], right, atol=1e-9)
+
+
+def test_a_clock_is_repaired_where_the_profile_says_so(read):
+    text = "t,w,d\n" + "".join(f"{i % 256 * 256},{i},25\n" for i in range(600))
+    profile = HEAD.replace("header_text: Omega\n", "") + (
+        "columns:\n  time: {source: t, unit: us}\n  gyro: {source: w, unit: deg/h}\n"
+        "  T: {source: d, unit: C}\n"
+    )
+    with pytest.raises(InputError, match="wraps"):
+        read(profile, text)
+    (run,) = read(profile + "repair: true\n", text)
+    assert len(run) == 600
+    np.testing.assert_allclose(np.diff(run.time), 256e-6)
+
+
+def test_fields_of_a_container_by_group(read, tmp_path):
+    files.tdms(tmp_path / "log.tdms")
+    profile = (
+        "schema: fogml.import/1\ndescription: bench\ncolumns:\n  time: {source: Gyro/time, unit: s}\n"
+        "  gyro: {source: gyro, unit: deg/s}\n  T_case: {source: Slow/T_in, unit: degC}\n"
+    )
+    (run,) = read(profile, name="log.tdms")
+    np.testing.assert_allclose(run.gyro, 3600.0 * files.GYRO)
+    np.testing.assert_allclose(
+        run.columns["T_case"], np.interp(files.TIME, files.TIME[::10], files.WARM[::10])
+    )
+    with pytest.raises(InputError, match=r"no column 'Fast/T'; it holds Gyro/time, Gyro/gyro"):
+        read(profile.replace("Slow/T_in", "Fast/T"), name="log.tdms")
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        ("legs: {a: {from_s: 4, to_s: 4}}\n", "'to_s' must be later"),
+        ("join: [{file: ../x, columns: {}}]\n", "a name in the recording's folder"),
+        ("join: [{file: x, columns: {T: {source: a, unit: degC}}}]\n", "'time' and columns"),
+        ("where: [{source: State, equal: up}]\n", "unknown key 'where.0.equal'; known keys are source"),
+    ],
+)
+def test_faults_of_a_profile(tmp_path, more, told):
+    path = tmp_path / "own.yaml"
+    path.write_text(HEAD + COLUMNS + more)
+    with pytest.raises(InputError, match=told):
+        load_profile(path)
