@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +30,8 @@ def numbers(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str
             for i, item in enumerate(message):
                 yield from numbers(item, f"{above}.{i}", depth + 1)
     elif not isinstance(message, str | bytes | None.__class__):
-        names = getattr(message, "__dataclass_fields__", None) or getattr(message, "__slots__", ())
+        known: Any = getattr(message, "__dataclass_fields__", None)
+        names = tuple(known or getattr(message, "__slots__", ()))
         yield from _fields({n: getattr(message, n) for n in names if not n.startswith("__")}, above, depth)
 
 
@@ -60,11 +62,15 @@ class Messages(Container):
         if first is None or not (names := [name for name, _ in numbers(first[1])]):
             return
         table = self.kept(topic)
-        self.add(topic, _CLOCK, "s", Column(len(table), lambda a, b: self.kept(topic)[a:b, 0]))
+        self.add(topic, _CLOCK, "s", Column(len(table), partial(self.part, topic, 0)))
         for place, name in enumerate(names[:100], start=1):
-            reader = Column(len(table), lambda a, b, place=place: self.kept(topic)[a:b, place])
+            reader = Column(len(table), partial(self.part, topic, place))
             self.add(topic, name, None, reader)
             self.described[-1]["type"] = kind
+
+    def part(self, topic: str, place: int, start: int, stop: int) -> Any:
+        """Rows `start` to `stop` of a topic's column."""
+        return self.kept(topic)[start:stop, place]
 
     def unpacked(self, topic: str) -> NDArray[np.float64]:
         """Times since the recording began [s] and numbers of a topic, shape (messages, columns)."""
@@ -125,7 +131,8 @@ class Mcap(Messages):
 
         super().__init__()
         self.opened = Path(path).open("rb")  # noqa: SIM115  closed by `close`
-        self.file = make_reader(self.opened, decoder_factories=[DecoderFactory(), _Json()])
+        decoders: list[Any] = [DecoderFactory(), _Json()]
+        self.file = make_reader(self.opened, decoder_factories=decoders)
         summary = self.file.get_summary()
         if summary is None:
             raise ValueError("no summary at its end")

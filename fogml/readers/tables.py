@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from datetime import date, datetime, time, timedelta
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,14 +21,14 @@ class Npz(Container):
     def __init__(self, path: str, keys: list[str]) -> None:
         super().__init__()
         self.file = np.load(path, allow_pickle=False)
-        held = Kept(self.file.__getitem__, 4)
+        self.held = Kept(self.file.__getitem__, 4)
         for name in self.file.files:
             array = self.file[name]
             if array.dtype.names:
                 for field in array.dtype.names:
                     self.add_values(name, field, None, array[field])
             elif array.dtype.kind in "fiub" and array.ndim == 1:
-                self.add("", name, None, Column(len(array), lambda a, b, name=name: held(name)[a:b]))
+                self.add("", name, None, Column(len(array), partial(self.part, name)))
             elif array.dtype.kind == "M" and array.ndim == 1 and len(array):
                 seconds = (array - array[0]) / np.timedelta64(1, "s")
                 self.origin_s = float(array[0].astype("datetime64[ns]").astype(np.int64) / 1e9)
@@ -35,6 +36,10 @@ class Npz(Container):
             elif array.dtype.kind in "fiub" and array.ndim == 2 and array.shape[1] <= 64:
                 for i in range(array.shape[1]):
                     self.add_values(name, f"{name} column {i + 1}", None, array[:, i])
+
+    def part(self, name: str, start: int, stop: int) -> Any:
+        """Rows `start` to `stop` of an array."""
+        return self.held(name)[start:stop]
 
     def close(self) -> None:
         """Let go of the file."""
@@ -155,7 +160,8 @@ class Mdf(Container):
         super().__init__()
         self.file = MDF(path, use_display_names=False)
         self.origin_s = _seconds(self.file.start_time)
-        for index, group in enumerate(self.file.groups):
+        groups: Any = self.file.groups
+        for index, group in enumerate(groups):
             count = int(group.channel_group.cycles_nr)
             named = getattr(group.channel_group, "acq_name", None) or f"group {index}"
             master = self.file.masters_db.get(index)
@@ -164,7 +170,7 @@ class Mdf(Container):
                     is_clock = place == master
                     conversion = getattr(channel, "conversion", None)
                     unit = channel.unit or (conversion.unit if conversion else "") or None
-                    reader = Column(count, lambda a, b, at=(index, place): self.samples(*at, a, b))
+                    reader = Column(count, partial(self.samples, index, place))
                     self.add(named, "time" if is_clock else channel.name, "s" if is_clock else unit, reader)
 
     def samples(self, group: int, place: int, start: int, stop: int) -> Any:

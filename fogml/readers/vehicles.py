@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 import struct
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -56,7 +57,7 @@ class DataFlash(Container):
     def message(self, kind: int, form: Any) -> None:
         """The fields of a message type, each instance a group."""
         records = self.kept(kind)
-        instances = [None]
+        instances: list[int | None] = [None]
         if form.instance_field in (records.dtype.names or ()):
             instances = sorted(set(records[form.instance_field].tolist()))
         for instance in instances:
@@ -69,7 +70,7 @@ class DataFlash(Container):
                     count = int(np.count_nonzero(records[form.instance_field] == instance))
                 stated = str(form.get_unit(name))
                 unit = "us" if name == "TimeUS" else _UNITS.get(stated, stated)
-                reader = Column(count, lambda a, b, at=(kind, instance, place): self.values(*at)[a:b])
+                reader = Column(count, partial(self.part, kind, instance, place))
                 self.add(group, name, unit, reader)
 
     def records(self, kind: int) -> NDArray[Any]:
@@ -85,6 +86,10 @@ class DataFlash(Container):
         layout = np.dtype({"names": names, "formats": formats, "offsets": places, "itemsize": size})
         offsets = offsets[offsets + size <= len(self.content)]
         return self.content[offsets[:, None] + np.arange(size)].reshape(-1).view(layout)
+
+    def part(self, kind: int, instance: int | None, place: int, start: int, stop: int) -> NDArray[np.float64]:
+        """Rows `start` to `stop` of `values`."""
+        return self.values(kind, instance, place)[start:stop]
 
     def values(self, kind: int, instance: int | None, place: int) -> NDArray[np.float64]:
         """A field of an instance's messages, with its multiplier."""
