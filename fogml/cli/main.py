@@ -59,6 +59,10 @@ COMMANDS = {
         ".fleet:FleetSettings",
         "Do the same job for every unit of a manifest, in parallel, here or on a cluster.",
     ),
+    "monitor": (
+        ".monitor:MonitorSettings",
+        "Watch units in service run by run, and say since when one has changed.",
+    ),
     "effects": (
         ".effects:EffectsSettings",
         "The catalogue of effects that a twin can have, or the card of one.",

@@ -64,7 +64,7 @@ class SweepSettings(Settings):
 
     def as_written(self) -> dict[str, Any]:
         """The values of a configuration file; a password is never written."""
-        from fogml.tuning.storage import without_password
+        from fogml.databases import without_password
 
         values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
         return values if self.storage is None else {**values, "storage": without_password(self.storage)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from fogml.features.blocks import FeatureBlocks
-from fogml.models.base import Compensation, DriftModel, compensation_of
+from fogml.models.base import Compensation, DriftModel, Evaluation, compensation_of
 from fogml.runs.run import Run
 
 
@@ -36,6 +36,14 @@ def compensate_blocks(
     InputError
         If the model does not apply to the recording, or a block begins before the last ended.
     """
+    for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
+        yield block, compensation_of(block, evaluation)
+
+
+def evaluate_blocks(
+    model: DriftModel, blocks: Iterable[Run], *, any_unit: bool = False
+) -> Iterator[tuple[Run, Evaluation]]:
+    """Evaluate a model on consecutive blocks of one recording as if it were whole; as `compensate_blocks`."""
     atoms: FeatureBlocks | None = None
     first = True
     for block in blocks:
@@ -50,4 +58,4 @@ def compensate_blocks(
             evaluation = model.evaluate(block)
         else:
             evaluation = model.evaluate_from(block, atoms.push(block))
-        yield block, compensation_of(block, evaluation)
+        yield block, evaluation

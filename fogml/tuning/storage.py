@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from fogml.databases import engine_settings, parse_url, shown_url, told_by
 from fogml.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from optuna.storages import BaseStorage
 
 JOURNAL = "study.journal"
-_ANSWER_S = 10
 _SECOND_TRIES_S = (0.2, 0.5, 1.0, 2.0)
 
 
@@ -43,20 +43,7 @@ def open_storage(url: str | None, folder: str | Path) -> BaseStorage:
 
 def shown(url: str | None) -> str:
     """A storage's name without its password."""
-    if url is None:
-        return JOURNAL
-    from sqlalchemy.engine import make_url
-
-    return make_url(url).render_as_string(hide_password=True)
-
-
-def without_password(url: str | None) -> str | None:
-    """A storage's URL as it may be written to a file: libpq finds the password in PGPASSWORD or ~/.pgpass."""
-    if url is None:
-        return None
-    from sqlalchemy.engine import make_url
-
-    return make_url(url)._replace(password=None).render_as_string(hide_password=False)
+    return JOURNAL if url is None else shown_url(url)
 
 
 def import_optuna() -> Any:
@@ -135,26 +122,10 @@ def _journal(folder: Path) -> BaseStorage:
 
 def _database(url: str) -> BaseStorage:
     from optuna.storages import RDBStorage
-    from sqlalchemy.engine import make_url
-    from sqlalchemy.exc import (
-        ArgumentError,
-        IntegrityError,
-        NoSuchModuleError,
-        ProgrammingError,
-        SQLAlchemyError,
-    )
+    from sqlalchemy.exc import IntegrityError, NoSuchModuleError, ProgrammingError, SQLAlchemyError
 
-    try:
-        parsed = make_url(url)
-    except ArgumentError:
-        raise InputError(
-            "--storage: no URL of a database; write it as postgresql://user@host/database"
-        ) from None
-    if parsed.drivername in ("postgresql", "postgres"):
-        parsed = parsed.set(drivername="postgresql+psycopg")
-    engine: dict[str, Any] = {"pool_pre_ping": True}
-    if parsed.get_backend_name() == "postgresql":
-        engine["connect_args"] = {"connect_timeout": _ANSWER_S}
+    parsed = parse_url(url)
+    engine = engine_settings(parsed)
     text = parsed.render_as_string(hide_password=False)
     try:
         with warnings.catch_warnings():
@@ -172,9 +143,9 @@ def _database(url: str) -> BaseStorage:
             "in fogml's source"
         ) from None
     except (SQLAlchemyError, OSError, RuntimeError) as error:
-        told = str(getattr(error, "orig", None) or error).strip().split("\n")[0]
         raise InputError(
-            f"--storage {shown(url)}: does not answer ({told}); start the database, or state another"
+            f"--storage {shown(url)}: does not answer ({told_by(error)}); start the database, or state "
+            "another"
         ) from None
 
 

@@ -29,7 +29,9 @@ ALLOWED = {
     "export": FIRST | {"models", "validation"},
     "lab": FIRST | {"models", "validation", "twin"},
     "fleet": FIRST | {"models", "validation", "tuning", "twin", "gap"},
-    "report": FIRST | {"models", "validation", "twin", "gap", "blind", "tuning", "export", "lab", "fleet"},
+    "monitor": FIRST | {"models"},
+    "report": FIRST
+    | {"models", "validation", "twin", "gap", "blind", "tuning", "export", "lab", "fleet", "monitor"},
     "testing": FIRST | {"models", "validation", "twin", "gap"},
 }
 ALLOWED["cli"] = set(ALLOWED) - {"testing"}

@@ -10,9 +10,10 @@ import pytest
 from optuna.storages import JournalStorage
 
 from experiments.faults.postgres import free_port
+from fogml.databases import without_password
 from fogml.errors import InputError
 from fogml.tuning.journal import WholeLines
-from fogml.tuning.storage import JOURNAL, open_storage, shown, without_password
+from fogml.tuning.storage import JOURNAL, open_storage, shown
 from fogml.tuning.study import is_finished
 from fogml.tuning.sweep import run_sweep
 from tests.tuning.world import plan

@@ -1,0 +1,1 @@
+"""Units in service: what their model leaves on every run, and when that changed."""

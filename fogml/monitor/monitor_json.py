@@ -1,0 +1,94 @@
+"""``monitor.json``: units in service, schema ``fogml.monitor/1``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from fogml.monitor.changes import Change
+from fogml.monitor.record import FIGURES
+from fogml.monitor.watch import NEAREST, Calibration, UnitWatch
+
+SCHEMA = "fogml.monitor/1"
+
+
+def monitor_json(
+    units: Sequence[UnitWatch], *, runs_between_false_alarms: float, added: int, repeated: int
+) -> dict[str, Any]:
+    """What is known of units in service.
+
+    Parameters
+    ----------
+    units
+        As `fogml.monitor.watch.watch` gives them.
+    runs_between_false_alarms
+        Least mean number of a unit's runs until a false alarm.
+    added, repeated
+        Runs that are new, and runs that the store held before.
+    """
+    return {
+        "schema": SCHEMA,
+        "runs_between_false_alarms": runs_between_false_alarms,
+        "runs": {"added": added, "repeated": repeated},
+        "figures": dict(FIGURES),
+        "units": [_unit(unit) for unit in units],
+    }
+
+
+def _unit(unit: UnitWatch) -> dict[str, Any]:
+    return {
+        "unit": unit.unit,
+        "axis": unit.axis,
+        "state": unit.state,
+        "age_unit": "d" if unit.dated else "run",
+        "age": unit.age.tolist(),
+        "runs": [asdict(record) for record in unit.records],
+        "statistic": unit.chart.statistic.tolist(),
+        "alarms": [_alarm(unit, change) for change in unit.chart.changes],
+        "calibration": None if unit.calibration is None else _calibration(unit.calibration),
+        "notes": list(unit.notes),
+    }
+
+
+def _alarm(unit: UnitWatch, change: Change) -> dict[str, Any]:
+    age, runs = unit.age, unit.records
+    first, last = change.onset_ci90
+    return {
+        "raised_at": runs[change.raised_at].run,
+        "raised_at_index": change.raised_at,
+        "onset": runs[change.onset].run,
+        "onset_index": change.onset,
+        "onset_started": runs[change.onset].started or None,
+        "onset_age": float(age[change.onset]),
+        "onset_ci90": [runs[first].run, runs[last].run],
+        "statistic": change.statistic,
+        "figure": change.figure,
+        "shape": change.shape,
+        "probability": change.probability,
+        "size": change.size,
+        "size_ci90": list(change.size_ci90),
+        "unit": FIGURES[change.figure] + ("" if change.shape == "step" else " per " + _age_word(unit)),
+        "nearest": list(NEAREST[change.figure, change.shape]),
+    }
+
+
+def _age_word(unit: UnitWatch) -> str:
+    return "day" if unit.dated else "run"
+
+
+def _calibration(told: Calibration) -> dict[str, Any]:
+    """Values, with None for what is not foretold."""
+
+    def finite(days: float) -> float | None:
+        return days if np.isfinite(days) else None
+
+    return {
+        "limit_deg_h": told.limit,
+        "trend_deg_h_per_day": told.trend,
+        "trend_ci90": list(told.trend_ci90),
+        "due_days": finite(told.due_days),
+        "due_ci90": [finite(days) for days in told.due_ci90],
+    }

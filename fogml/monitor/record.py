@@ -1,0 +1,272 @@
+"""What is kept of a run in service: a few figures of what its model leaves, and how far it can be trusted."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
+from datetime import UTC, datetime
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.models.base import OUTSIDE, DriftModel
+from fogml.models.compensation import evaluate_blocks
+from fogml.models.saved import model_hash
+from fogml.runs.run import FloatArray, Run
+from fogml.runs.transitions import transition_mask
+from fogml.runs.turning import turning
+
+FIGURES = {
+    "level": "deg/h",
+    "temperature_slope": "deg/h/degC",
+    "rate_slope": "deg/h/(degC/min)",
+    "scatter": "ln(deg/h)",
+    "scale_factor": "ppm",
+}
+"""Figures of what a model leaves on a run, with their units."""
+LEAST_WINDOWS = 10
+"""Averages that figures of a run need: seven beyond the three coefficients."""
+LEAST_SHARE_OF_TRAINED = 0.5
+"""Part of the trained range that a temperature or its rate has to move through to tell a slope: what moves
+less tells it so much worse than other runs that it would hide them."""
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """A run as it is kept.
+
+    Attributes
+    ----------
+    key
+        SHA-256 over the run's columns, unit, axis, model and averaging time: a run that comes twice has the
+        same.
+    unit, axis
+        Serial number and axis; empty where the run states none.
+    run
+        Base name of its file.
+    model
+        Hash of the model.
+    started
+        When it began, by ISO 8601; empty where the run does not say.
+    monitored
+        When it was monitored, UTC, by ISO 8601.
+    span_s
+        Time from the first to the last sample [s].
+    samples
+        Number of samples.
+    outside_training
+        Share of the samples outside what the model was trained on.
+    beyond_interval
+        Share of the averages that lie beyond the model's 90 % interval about zero; NaN where Earth rate is
+        not known.
+    half_width
+        Mean half-width of that interval [deg/h].
+    averaging_s
+        Averaging time of the figures [s].
+    level
+        Mean of what is left [deg/h].
+    temperature_slope, rate_slope
+        Its slopes against temperature [deg/h/degC] and rate of temperature [deg/h/(degC/min)], fitted
+        together; NaN where the run moves through less than half of what the model was trained on.
+    scatter
+        Natural logarithm of the standard deviation of averages about these slopes [ln(deg/h)].
+    scale_factor
+        Error of the scale factor by the turns [ppm]; NaN where the table does not turn.
+    """
+
+    key: str
+    unit: str
+    axis: str
+    run: str
+    model: str
+    started: str
+    monitored: str
+    span_s: float
+    samples: float
+    outside_training: float
+    beyond_interval: float
+    half_width: float
+    averaging_s: float
+    level: float
+    temperature_slope: float
+    rate_slope: float
+    scatter: float
+    scale_factor: float
+
+    @property
+    def label(self) -> str:
+        """Serial number and axis."""
+        return f"{self.unit} {self.axis}".strip() or "unit without a name"
+
+
+TEXTS = tuple(f.name for f in fields(RunRecord) if f.type == "str")
+NUMBERS = tuple(f.name for f in fields(RunRecord) if f.type == "float")
+
+
+def record_run(
+    model: DriftModel, blocks: Iterable[Run], *, averaging_s: float = 100.0, any_unit: bool = False
+) -> RunRecord:
+    """What a model leaves on a run that comes in blocks.
+
+    Parameters
+    ----------
+    model
+        A fitted model.
+    blocks
+        Blocks of one recording in order of time.
+    averaging_s
+        Averaging time of the figures [s].
+    any_unit
+        Allow a run of another unit or axis than the model's.
+
+    Raises
+    ------
+    InputError
+        If the run is empty, of another unit or axis, or holds fewer than `LEAST_WINDOWS` averages.
+    """
+    means = _Means(averaging_s)
+    columns: dict[str, hashlib._Hash] = {}
+    first: Run | None = None
+    samples = outside = 0
+    last_s = 0.0
+    for block, evaluation in evaluate_blocks(model, blocks, any_unit=any_unit):
+        first = first or block
+        for name, values in block.columns.items():
+            columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
+        moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
+        kept = evaluation.full & evaluation.settled
+        if moving.any():
+            kept &= ~transition_mask(block)
+        half = model.intervals_.half_width(0.9, evaluation.excess)
+        means.add(
+            block.time,
+            kept,
+            left=block.error_deg_h - (0.0 if block.facts.compensated else evaluation.drift),
+            temperature=block.temperature(),
+            reference=block.reference_deg_h,
+            half=half,
+            moving=moving.astype(np.float64),
+        )
+        samples += len(block)
+        outside += int(np.sum(evaluation.flag == OUTSIDE))
+        last_s = float(block.time[-1])
+    if first is None:
+        raise InputError("the run holds no samples, there is nothing to monitor")
+    time, mean = means.values()
+    rest = mean["moving"] == 0.0
+    used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(time), dtype=bool)
+    if used.sum() < LEAST_WINDOWS:
+        raise InputError(
+            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
+            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
+        )
+    facts = first.facts
+    digest = hashlib.sha256()
+    sha = model_hash(model)
+    for text in (facts.unit or "", facts.axis or "", sha, first.gyro_unit, repr(averaging_s)):
+        digest.update(f"{text}\0".encode())
+    for name in sorted(columns):
+        digest.update(f"{name}\0{columns[name].hexdigest()}".encode())
+    left, half = mean["left"][used], mean["half"][used]
+    level, temperature_slope, rate_slope, scatter = _slopes(
+        model, time[used], left, mean["temperature"][used], averaging_s
+    )
+    return RunRecord(
+        key=digest.hexdigest(),
+        unit=facts.unit or "",
+        axis=facts.axis or "",
+        run=first.name,
+        model=sha,
+        started=facts.started.isoformat() if facts.started else "",
+        monitored=datetime.now(UTC).isoformat(timespec="seconds"),
+        span_s=last_s - float(first.time[0]),
+        samples=float(samples),
+        outside_training=outside / samples,
+        beyond_interval=float(np.mean(np.abs(left) > half)) if first.earth_known else float("nan"),
+        half_width=float(half.mean()),
+        averaging_s=averaging_s,
+        level=level,
+        temperature_slope=temperature_slope,
+        rate_slope=rate_slope,
+        scatter=scatter,
+        scale_factor=_scale_factor(mean["left"][~rest], mean["reference"][~rest]),
+    )
+
+
+def _slopes(
+    model: DriftModel, time: FloatArray, left: FloatArray, temperature: FloatArray, averaging_s: float
+) -> tuple[float, float, float, float]:
+    """Level, slopes and scatter of m averages."""
+    rate = _rate(time, temperature, averaging_s)
+    columns = [np.ones(len(time))]
+    told = []
+    for name, values in (("T", temperature), ("dT", rate)):
+        low, high = model.card_.box.get(name, (np.nan, np.nan))
+        moves = bool(np.ptp(values) > 0.0 and not np.ptp(values) < LEAST_SHARE_OF_TRAINED * (high - low))
+        told.append(moves)
+        if moves:
+            columns.append(values - values.mean())
+    design = np.stack(columns, axis=1)
+    coefficients, _, rank, _ = np.linalg.lstsq(design, left, rcond=None)
+    free = len(left) - int(rank)
+    scatter = float(np.linalg.norm(left - design @ coefficients)) / np.sqrt(max(free, 1))
+    slopes = iter(coefficients[1:].tolist())
+    found = [next(slopes) if moves else float("nan") for moves in told]
+    return float(left.mean()), found[0], found[1], float(np.log(scatter)) if scatter > 0.0 else float("nan")
+
+
+def _rate(time: FloatArray, temperature: FloatArray, averaging_s: float) -> FloatArray:
+    """Rate of averaged temperatures [degC/min], taken within stretches without a gap, shape (m,)."""
+    rate = np.zeros(len(time))
+    edges = np.flatnonzero(np.diff(time) > 2.5 * averaging_s) + 1
+    for part in np.split(np.arange(len(time)), edges):
+        if len(part) > 1:
+            rate[part] = 60.0 * np.gradient(temperature[part], time[part])
+    return rate
+
+
+def _scale_factor(left: FloatArray, reference: FloatArray) -> float:
+    """Error of the scale factor [ppm] by averages at which the table turns."""
+    power = float(reference @ reference)
+    return 1e6 * float(reference @ left) / power if len(left) and power > 0.0 else float("nan")
+
+
+class _Means:
+    """Means over windows of samples that come in blocks."""
+
+    def __init__(self, window_s: float) -> None:
+        self.window_s = window_s
+        self.start: float | None = None
+        self.parts: list[tuple[np.ndarray, np.ndarray, dict[str, FloatArray]]] = []
+        self.sample_s = 0.0
+
+    def add(self, time: FloatArray, kept: np.ndarray, **columns: FloatArray) -> None:
+        """Add a block's samples; of those that are not kept none counts."""
+        if self.start is None:
+            self.start = float(time[0])
+            self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
+        window = np.floor((time[kept] - self.start) / self.window_s).astype(np.int64)
+        names, place = np.unique(window, return_inverse=True)
+        sums = {
+            name: np.bincount(place, values[kept], minlength=len(names))
+            for name, values in {"time": time, **columns}.items()
+        }
+        self.parts.append((names, np.bincount(place, minlength=len(names)), sums))
+
+    def values(self) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """Mean times [s] and columns of the windows that are at least half full, each of shape (m,)."""
+        every = np.concatenate([names for names, _, _ in self.parts])
+        names, place = np.unique(every, return_inverse=True)
+        counts = np.bincount(place, np.concatenate([count for _, count, _ in self.parts]), len(names))
+        full = counts * self.sample_s >= 0.5 * self.window_s
+        means = {
+            name: (
+                np.bincount(place, np.concatenate([sums[name] for _, _, sums in self.parts]), len(names))[
+                    full
+                ]
+                / counts[full]
+            )
+            for name in self.parts[0][2]
+        }
+        return means.pop("time"), means

@@ -1,0 +1,219 @@
+"""Units in service by their records: in order, judged for change, and when to calibrate again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from itertools import groupby
+from typing import Literal
+
+import numpy as np
+from scipy.stats import t as student
+
+from fogml.errors import InputError
+from fogml.monitor.changes import ChangePrior, Chart, Shape, change_chart
+from fogml.monitor.record import FIGURES, RunRecord
+from fogml.runs.run import FloatArray
+
+DAY_S = 86400.0
+NEAREST: dict[tuple[str, Shape], tuple[str, ...]] = {
+    ("level", "step"): ("turn_on_bias", "thermal_shock", "magnetic", "mount_tilt"),
+    ("level", "ramp"): ("ageing", "moisture", "stress_relaxation"),
+    ("temperature_slope", "step"): ("bias_polynomial", "polarization_nonreciprocity", "glass_transition"),
+    ("temperature_slope", "ramp"): ("ageing", "light_power", "moisture"),
+    ("rate_slope", "step"): ("shupe_pure", "temperature_rate_product", "sensor_lag", "sensor_placement"),
+    ("rate_slope", "ramp"): ("stress_relaxation", "moisture"),
+    ("scatter", "step"): ("angle_random_walk", "outliers_dropouts", "vibration_noise", "loop_gain"),
+    ("scatter", "ramp"): ("arw_physics", "radiation_noise", "light_power"),
+    ("scale_factor", "step"): ("source_wavelength", "halfwave_voltage", "table_rate_error"),
+    ("scale_factor", "ramp"): ("source_wavelength", "radiation", "halfwave_voltage"),
+}
+"""Effects of the catalogue that change a figure so, the usual first; the diagnosis of the runs tells more."""
+LONGEST_DAYS = 36500.0
+"""How far ahead a calibration is foretold [d]: what is later is said to be later."""
+State = Literal["baseline", "steady", "alarm"]
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """When what is left grows beyond what the model states, if it goes on as it does.
+
+    Attributes
+    ----------
+    limit
+        Greatest change of the level [deg/h].
+    trend, trend_ci90
+        The level's slope over the runs since the last change [deg/h per day].
+    due_days, due_ci90
+        Days from the last run until the level's change passes the limit: most likely, and the interval that
+        holds it with 90 %; infinite where it does not within a hundred years.
+    """
+
+    limit: float
+    trend: float
+    trend_ci90: tuple[float, float]
+    due_days: float
+    due_ci90: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class UnitWatch:
+    """A unit in service.
+
+    Attributes
+    ----------
+    unit, axis
+        Serial number and axis.
+    records
+        Its runs in order.
+    age
+        Age at each run [d], or its number from 0 where runs do not say when they began, shape (n,).
+    dated
+        Whether the ages are days.
+    chart
+        The evidence of change after each run, and the alarms.
+    state
+        ``baseline`` while there are too few runs, ``alarm`` if the figures changed and no run has shown a
+        baseline since, else ``steady``.
+    calibration
+        When to calibrate again; None where too few runs tell it.
+    notes
+        What a reader should know.
+    """
+
+    unit: str
+    axis: str
+    records: tuple[RunRecord, ...]
+    age: FloatArray
+    dated: bool
+    chart: Chart
+    state: State
+    calibration: Calibration | None
+    notes: tuple[str, ...]
+
+    @property
+    def label(self) -> str:
+        """Serial number and axis."""
+        return self.records[0].label
+
+    def figure(self, name: str) -> FloatArray:
+        """A figure of each run, in its unit, shape (n,)."""
+        return np.array([getattr(record, name) for record in self.records])
+
+
+def watch(
+    records: Iterable[RunRecord],
+    *,
+    runs_between_false_alarms: float = 1000.0,
+    bias_limit: float | None = None,
+    prior: ChangePrior | None = None,
+) -> list[UnitWatch]:
+    """Units in service, in order of their names; whatever order the records come in.
+
+    Parameters
+    ----------
+    records
+        Of any units.
+    runs_between_false_alarms
+        Least mean number of a unit's runs until a false alarm.
+    bias_limit
+        Change of the level that asks for a calibration [deg/h]; by default half the width of the model's
+        90 % interval.
+    prior
+        What is taken for granted of changes.
+
+    Raises
+    ------
+    InputError
+        If only some of a unit's runs have a time zone.
+    """
+    ordered = sorted(records, key=lambda record: (record.unit, record.axis))
+    return [
+        _watched(list(group), runs_between_false_alarms, bias_limit, prior or ChangePrior())
+        for _, group in groupby(ordered, key=lambda record: (record.unit, record.axis))
+    ]
+
+
+def _watched(
+    records: list[RunRecord], between: float, bias_limit: float | None, prior: ChangePrior
+) -> UnitWatch:
+    records, age, dated = _in_order(records)
+    notes = []
+    if not dated and len(records) > 1:
+        notes.append(
+            "not every run says when it began: they stand in the order in which they were monitored; "
+            "state 'started' in their side files"
+        )
+    last = records[-1]
+    alike = (last.model, last.averaging_s)
+    if any((record.model, record.averaging_s) != alike for record in records):
+        notes.append("model or averaging time were exchanged: runs by another are left out of the charts")
+        kept = [i for i, record in enumerate(records) if (record.model, record.averaging_s) == alike]
+        records, age = [records[i] for i in kept], age[kept]
+    figures = {name: np.array([getattr(record, name) for record in records]) for name in FIGURES}
+    chart = change_chart(figures, age, between, prior)
+    first = chart.changes[-1].onset if chart.changes else 0
+    since = len(records) - first
+    state: State = "alarm" if chart.changes else "steady"
+    if not chart.changes and len(records) <= prior.baseline_runs:
+        state = "baseline"
+    if since <= prior.baseline_runs:
+        notes.append(
+            f"{since} of {prior.baseline_runs + 1} runs since "
+            + ("the change" if chart.changes else "the first")
+            + ": no change can be told yet"
+        )
+    return UnitWatch(
+        unit=last.unit,
+        axis=last.axis,
+        records=tuple(records),
+        age=age,
+        dated=dated,
+        chart=chart,
+        state=state,
+        calibration=_calibration(age[first:], figures["level"][first:], bias_limit or last.half_width)
+        if dated
+        else None,
+        notes=tuple(notes),
+    )
+
+
+def _in_order(records: Sequence[RunRecord]) -> tuple[list[RunRecord], FloatArray, bool]:
+    """Runs by when they began, with the unit's age [d]; by when they were monitored if one does not say."""
+    if not all(record.started for record in records):
+        placed = sorted(records, key=lambda record: (record.monitored, record.run, record.key))
+        return placed, np.arange(float(len(placed))), False
+    moments = {record.key: datetime.fromisoformat(record.started) for record in records}
+    try:
+        placed = sorted(records, key=lambda record: (moments[record.key], record.key))
+    except TypeError:
+        raise InputError(
+            f"{records[0].label}: 'started' has a time zone in some of the runs only; add it"
+        ) from None
+    first = moments[placed[0].key]
+    return placed, np.array([(moments[r.key] - first).total_seconds() / DAY_S for r in placed]), True
+
+
+def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibration | None:
+    """When a line through the levels passes a limit, by least squares; None for fewer than four runs."""
+    n = len(age)
+    if n < 4 or not np.ptp(age) > 0.0:
+        return None
+    centred = age - age.mean()
+    v = float(centred @ centred)
+    trend = float(centred @ level) / v
+    left = level - level.mean() - trend * centred
+    half = float(student.ppf(0.95, n - 2))
+    deviation = float(np.sqrt(left @ left / (n - 2)))
+    slope_half = half * deviation / np.sqrt(v)
+    ahead = np.geomspace(0.1, LONGEST_DAYS, 4000)
+    passed = age[-1] - age[0] + ahead
+
+    def due(slope: float) -> float:
+        beyond = np.abs(slope) * passed >= limit
+        return float(ahead[np.argmax(beyond)]) if beyond.any() else float("inf")
+
+    low, high = trend - slope_half, trend + slope_half
+    latest = float("inf") if low <= 0.0 <= high else due(min(low, high, key=abs))
+    return Calibration(limit, trend, (low, high), due(trend), (due(max(low, high, key=abs)), latest))

@@ -1,0 +1,134 @@
+"""The pages of ``fogml monitor``: the fleet at one look, and a page per unit."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from fogml.fleet.summary import in_order_of_serial, label_of
+from fogml.report.figures_monitor import evidence, levels, run_figures, shown_figure
+from fogml.report.monitor_words import FIGURE_WORDS, alarm_words, calibration_words, state_words
+from fogml.report.page import Tile, render
+from fogml.report.tables import Row, Table
+from fogml.report.words import number, percent, plural
+
+_UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
+
+
+def unit_file(unit: Mapping[str, Any]) -> str:
+    """Name of a unit's page, unlike every other's."""
+    label = label_of(unit)
+    digest = hashlib.sha256(f"{unit['unit']}\0{unit['axis']}".encode()).hexdigest()[:8]
+    return f"{_UNSAFE.sub('-', label)[:80].strip('-.') or 'unit'}-{digest}.html"
+
+
+def monitor_page(monitor: Mapping[str, Any]) -> str:
+    """The self-contained HTML page of a ``monitor.json``, schema ``fogml.monitor/1``."""
+    units = sorted(monitor["units"], key=lambda unit: in_order_of_serial(label_of(unit)))
+    changed = [unit for unit in units if unit["state"] == "alarm"]
+    every = monitor["runs_between_false_alarms"]
+    runs = sum(len(unit["runs"]) for unit in units)
+    if changed:
+        verdict = [f"{plural(len(changed), 'unit has', 'units have')} changed."]
+    else:
+        verdict = ["No unit has changed."]
+    verdict.append(
+        f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; of runs without a change one in "
+        f"{every:g} gives an alarm, at most."
+    )
+    return render(
+        "monitor.html",
+        title="Units in service",
+        name="Units in service",
+        verdict=verdict,
+        tiles=[
+            Tile("Units", str(len(units))),
+            Tile(
+                "Changed",
+                str(len(changed)),
+                "",
+                "by all runs so far",
+                "missed" if changed else "met",
+            ),
+            Tile("Runs", str(runs), "", f"{monitor['runs']['added']} new"),
+        ],
+        changed=[(label_of(unit) or "(no name)", alarm_words(unit["alarms"][-1])) for unit in changed],
+        levels=levels(units),
+        links=[
+            (label_of(unit) or "(no name)", f"units/{unit_file(unit)}", state_words(unit)) for unit in units
+        ],
+    )
+
+
+def unit_page(unit: Mapping[str, Any], limit: float) -> str:
+    """The self-contained HTML page of one unit of a ``monitor.json``.
+
+    Parameters
+    ----------
+    unit
+        An entry of ``units``.
+    limit
+        The ``runs_between_false_alarms``.
+    """
+    label = label_of(unit) or "Unit without a name"
+    last = unit["runs"][-1]
+    beyond = last["beyond_interval"]
+    return render(
+        "monitor_unit.html",
+        title=f"{label} in service",
+        name=label,
+        verdict=_verdict(unit),
+        tiles=[
+            Tile("Runs", str(len(unit["runs"]))),
+            Tile("Bias left, last run", number(last["level"]), "deg/h"),
+            Tile("Evidence of change", number(unit["statistic"][-1]), "", f"alarm at {limit:g}"),
+            Tile("Outside training, last run", percent(last["outside_training"])),
+            *(
+                []
+                if beyond is None
+                else [Tile("Averages beyond the interval", percent(beyond), "", "10 % is usual")]
+            ),
+        ],
+        alarms=[alarm_words(alarm) for alarm in unit["alarms"]],
+        notes=unit["notes"],
+        figures=run_figures(unit),
+        evidence=evidence(unit, limit),
+        table=_table(unit),
+    )
+
+
+def _verdict(unit: Mapping[str, Any]) -> list[str]:
+    if unit["alarms"]:
+        figure = FIGURE_WORDS[unit["alarms"][-1]["figure"]]
+        return [f"Changed: {figure}.", "Diagnose the runs since then, and calibrate the unit again."]
+    if unit["state"] == "baseline":
+        return ["Too few runs to tell a change: the first ones show what is usual."]
+    told = calibration_words(unit)
+    return ["Not changed.", *([told] if told else [])]
+
+
+def _table(unit: Mapping[str, Any]) -> Table:
+    rows = [
+        Row(
+            (
+                run["run"],
+                (run["started"] or "–")[:16].replace("T", " "),
+                *(number(shown_figure(run, name)) for name in FIGURE_WORDS),
+                percent(run["outside_training"]),
+            )
+        )
+        for run in unit["runs"]
+    ]
+    columns = (
+        ("Run", "", "text"),
+        ("Began", "", "text"),
+        ("Bias", "deg/h", "figure"),
+        ("Slope, temperature", "deg/h/°C", "figure"),
+        ("Slope, rate", "deg/h/(°C/min)", "figure"),
+        ("Scatter", "deg/h", "figure"),
+        ("Scale factor error", "ppm", "figure"),
+        ("Outside training", "", "figure"),
+    )
+    return Table(columns, tuple(rows), "What the model leaves on each run, in the order of time.")

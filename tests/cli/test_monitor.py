@@ -1,0 +1,69 @@
+"""``fogml monitor``: run by run, with repeated, late and damaged runs, and several units."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.monitor.service import write_model, write_run
+
+
+@pytest.fixture(scope="module")
+def service(tmp_path_factory):
+    """A model, and twelve runs of its unit; from the ninth on the bias is 0.1 deg/h higher."""
+    folder = tmp_path_factory.mktemp("service")
+    return write_model(folder), [
+        write_run(folder, day, bias=5.1 if day >= 9 else 5.0) for day in range(1, 13)
+    ]
+
+
+def test_a_unit_that_changes_is_noticed_once_and_for_all(service, tmp_path, invoke_json, invoke):
+    model, runs = service
+    out = tmp_path / "out"
+    first = invoke_json("monitor", model, *runs[:8:2], "-o", out)
+    assert first["schema"] == "fogml.monitor/1"
+    assert first["runs"] == {"added": 4, "repeated": 0}
+    # Late runs, and some again.
+    invoke_json("monitor", model, *runs[:8], "-o", out)
+    told = invoke_json("monitor", model, *runs[6:], "-o", out, status=1)
+    assert told["runs"] == {"added": 4, "repeated": 2}
+    (unit,) = told["units"]
+    assert [run["run"] for run in unit["runs"]] == [path.name for path in runs]
+    (alarm,) = unit["alarms"]
+    assert alarm["onset"] == "FOG-1-09.csv"
+    assert alarm["size"] == pytest.approx(0.1, abs=0.02)
+    assert json.loads((out / "monitor.json").read_text())["units"] == told["units"]
+    # The same again, with no run: what the store holds.
+    again = invoke("monitor", "--config", out / "monitor.config.yaml", status=1)
+    assert "The bias moves by" in again.stdout
+    assert len(list((out / "units").iterdir())) == 1
+
+
+def test_a_bad_run_loses_none_and_doubles_none(service, tmp_path, invoke):
+    model, runs = service
+    (tmp_path / "bad.csv").write_text("time [s],gyro [deg/h],T [degC]\n1,2,3\n")
+    out = tmp_path / "out"
+    told = invoke("monitor", model, runs[0], tmp_path / "bad.csv", "-o", out, status=2)
+    assert "bad.csv" in told.stderr
+    assert not out.exists()
+    other = write_run(tmp_path, 3, unit="FOG-9")
+    assert "FOG-9" in invoke("monitor", model, other, "-o", out, status=2).stderr
+    assert "more than once" in invoke("monitor", model, runs[0], runs[0], "-o", out, status=2).stderr
+    assert "the store holds none" in invoke("monitor", model, "-o", out, status=2).stderr
+
+
+def test_a_fleet_s_models_are_found_by_unit(tmp_path, invoke_json, invoke):
+    units = []
+    for unit in ("FOG-1", "FOG-2"):
+        (tmp_path / unit).mkdir()
+        write_model(tmp_path / unit, unit)
+        units.append({"unit": unit, "axis": "x", "folder": unit})
+    (tmp_path / "fleet.json").write_text(json.dumps({"units": units}))
+    runs = [write_run(tmp_path / unit, 5, unit=unit) for unit in ("FOG-1", "FOG-2")]
+    told = invoke_json("monitor", tmp_path, *runs, "-o", tmp_path / "out")
+    assert [unit["unit"] for unit in told["units"]] == ["FOG-1", "FOG-2"]
+    assert len({unit["runs"][0]["model"] for unit in told["units"]}) == 2
+    stranger = write_run(tmp_path, 6, unit="FOG-3")
+    told = invoke("monitor", tmp_path, stranger, "-o", tmp_path / "out", status=2)
+    assert "holds no model" in told.stderr

@@ -1,0 +1,112 @@
+"""Evidence of change: against integrals done numerically, and against its own promise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.stats import multivariate_normal
+
+from fogml.errors import InputError
+from fogml.monitor.changes import ChangePrior, change_chart
+
+
+def _marginal(y, column, size):
+    """Integral over mean and log deviation of a normal likelihood with a random coefficient of `column`."""
+    n = len(y)
+    # The mean is taken out by contrasts, whose density does not depend on it.
+    contrasts = np.linalg.svd(np.ones((1, n)))[2][1:]
+    turned = contrasts @ y
+    moved = contrasts @ column
+    spread = multivariate_normal(np.zeros(n - 1), np.eye(n - 1) + size**2 * np.outer(moved, moved))
+
+    def density(log_deviation):
+        return spread.pdf(turned * np.exp(-log_deviation)) * np.exp(-(n - 1) * log_deviation)
+
+    return quad(density, -4.0, 5.0, limit=200, epsabs=0.0, epsrel=1e-7)[0]
+
+
+@pytest.mark.parametrize("ages", [np.arange(8.0), np.array([0.0, 1.0, 3.0, 3.5, 8.0, 9.0, 15.0, 16.0])])
+def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
+    y = np.random.default_rng(3).normal(size=8)
+    prior = ChangePrior(sizes=(3.0,), ramp_sizes=(0.5,))
+    interval = (ages[2] - ages[0]) / 2
+    chart = change_chart({"level": y}, ages, 1e9, prior)
+    for n in (4, 8):
+        logs = []
+        for onset in range(3, n):
+            step = (np.arange(n) >= onset).astype(float)
+            ramp = np.where(np.arange(n) >= onset, (ages[:n] - ages[onset - 1]) / interval, 0.0)
+            plain = _marginal(y[:n], step, 0.0)
+            logs += [np.log(_marginal(y[:n], step, 3.0) / plain), np.log(_marginal(y[:n], ramp, 0.5) / plain)]
+        assert chart.statistic[n - 1] == pytest.approx(np.sum(np.exp(logs)) / 2.0, rel=1e-6)
+
+
+def test_without_a_change_alarms_are_as_rare_as_stated():
+    rng = np.random.default_rng(0)
+    runs, between, repeats = 30, 75.0, 120
+    alarmed = 0
+    for _ in range(repeats):
+        figures = {"level": rng.normal(size=runs), "scatter": 7.0 + 0.1 * rng.normal(size=runs)}
+        alarmed += bool(change_chart(figures, np.arange(float(runs)), between).changes)
+    # By Doob's inequality the share is at most 30 / 75; most paths stay well below.
+    assert 0.0 < alarmed / repeats < 0.4
+
+
+@pytest.mark.parametrize("size", [4.0, 10.0])
+def test_a_step_is_found_where_it_is(size):
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(25):
+        level = rng.normal(size=30)
+        level[15:] += size
+        figures = {"level": level, "rate_slope": rng.normal(size=30)}
+        changes = change_chart(figures, np.arange(30.0), 1000.0).changes
+        if changes:
+            first = changes[0]
+            held = first.onset_ci90[0] <= 15 <= first.onset_ci90[1]
+            within = first.size_ci90[0] <= size <= first.size_ci90[1]
+            found.append((first.figure == "level", held, within, first.raised_at - 15))
+    right, held, within, delay = np.array(found, dtype=float).T
+    assert len(found) >= 24
+    assert right.mean() > 0.9
+    assert held.mean() > 0.85
+    assert within.mean() > 0.7
+    assert np.median(delay) <= (4 if size == 4.0 else 1)
+
+
+def test_a_ramp_is_told_from_a_step_and_runs_that_do_not_tell_are_passed_over():
+    rng = np.random.default_rng(2)
+    age = np.arange(60.0)
+    level = 0.3 * rng.normal(size=60) + np.where(age > 20, 0.2 * (age - 20), 0.0)
+    level[rng.choice(60, 15, replace=False)] = np.nan
+    (change, *_) = change_chart({"level": level}, age, 1000.0).changes
+    assert change.shape == "ramp"
+    assert change.size_ci90[0] < 0.2 < change.size_ci90[1]
+    assert np.isfinite(level[change.onset])
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.floats(-1e3, 1e3), st.floats(1e-3, 1e3), st.floats(0.1, 100.0))
+def test_units_and_offsets_change_nothing(offset, scale, day):
+    rng = np.random.default_rng(4)
+    level = rng.normal(size=12)
+    plain = change_chart({"level": level}, np.arange(12.0), 1e12)
+    other = change_chart({"level": offset + scale * level}, day * np.arange(12.0), 1e12)
+    np.testing.assert_allclose(other.statistic, plain.statistic, rtol=1e-5)
+
+
+def test_equal_values_are_no_change():
+    assert not change_chart({"level": np.full(20, 0.3)}, np.arange(20.0), 10.0).changes
+
+
+def test_what_is_wrong_is_said():
+    level = np.zeros(5)
+    with pytest.raises(InputError, match="go back"):
+        change_chart({"level": level}, np.array([0.0, 1.0, 0.5, 2.0, 3.0]), 10.0)
+    with pytest.raises(InputError, match="at least 1"):
+        change_chart({"level": level}, np.arange(5.0), 0.0)
+    with pytest.raises(InputError, match="shape"):
+        change_chart({"level": level[:3]}, np.arange(5.0), 10.0)

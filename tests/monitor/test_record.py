@@ -1,0 +1,69 @@
+"""What is kept of a run: against known truths, whatever the blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.models.saved import load_model
+from fogml.monitor.record import record_run
+from fogml.runs.reading import read_blocks, read_run
+from tests.monitor.service import write_model, write_run
+
+
+@pytest.fixture(scope="module")
+def model(tmp_path_factory):
+    return load_model(write_model(tmp_path_factory.mktemp("model")))
+
+
+def test_figures_are_those_of_what_is_left(model, tmp_path):
+    run = read_run(write_run(tmp_path, 3, bias=5.2, slope=0.052, noise=1e-4))
+    record = record_run(model, [run])
+    left = run.gyro_deg_h - model.predict(run)
+    assert record.level == pytest.approx(left.mean(), abs=2e-3)
+    usual = record_run(model, [read_run(write_run(tmp_path, 4, noise=1e-4))])
+    assert record.temperature_slope - usual.temperature_slope == pytest.approx(0.002, rel=0.02)
+    assert record.scatter == pytest.approx(usual.scatter, abs=0.3)
+    assert record.started == "2026-03-03T08:00:00+00:00"
+    assert np.isnan(record.scale_factor)
+    assert np.isnan(record.beyond_interval)
+
+
+def test_blocks_and_names_make_no_difference(model, tmp_path):
+    path = write_run(tmp_path, 5, rate=10.0)
+    whole = record_run(model, [read_run(path)])
+    parts = record_run(model, read_blocks(path, block_rows=97))
+    assert whole.key == parts.key
+    for name in ("level", "temperature_slope", "rate_slope", "scatter", "scale_factor", "samples"):
+        assert getattr(parts, name) == pytest.approx(getattr(whole, name), rel=1e-6), name
+    assert whole.scale_factor == pytest.approx(50.0, abs=3.0)
+    other = path.rename(tmp_path / "other.csv")
+    path.with_suffix(".yaml").rename(tmp_path / "other.yaml")
+    assert record_run(model, [read_run(other)]).key == whole.key
+    assert record_run(model, [read_run(write_run(tmp_path, 6))]).key != whole.key
+
+
+def test_a_run_whose_temperature_stays_tells_no_slopes(model, tmp_path):
+    run = read_run(write_run(tmp_path, 7))
+    still = run.with_columns(T=np.full(len(run), 20.0) + 1e-3 * np.sin(run.time))
+    record = record_run(model, [still])
+    assert np.isnan(record.temperature_slope)
+    assert np.isnan(record.rate_slope)
+    assert np.isfinite(record.level)
+
+
+def test_what_the_unit_compensated_itself_is_taken_as_it_is(model, tmp_path):
+    run = read_run(write_run(tmp_path, 8))
+    plain = record_run(model, [run])
+    done = run.with_columns(gyro=run.gyro - model.predict(run))
+    done = done.with_facts(run.facts.model_copy(update={"compensated": True}))
+    assert record_run(model, [done]).level == pytest.approx(plain.level, abs=1e-9)
+
+
+def test_a_run_that_is_too_short_is_refused(model, tmp_path):
+    run = read_run(write_run(tmp_path, 9))
+    with pytest.raises(InputError, match="10 are needed"):
+        record_run(model, [run[:150]])
+    with pytest.raises(InputError, match="no samples"):
+        record_run(model, [])

@@ -1,0 +1,108 @@
+"""Stores: every record once, whoever writes, and nothing lost while one is away."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from experiments.faults.postgres import free_port
+from fogml.errors import InputError
+from fogml.monitor.record import RunRecord
+from fogml.monitor.store import FILE, open_store
+from fogml.outputs import sole_writer
+from tests.tuning.conftest import database  # noqa: F401
+
+RECORD = RunRecord(
+    key="a" * 64,
+    unit="FOG-1 ü",
+    axis="x",
+    run="a.csv",
+    model="m",
+    started="2026-03-01T08:00:00+00:00",
+    monitored="2026-03-02T08:00:00+00:00",
+    span_s=3600.0,
+    samples=3600.0,
+    outside_training=0.01,
+    beyond_interval=float("nan"),
+    half_width=0.1,
+    averaging_s=100.0,
+    level=0.02,
+    temperature_slope=float("nan"),
+    rate_slope=-1e-3,
+    scatter=-4.0,
+    scale_factor=float("nan"),
+)
+
+
+def others(count):
+    return [replace(RECORD, key=f"{n:064d}", run=f"{n}.csv", level=0.1 * n) for n in range(count)]
+
+
+def places(tmp_path):
+    return [str(tmp_path / "store"), f"sqlite:///{tmp_path / 'store.db'}"]
+
+
+def same(found, expected):
+    assert len(found) == len(expected)
+    for one, other in zip(sorted(found, key=lambda r: r.key), expected, strict=True):
+        assert one.key == other.key
+        np.testing.assert_equal(vars(one), vars(other))
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_records_come_back_as_they_were_and_once(tmp_path, kind):
+    place = places(tmp_path)[kind]
+    store = open_store(place)
+    assert store.records() == []
+    assert store.add(others(5)) == 5
+    assert store.add([*others(7), *others(7)]) == 2
+    same(open_store(place).records(), others(7))
+    store.close()
+
+
+@pytest.mark.parametrize("kind", [0, 1])
+def test_many_stations_write_at_once(tmp_path, kind):
+    place = places(tmp_path)[kind]
+    open_store(place).add(others(1))
+    stations = [others(10)[start : start + 5] for start in (0, 2, 5)]
+    with ThreadPoolExecutor(3) as pool:
+        list(pool.map(lambda some: open_store(place, 30.0).add(some), stations))
+    same(open_store(place).records(), others(10))
+
+
+def test_a_database_of_several_stations(database):  # noqa: F811
+    first, second = open_store(database), open_store(database)
+    assert first.add(others(3)) == 3
+    assert second.add(others(4)) == 1
+    same(first.records(), others(4))
+    first.close()
+    second.close()
+
+
+def test_a_store_that_is_away_is_waited_for_and_then_said(tmp_path):
+    url = f"postgresql://somebody:secret@127.0.0.1:{free_port()}/units"
+    with pytest.raises(InputError, match="nothing is lost") as told:
+        open_store(url, 0.0).add([RECORD])
+    assert "secret" not in str(told.value)
+    place = tmp_path / "store"
+    store = open_store(str(place), 0.0)
+    store.add([RECORD])
+    with sole_writer(place / FILE), pytest.raises(InputError, match="is writing it"):
+        store.add(others(1))
+    assert len(store.records()) == 1
+
+
+def test_what_is_no_store_is_said_at_once(tmp_path):
+    place = tmp_path / "store"
+    place.mkdir()
+    (place / FILE).write_bytes(b"PAR1 no more")
+    with pytest.raises(InputError, match="damaged"):
+        open_store(str(place)).records()
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(InputError, match="is a file"):
+        open_store(str(tmp_path / "file"))
+    with pytest.raises(InputError, match="--store"):
+        open_store("nosuchdatabase://x/y").records()

@@ -1,0 +1,111 @@
+"""Units by their records: whatever the order, changes and when to calibrate again."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.monitor.monitor_json import monitor_json
+from fogml.monitor.watch import watch
+from fogml.report.monitor_page import monitor_page, unit_file, unit_page
+from fogml.report.monitor_words import alarm_words, calibration_words
+from tests.monitor.test_store import RECORD
+
+
+def service(count=20, *, step_at=None, trend=0.0, seed=0, unit="FOG-1"):
+    rng = np.random.default_rng(seed)
+    records = []
+    for day in range(count):
+        level = 0.01 * rng.normal() + trend * day + (0.1 if step_at is not None and day >= step_at else 0.0)
+        records.append(
+            replace(
+                RECORD,
+                key=f"{unit}{day}",
+                unit=unit,
+                run=f"{day:02d}.csv",
+                started=f"2026-03-{day + 1:02d}T08:00:00+00:00",
+                level=level,
+                rate_slope=0.001 * rng.normal(),
+                scatter=-4.0 + 0.1 * rng.normal(),
+            )
+        )
+    return records
+
+
+def values_of(units):
+    return monitor_json(units, runs_between_false_alarms=1000.0, added=0, repeated=0)
+
+
+def test_the_order_of_arrival_makes_no_difference():
+    records = service(step_at=12)
+    (unit,) = watch(records)
+    (late,) = watch(list(np.random.default_rng(1).permutation(records)))
+    assert json.dumps(values_of([unit])) == json.dumps(values_of([late]))
+    assert unit.state == "alarm"
+    (change,) = unit.chart.changes
+    assert change.onset == 12
+    assert change.size == pytest.approx(0.1, abs=0.02)
+    (alarm,) = values_of([unit])["units"][0]["alarms"]
+    assert alarm["onset"] == "12.csv"
+    assert alarm["onset_started"] == "2026-03-13T08:00:00+00:00"
+    assert "turn_on_bias" in alarm["nearest"]
+    assert "since 2026-03-13" in alarm_words(alarm)
+
+
+def test_units_are_kept_apart():
+    units = watch([*service(unit="FOG-2"), *service(step_at=10, seed=1, unit="FOG-10")])
+    assert [(u.unit, u.state) for u in units] == [("FOG-10", "alarm"), ("FOG-2", "steady")]
+
+
+def test_a_new_model_begins_a_new_chart():
+    records = service(step_at=10)
+    exchanged = [replace(r, model="new") if i >= 10 else r for i, r in enumerate(records)]
+    (unit,) = watch(exchanged)
+    assert len(unit.records) == 10
+    assert unit.state == "steady"
+    assert "exchanged" in unit.notes[0]
+
+
+def test_when_to_calibrate_again_is_where_the_trend_passes_the_limit():
+    (unit,) = watch(service(28, trend=0.002, seed=2), runs_between_false_alarms=1e9, bias_limit=0.2)
+    told = unit.calibration
+    # 0.2 / 0.002 = 100 days after the first run, 73 after the last.
+    assert told.due_ci90[0] < 73.0 < told.due_ci90[1]
+    assert told.due_days == pytest.approx(73.0, rel=0.25)
+    words = calibration_words(values_of([unit])["units"][0])
+    assert words.startswith("Calibrate again in")
+    (steady,) = watch(service(28), bias_limit=10.0)
+    assert "No trend is seen" in calibration_words(values_of([steady])["units"][0])
+
+
+def test_runs_without_a_date_stand_as_they_were_monitored():
+    records = [replace(r, started="", monitored=f"2026-04-{i + 1:02d}") for i, r in enumerate(service(6))]
+    (unit,) = watch(records[::-1])
+    assert [r.run for r in unit.records] == [f"{n:02d}.csv" for n in range(6)]
+    assert "side files" in unit.notes[0]
+    assert unit.calibration is None
+    mixed = [replace(r, started=r.started[:19] if i else r.started) for i, r in enumerate(service(6))]
+    with pytest.raises(InputError, match="time zone"):
+        watch(mixed)
+
+
+def test_first_runs_are_a_baseline():
+    (unit,) = watch(service(3))
+    assert unit.state == "baseline"
+
+
+def test_pages_show_units_of_any_name():
+    records = [*service(step_at=10), *service(2, unit="<b>&/.."), *service(5, unit="")]
+    values = values_of(watch(records))
+    page = monitor_page(values)
+    assert "<b>&/" not in page
+    names = {unit_file(unit) for unit in values["units"]}
+    assert len(names) == 3
+    assert all("/" not in name for name in names)
+    for unit in values["units"]:
+        assert unit_file(unit) in page
+        assert "Run by run" in unit_page(unit, 1000.0)
