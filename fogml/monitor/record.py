@@ -8,12 +8,13 @@ from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
 
@@ -238,10 +239,10 @@ class _Means:
     def __init__(self, window_s: float) -> None:
         self.window_s = window_s
         self.start: float | None = None
-        self.parts: list[tuple[np.ndarray, np.ndarray, dict[str, FloatArray]]] = []
+        self.parts: list[tuple[NDArray[np.int64], NDArray[np.int64], dict[str, FloatArray]]] = []
         self.sample_s = 0.0
 
-    def add(self, time: FloatArray, kept: np.ndarray, **columns: FloatArray) -> None:
+    def add(self, time: FloatArray, kept: BoolArray, **columns: FloatArray) -> None:
         """Add a block's samples; of those that are not kept none counts."""
         if self.start is None:
             self.start = float(time[0])
@@ -252,7 +253,7 @@ class _Means:
             name: np.bincount(place, values[kept], minlength=len(names))
             for name, values in {"time": time, **columns}.items()
         }
-        self.parts.append((names, np.bincount(place, minlength=len(names)), sums))
+        self.parts.append((names, np.bincount(place, minlength=len(names)).astype(np.int64), sums))
 
     def values(self) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Mean times [s] and columns of the windows that are at least half full, each of shape (m,)."""

@@ -181,7 +181,8 @@ class DatabaseStore(Store):
             table, engine = self._open()
             with engine.connect() as connection:
                 rows = connection.execute(select(table)).mappings().all()
-            return [RunRecord(**{k: np.nan if v is None else v for k, v in row.items()}) for row in rows]
+            held: list[dict[str, Any]] = [{k: np.nan if v is None else v for k, v in r.items()} for r in rows]
+            return [RunRecord(**values) for values in held]
 
         return self._told(read)
 
