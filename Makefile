@@ -20,7 +20,7 @@ demo: $(READY)
 
 ## The whole test suite.
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## The suite with the oldest versions that pyproject.toml allows, and with the newest there are; each in a virtual
 ## environment of its own. PYTHON=python3.13 takes another Python.
@@ -28,7 +28,7 @@ oldest newest:
 	test -x .venv-$@/bin/python || $(PYTHON) -m venv .venv-$@
 	if [ $@ = oldest ]; then $(PYTHON) .ci/oldest.py > .venv-$@/constraints.txt; else : > .venv-$@/constraints.txt; fi
 	.venv-$@/bin/python -m pip install --quiet --upgrade -c .venv-$@/constraints.txt -e '.[readers,export,sweep,cluster,test]'
-	.venv-$@/bin/python -m pytest -n 2 --dist loadfile
+	.venv-$@/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## The documentation as a site and as a zip, warnings as errors; both work without a network.
 docs: $(READY)

@@ -1,8 +1,4 @@
-"""Programs run without a shell and within limits on time, memory and output.
-
-Run as a program itself, this file sets its limits and becomes the program named: limits set in
-the child of a process with threads would need a fork of those threads.
-"""
+"""Programs run without a shell, within limits on time, memory and output that `fogml.limited_child` sets."""
 
 from __future__ import annotations
 
@@ -15,6 +11,8 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryFile
+
+_CHILD = Path(__file__).with_name("limited_child.py")
 
 
 @dataclass(frozen=True)
@@ -71,7 +69,7 @@ def run_limited(words: Sequence[str], limits: ProgramLimits, data: bytes = b"") 
     """
     memory = -1 if limits.memory_bytes is None else limits.memory_bytes
     stated = (limits.cpu_s, memory, limits.output_bytes)
-    launcher = [sys.executable, "-I", "-S", str(Path(__file__)), *map(str, stated), *words]
+    launcher = [sys.executable, "-I", "-S", str(_CHILD), *map(str, stated), *words]
     with TemporaryFile() as given, TemporaryFile() as output, TemporaryFile() as errors:
         given.write(data)
         given.seek(0)
@@ -99,28 +97,3 @@ def _end_group(process: subprocess.Popen[bytes]) -> None:
     with suppress(ProcessLookupError, PermissionError):
         os.killpg(process.pid, signal.SIGKILL)
     process.wait()
-
-
-def _become(cpu_s: str, memory_bytes: str, output_bytes: str, *words: str) -> None:
-    import resource
-
-    for kind, limit in (
-        (resource.RLIMIT_CPU, int(cpu_s)),
-        # Not the address space, of which an emulator reserves more than it uses.
-        (resource.RLIMIT_DATA, int(memory_bytes)),
-        (resource.RLIMIT_FSIZE, int(output_bytes)),
-        (resource.RLIMIT_CORE, 0),
-    ):
-        _, most = resource.getrlimit(kind)
-        if limit == resource.RLIM_INFINITY:
-            continue
-        # Of processor time the first limit tells itself apart by its signal; none survives the second.
-        last = limit + 1 if kind == resource.RLIMIT_CPU else limit
-        if most != resource.RLIM_INFINITY:
-            limit, last = min(limit, most), min(last, most)
-        resource.setrlimit(kind, (limit, last))
-    os.execvp(words[0], words)
-
-
-if __name__ == "__main__":
-    _become(*sys.argv[1:])
