@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import stats
 
 from fogml.validation.results import RunJudgement
 
@@ -25,7 +24,9 @@ def floor_interval(floor: float, averages: int, level: float = LEVEL) -> tuple[f
     level
         Share of the cases in it.
     """
-    tails = stats.chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], max(averages, 1))
+    from scipy.stats import chi2
+
+    tails = chi2.ppf([0.5 * (1.0 - level), 0.5 * (1.0 + level)], max(averages, 1))
     low, high = floor * np.sqrt(tails / max(averages, 1))
     return float(low), float(high)
 

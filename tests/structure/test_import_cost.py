@@ -17,6 +17,16 @@ def test_import_leaves_heavy_libraries_unloaded(module: str) -> None:
     assert answer.stdout.strip() == ""
 
 
+def test_the_words_of_a_page_leave_numerics_unloaded() -> None:
+    """Every command takes them, to say no more than that a file is missing."""
+    code = (
+        "import sys, fogml.report.words\n"
+        "print(*sorted({'torch', 'sklearn', 'pandas', 'scipy', 'numba'} & set(sys.modules)))"
+    )
+    answer = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert answer.stdout.strip() == ""
+
+
 def test_every_public_name_resolves() -> None:
     import fogml
 
