@@ -97,4 +97,5 @@ def _measure(root: Path, tests: list[str], data: Path, times: Path) -> None:
 
 def environment(root: Path) -> dict[str, Any]:
     """What tests of a tree run in: that tree's code, one thread."""
-    return {**os.environ, "PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"}
+    path = [str(root), *filter(None, [os.environ.get("PYTHONPATH")])]
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(path), "OMP_NUM_THREADS": "1"}
