@@ -12,7 +12,8 @@ import click
 from click.shell_completion import CompletionItem
 from pydantic.fields import FieldInfo
 
-from fogml.cli.given import HELP_NAMES, Given, load
+from fogml.cli.each_axis import do_job
+from fogml.cli.given import HELP_NAMES, Given
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
@@ -75,7 +76,7 @@ class SettingsCommand(click.Command):
             raise InputError("CONFIG and --config are the same file; give one of them")
         stated = named if config is None else config
         settings = self.settings.gather(None if stated is None else Path(stated), _flags(values))
-        if load(settings.job)(settings, Terminal(as_json, quiet)) is False:
+        if not do_job(settings, self.name or "", Terminal(as_json, quiet)):
             raise click.exceptions.Exit(1)
 
 

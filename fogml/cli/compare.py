@@ -31,6 +31,7 @@ class CompareSettings(options.LimitSettings):
         option('Names with commas between, or "all".', as_text=True),
     ] = ["all"]
     features: options.Features = None
+    axis: options.Axis = None
     repair: options.Repair = False
     strict: options.Strict = False
     any_unit: options.AnyUnit = False

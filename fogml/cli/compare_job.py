@@ -60,8 +60,12 @@ def _compare(settings: CompareSettings, makers: dict[str, partial], terminal: Te
         raise InputError("no training run is given; name the training runs before --test")
     if settings.leave_one_out == bool(settings.test):
         raise InputError("give test runs after --test, or --leave-one-out without --test")
-    train_runs = open_runs(settings.runs, terminal, repair=settings.repair)
-    test_runs = open_runs(settings.test, terminal, repair=settings.repair) if settings.test else None
+    train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+    test_runs = (
+        open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)
+        if settings.test
+        else None
+    )
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *(test_runs or []))])
     noise = noise_run(settings, terminal)

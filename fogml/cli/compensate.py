@@ -23,5 +23,6 @@ class CompensateSettings(Settings):
     ] = None
     model: Annotated[str | None, option("Folder of the model: DIR/model.", metavar="DIR", reads=True)] = None
     any_unit: options.AnyUnit = False
+    axis: options.Axis = None
     repair: options.Repair = False
     out: options.FileToWrite = None

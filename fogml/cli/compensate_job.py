@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import ExitStack
+from itertools import chain, islice
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,14 +38,16 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
     out = Path(settings.out)
     if out.exists() and Path(settings.run).exists() and out.samefile(settings.run):
         raise InputError(f"{out}: is the run itself; choose another --out")
+    # The run is looked into first: one of three axes takes a model each.
+    blocks = iter(open_blocks(settings.run, repair=settings.repair, axis=settings.axis))
+    begun = list(islice(blocks, 1))
     model = load_model(settings.model)
     total = _expected_rows(settings.run)
     with (
         settings.written_beside(out, "compensate"),
         terminal.work(f"compensating {settings.run}", total=total) as work,
     ):
-        blocks = open_blocks(settings.run, repair=settings.repair)
-        counts = _compensate(model, blocks, out, settings.any_unit, work)
+        counts = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
     _print(settings, model.kind, counts, terminal)
 
 

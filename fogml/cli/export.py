@@ -35,7 +35,7 @@ class ExportJobSettings(Settings):
         list[str],
         BeforeValidator(_several),
         PlainSerializer(_one_as_text),
-        argument("MODEL...", "Folder of the model; of tables, up to three axes.", reads=True),
+        argument("MODEL...", "Folder of the model, or of the results of three axes.", reads=True),
     ] = []
     to: Annotated[str, option("c, onnx, json, mat; segments, px4 or ardupilot.", metavar="FORMAT")] = "c"
     dtype: Annotated[str | None, option("float64, float32, float16, int8, q15 or q31.", metavar="TYPE")] = (

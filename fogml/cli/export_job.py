@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from fogml.cli.each_axis import axis_folders
 from fogml.cli.export import ExportJobSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal
@@ -12,9 +14,14 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
+    from fogml.runs.run import Run
+
 
 def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[str, Any]:
     """Export a model into ``settings.out``, whole or not at all, and print what came of it."""
+    from fogml.export.c_axes import export_axes
     from fogml.export.export import export_model
     from fogml.export.settings import TABLE_TARGETS, ExportSettings
     from fogml.export.tables import TableSettings, export_tables
@@ -22,10 +29,10 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
 
     if not settings.model:
         raise InputError("no model is given; name the folder of the model, e.g. train-results/model")
-    _check_form(settings)
     with whole_folder(settings.out) as folder:
-        models = [load_model(path) for path in settings.model]
-        train = open_runs(settings.train, terminal) if settings.train else []
+        models = [load_model(path) for named in settings.model for path in axis_folders(named)]
+        _check_form(settings, len(models))
+        train = _training_runs(settings, models, terminal)
         wanted = ExportSettings(
             settings.to,
             settings.dtype,
@@ -42,22 +49,44 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
                     settings.to, settings.dtype, settings.breakpoints, settings.tolerance, matrix
                 )
                 report = export_tables(models, folder, tables, train)
+            elif len(models) > 1:
+                report = export_axes(models, folder, wanted, train)
             else:
                 report = export_model(models[0], folder, wanted, train)
         write_json(folder / "export.json", report)
         settings.write_into(folder, "export")
-    (_print_tables if settings.to in TABLE_TARGETS else _print)(settings, report, terminal)
+    if settings.to in TABLE_TARGETS:
+        _print_tables(settings, report, terminal)
+    else:
+        for axis, told in report.get("axes", {"": report}).items():
+            _print(settings, told, terminal, f"axis {axis}: " if axis else "")
     terminal.result(report)
     return report
 
 
-def _check_form(settings: ExportJobSettings) -> None:
+def _training_runs(
+    settings: ExportJobSettings, models: Sequence[DriftModel], terminal: Terminal
+) -> list[Run]:
+    """The training runs; of files of three gyros one for each model's axis."""
+    from fogml.runs.three_axes import SeveralAxes
+
+    if not settings.train:
+        return []
+    try:
+        return open_runs(settings.train, terminal)
+    except SeveralAxes:
+        axes = dict.fromkeys(model.card_.axis for model in models)
+        return [run for axis in axes for run in open_runs(settings.train, terminal, axis=axis)]
+
+
+def _check_form(settings: ExportJobSettings, models: int) -> None:
     """Hold that what is asked for is of the form asked for."""
     from fogml.export.settings import TABLE_TARGETS
 
     of_tables = settings.to in TABLE_TARGETS
-    if not of_tables and len(settings.model) > 1:
-        raise InputError(f"--to {settings.to} takes one model; several axes go to {', '.join(TABLE_TARGETS)}")
+    if not of_tables and settings.to != "c" and models > 1:
+        several = ", ".join(("c", *TABLE_TARGETS))
+        raise InputError(f"--to {settings.to} takes one model; several axes go to {several}")
     given = {
         "--bytes": settings.bytes is not None,
         "--with-pipeline": settings.with_pipeline,
@@ -91,7 +120,7 @@ def _print_tables(settings: ExportJobSettings, report: dict[str, Any], terminal:
         terminal.table(title, ["", ""], rows)
 
 
-def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Terminal) -> None:
+def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Terminal, lead: str = "") -> None:
     difference, tolerance = report["largest_difference"], report["tolerance"]
     rows = [
         ["number format", report["dtype"]],
@@ -117,4 +146,4 @@ def _print(settings: ExportJobSettings, report: dict[str, Any], terminal: Termin
         rows.append(["Cortex-M4", "not measured: arm-none-eabi-gcc is not installed"])
     if beyond := report.get("beyond_the_box"):
         rows.append(["beyond the trained box", beyond])
-    terminal.table(f"{report['model']['kind']} exported to {settings.out}", ["", ""], rows)
+    terminal.table(f"{lead}{report['model']['kind']} exported to {settings.out}", ["", ""], rows)

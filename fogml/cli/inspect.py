@@ -19,6 +19,7 @@ class InspectSettings(Settings):
     runs: Annotated[
         list[str], argument("RUN...", "Runs to look into.", reads=True, known=options.SHIPPED_RUNS)
     ] = []
+    axis: options.Axis = None
     repair: options.Repair = False
     strict: options.Strict = False
     out: options.FolderIfNamed = None

@@ -42,7 +42,7 @@ def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
 
 def _inspect(settings: InspectSettings, terminal: Terminal) -> tuple[list[Run], dict[str, Any]]:
     # Findings are part of the result here, so they are not noted on stderr as well.
-    runs = open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair)
+    runs = open_runs(settings.runs, Terminal(quiet=True), repair=settings.repair, axis=settings.axis)
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in runs])
     with terminal.work("looking into the runs"):

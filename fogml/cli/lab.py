@@ -1,4 +1,4 @@
-"""``fogml lab``: procedures of a laboratory: misalignment, tests on a rate table, north seeking."""
+"""``fogml lab``: procedures of a laboratory: misalignment, rate table, north seeking, acceptance."""
 
 from __future__ import annotations
 
@@ -139,4 +139,56 @@ class NorthSettings(Settings):
     out: options.FolderIfNamed = None
 
 
-COMMANDS = {"misalignment": MisalignmentSettings, "rate": RateSettings, "north": NorthSettings}
+class AcceptanceSettings(Settings):
+    """The acceptance report of one gyro: every figure that its runs tell, limits and verdict.
+
+    From runs of one unit and axis: static, over temperature, on a rate table. Figures are before and after
+    compensation where a model is named. With --out, writes acceptance.json, acceptance.html,
+    acceptance.xlsx and lab-acceptance.config.yaml. Exit status 1 if a limit is missed or not tested.
+    """
+
+    job: ClassVar[str] = "fogml.cli.lab_acceptance_job:acceptance_and_write"
+    runs: Annotated[
+        list[str],
+        argument("RUN...", "Runs of one unit and axis.", reads=True, known=options.SHIPPED_RUNS),
+    ] = []
+    model: Annotated[str | None, option("Folder of the unit's model.", metavar="DIR", reads=True)] = None
+    limits: Annotated[
+        str | None, option("Limits (YAML): customer, document, limits.", metavar="FILE", reads=True)
+    ] = None
+    noise: Annotated[
+        str | None, option("Static run for noise terms and floor.", metavar="RUN", reads=True)
+    ] = None
+    averaging: options.Averaging = Field(100.0, gt=0.0)
+    turn_on_band: Annotated[float | None, option("Band that tells the turn-on time.", metavar="DEG/H")] = (
+        Field(None, gt=0.0)
+    )
+    date: Annotated[str | None, option("Date of issue; a line to write it on if none.")] = None
+    axis: options.Axis = None
+    repair: options.Repair = False
+    out: options.FolderIfNamed = None
+
+
+class BatchSettings(Settings):
+    """A batch of units from their acceptance reports: yield, distribution, links, who fails on what.
+
+    With --out, writes batch.json, batch.html, batch.xlsx and lab-batch.config.yaml. Exit status 1 if a unit
+    is not accepted.
+    """
+
+    job: ClassVar[str] = "fogml.cli.lab_batch_job:batch_and_write"
+    reports: Annotated[
+        list[str],
+        argument("REPORT...", "Files acceptance.json, or the folders that hold them.", reads=True),
+    ] = []
+    title: Annotated[str, option("Heading of the page.")] = "Batch"
+    out: options.FolderIfNamed = None
+
+
+COMMANDS = {
+    "misalignment": MisalignmentSettings,
+    "rate": RateSettings,
+    "north": NorthSettings,
+    "acceptance": AcceptanceSettings,
+    "batch": BatchSettings,
+}

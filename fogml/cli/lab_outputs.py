@@ -19,8 +19,12 @@ def tell(
     settings: Settings,
     out: str | None,
     terminal: Terminal,
+    sheets: Callable[[dict[str, Any], Path], None] | None = None,
 ) -> dict[str, Any]:
-    """Make the values and, where a folder is named, write ``name.json``, ``name.html`` and the settings."""
+    """Make the values and, where a folder is named, write ``name.json``, ``name.html`` and the settings.
+
+    `sheets` writes ``name.xlsx`` too.
+    """
     if out is None:
         return make()
     with whole_folder(out) as folder:
@@ -28,6 +32,8 @@ def tell(
         write_json(folder / f"{name}.json", values)
         with terminal.work("drawing"):
             (folder / f"{name}.html").write_text(page(values), encoding="utf-8")
+        if sheets is not None:
+            sheets(values, folder / f"{name}.xlsx")
         settings.write_into(folder, f"lab {name}")
     return values
 

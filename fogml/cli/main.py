@@ -53,7 +53,7 @@ COMMANDS = {
     ),
     "lab": (
         ".lab:COMMANDS",
-        "Procedures of a laboratory: misalignment, tests on a rate table, north seeking.",
+        "Procedures of a laboratory: misalignment, rate table, north seeking, acceptance.",
     ),
     "fleet": (
         ".fleet:FleetSettings",

@@ -12,7 +12,8 @@ from fogml.cli.settings import Settings
 class NoiseSettings(Settings):
     """Allan deviation and the IEEE 952 noise terms with intervals.
 
-    With --out, writes noise.json, noise.html and noise.config.yaml.
+    With --out, writes noise.json, noise.html and noise.config.yaml; with --to the terms for another program
+    too: noise.kalibr.yaml, noise_gyroparams.m (MATLAB), or noise.kalman.json (discrete-time Q).
     """
 
     job: ClassVar[str] = "fogml.cli.noise_job:noise_and_write"
@@ -26,5 +27,14 @@ class NoiseSettings(Settings):
         ),
     ] = None
     overlapping: Annotated[bool, option("Kind of estimator.", "--overlapping/--not-overlapping")] = True
+    to: Annotated[
+        str | None,
+        option(
+            "Write the terms for another program.",
+            metavar="kalibr|matlab|kalman",
+            known="fogml.export.noise_parameters:TARGETS",
+        ),
+    ] = None
+    axis: options.Axis = None
     repair: options.Repair = False
     out: options.FolderIfNamed = None

@@ -21,21 +21,37 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
     """Tell the noise of a run, write it where an output folder is named, and print it."""
     if not settings.run:
         raise InputError("no run is given; name one")
+    text = None
     if settings.out is None:
         values = _noise(settings, terminal)
+        text = _for_others(settings, values)
     else:
         with whole_folder(settings.out) as folder:
             values = _noise(settings, terminal)
             write_json(folder / "noise.json", values)
+            text = _for_others(settings, values)
+            if text is not None:
+                (folder / text[0]).write_text(text[1], encoding="utf-8")
             with terminal.work("drawing"):
                 from fogml.report import noise_page
 
                 (folder / "noise.html").write_text(noise_page(values), encoding="utf-8")
             settings.write_into(folder, "noise")
     _print(values, terminal)
+    if text is not None:
+        terminal.say(f"{text[0]}:\n{text[1]}")
     terminal.result(values)
     if settings.out is not None:
         terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'noise.html'}")
+
+
+def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> tuple[str, str] | None:
+    """File name and text for the program that is asked for."""
+    if settings.to is None:
+        return None
+    from fogml.export.noise_parameters import noise_text
+
+    return noise_text(values, settings.to)
 
 
 def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
@@ -46,7 +62,7 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
         runs = []
         for path in paths:
             work.doing(f"reading {path}")
-            runs.append(open_run(path, repair=settings.repair))
+            runs.append(open_run(path, repair=settings.repair, axis=settings.axis))
         work.doing("averaging")
         values = noise_report(runs, overlapping=settings.overlapping)
         if len(runs) == 1:

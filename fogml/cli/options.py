@@ -116,6 +116,9 @@ Strict = Annotated[
 AnyUnit = Annotated[
     bool, option("Allow a run of another unit or axis than the model's.", "--any-unit/--same-unit")
 ]
+Axis = Annotated[
+    str | None, option("Of files with gyro_x, gyro_y, gyro_z this one alone; all if none.", metavar="x|y|z")
+]
 Workers = Annotated[int, option("Processes on this machine.")]
 CostOfFalseName = Annotated[
     float,

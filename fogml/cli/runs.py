@@ -19,32 +19,33 @@ def shipped_places() -> list[str]:
     return [SHIPPED + name for name in shipped_names()]
 
 
-def open_run(path: str, *, repair: Repairing = False) -> Run:
+def open_run(path: str, *, repair: Repairing = False, axis: str | None = None) -> Run:
     """The run in a file, or ``shipped:NAME``, checked: what is noticed is in its findings."""
     from fogml.runs.reading import read_run
     from fogml.runs.shipped import shipped_run
+    from fogml.runs.three_axes import OneAxis
 
     if not path.startswith(SHIPPED):
-        return read_run(path, repair=bool(repair), most_dropped=most_dropped(repair))
-    return shipped_run(path.removeprefix(SHIPPED))
+        return read_run(path, repair=bool(repair), axis=axis, most_dropped=most_dropped(repair))
+    return OneAxis(axis).run(shipped_run(path.removeprefix(SHIPPED)))
 
 
-def open_legs(path: str, *, repair: Repairing = False) -> list[Run]:
+def open_legs(path: str, *, repair: Repairing = False, axis: str | None = None) -> list[Run]:
     """The runs in a file, or ``shipped:NAME``: several where its clock restarts and it is repaired."""
     from fogml.runs.reading import read_runs
 
     if path.startswith(SHIPPED):
-        return [open_run(path)]
-    return read_runs(path, repair=bool(repair), most_dropped=most_dropped(repair))
+        return [open_run(path, axis=axis)]
+    return read_runs(path, repair=bool(repair), axis=axis, most_dropped=most_dropped(repair))
 
 
-def open_blocks(path: str, *, repair: Repairing = False) -> Iterable[Run]:
+def open_blocks(path: str, *, repair: Repairing = False, axis: str | None = None) -> Iterable[Run]:
     """The run in a file in blocks of bounded size, or ``shipped:NAME`` whole."""
     from fogml.runs.reading import read_blocks
 
     if path.startswith(SHIPPED):
-        return [open_run(path)]
-    return read_blocks(path, repair=bool(repair), most_dropped=most_dropped(repair))
+        return [open_run(path, axis=axis)]
+    return read_blocks(path, repair=bool(repair), axis=axis, most_dropped=most_dropped(repair))
 
 
 def most_dropped(repair: Repairing) -> float:
@@ -54,7 +55,9 @@ def most_dropped(repair: Repairing) -> float:
     return 1.0 if repair == "anyway" else MOST_DROPPED
 
 
-def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: Repairing = False) -> list[Run]:
+def open_runs(
+    paths: Sequence[str], terminal: Terminal, *, repair: Repairing = False, axis: str | None = None
+) -> list[Run]:
     """The runs in several files; findings are noted on stderr.
 
     Raises
@@ -69,7 +72,7 @@ def open_runs(paths: Sequence[str], terminal: Terminal, *, repair: Repairing = F
     with terminal.work("reading", total=len(paths)) as work:
         for path in paths:
             work.doing(f"reading {path}")
-            runs += open_legs(path, repair=repair)
+            runs += open_legs(path, repair=repair, axis=axis)
             work.advance()
     noticed = [(run.name, finding) for run in runs for finding in run.findings]
     for name, finding in sorted(noticed, key=lambda one: one[1].code not in FIRST_OF_ALL):

@@ -31,6 +31,7 @@ class TrainSettings(options.LimitSettings):
     navigation: Annotated[
         float | None, option("Show what the drift costs a navigator there.", metavar="LATITUDE")
     ] = None
+    axis: options.Axis = None
     repair: options.Repair = False
     strict: options.Strict = False
     any_unit: options.AnyUnit = False

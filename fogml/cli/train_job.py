@@ -79,8 +79,8 @@ def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], 
         raise InputError("no training run is given; name the training runs before --test")
     if not settings.test:
         raise InputError("no test run is given; name at least one after --test")
-    train_runs = open_runs(settings.runs, terminal, repair=settings.repair)
-    test_runs = open_runs(settings.test, terminal, repair=settings.repair)
+    train_runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+    test_runs = open_runs(settings.test, terminal, repair=settings.repair, axis=settings.axis)
     check_turn_on_band(settings.turn_on_band, (*train_runs, *test_runs))
     if settings.strict:
         hold_strict([(run.name, run.findings) for run in (*train_runs, *test_runs)])
@@ -93,7 +93,7 @@ def noise_run(settings: LimitSettings, terminal: Terminal) -> Run | None:
         return None
     from fogml.validation.floors import check_noise_run
 
-    (run,) = open_runs([settings.noise], terminal)
+    (run,) = open_runs([settings.noise], terminal, axis=getattr(settings, "axis", None))
     check_noise_run(run)
     return run
 

@@ -180,6 +180,13 @@ def _built(
     return program
 
 
+def run_self_test(files: Mapping[str, str], header: str, function: str, source: str, folder: Path) -> int:
+    """What a function without arguments of generated files returns on this machine, compiled in a folder."""
+    main = f'#include "{header}"\n#include "{source}"\n\nint main(void)\n{{\n    return {function}();\n}}\n'
+    program = _built({**files, "main.c": main}, "main.c", folder)
+    return _limited([str(program)], RUNNING, "the generated C").status
+
+
 def _output(done: Finished) -> bytes:
     """What a program of generated C wrote, if it did not fail."""
     if done.status != 0:

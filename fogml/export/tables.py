@@ -81,7 +81,7 @@ def export_tables(
     """
     if settings.dtype not in (None, "float32", "float64"):
         raise InputError(f"--dtype {settings.dtype}: --to {settings.to} takes float32 and float64")
-    named = _by_axis(models)
+    named = by_axis(models)
     matrix = None if settings.matrix is None else read_matrix(settings.matrix, len(named))
     plans = {axis: Plan.of(model) for axis, model in named.items()}
     curves = {axis: StaticCurve.of(plan) for axis, plan in plans.items()}
@@ -156,7 +156,14 @@ def read_matrix(path: Path, axes: int = 3) -> FloatArray:
     return np.array(rows, dtype=np.float64)
 
 
-def _by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
+def by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
+    """Models by their axis, in its order; one alone is x where it states none.
+
+    Raises
+    ------
+    InputError
+        If they are not of different axes of one unit.
+    """
     if len(models) == 1:
         return {models[0].card_.axis or "x": models[0]}
     found: dict[str, DriftModel] = {}

@@ -11,7 +11,7 @@ from fogml.validation.advice import SEEN, Advice, Asked
 from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
-_GRADES = {
+GRADES = {
     "use": ("met", "✓", "Use it"),
     "use_with_care": ("care", "!", "Use with care"),
     "do_not_use": ("missed", "✗", "Do not use"),
@@ -20,7 +20,7 @@ _GRADES = {
 
 def advice_words(advice: Advice) -> dict[str, Any]:
     """A verdict as it is shown: colour's class, sign, words, reasons, next step."""
-    kind, sign, words = _GRADES[advice.grade]
+    kind, sign, words = GRADES[advice.grade]
     return {
         "kind": kind,
         "sign": sign,

@@ -22,6 +22,7 @@ from fogml.runs.possible import clock_fault, faulty, float32_reason
 from fogml.runs.raw_table import RawTable
 from fogml.runs.row_faults import REPAIR, Rows, finite_rows, order_error, step_error
 from fogml.runs.run import Run
+from fogml.runs.three_axes import SeveralAxes, axes_of
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -252,6 +253,8 @@ def _internal_columns(
             tick_s = factor
         if column_spec(name) is None:
             unknown.append(name)
+    if axes := axes_of(columns):
+        raise SeveralAxes(table.file, axes)
     for name in ("time", "gyro"):
         if name not in columns:
             found = _listed(seen)

@@ -73,21 +73,37 @@ class Direction(Heading):
     elevation: float = Field(default=0.0, ge=-90.0, le=90.0, allow_inf_nan=False)
 
 
+_Named = Literal["up", "down", "north", "south", "east", "west"]
+InputAxis = _Named | Heading
+TableAxis = _Named | Direction
+
+
+class AxisFacts(BaseModel):
+    """What a side file of three gyros may state of one."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    input_axis: InputAxis | None = None
+    table_axis: TableAxis | None = None
+    scale_factor: ScaleFactor | None = None
+
+
 class Facts(BaseModel):
     """The facts about the set-up that a side file may state. All optional.
 
     Latitude in degrees north; `powered_on` in seconds on the run's clock. The `table_axis` is what the table
     turns about, counter-clockwise; up where it is not stated. `compensated` says that the output is.
-    `in_use_since` is when the unit's first run began, from which it ages.
+    `in_use_since` is when the unit's first run began, from which it ages. `axes` states facts of each gyro
+    of a file that holds three.
     """
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
     unit: str | None = None
     axis: str | None = None
     latitude: float | None = Field(default=None, ge=-90.0, le=90.0)
-    input_axis: Literal["up", "down", "north", "south", "east", "west"] | Heading | None = None
-    table_axis: Literal["up", "down", "north", "south", "east", "west"] | Direction | None = None
+    input_axis: InputAxis | None = None
+    table_axis: TableAxis | None = None
     scale_factor: ScaleFactor | None = None
+    axes: dict[Literal["x", "y", "z"], AxisFacts] | None = None
     powered_on: float | None = Field(default=None, allow_inf_nan=False)
     started: Annotated[datetime | None, BeforeValidator(_moment)] = None
     in_use_since: Annotated[datetime | None, BeforeValidator(_moment)] = None

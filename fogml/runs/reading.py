@@ -14,6 +14,7 @@ from fogml.runs.raw_table import RawTable
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
+from fogml.runs.three_axes import OneAxis
 
 BLOCK_ROWS = 1_000_000
 _HEAD_BYTES = 1024
@@ -34,6 +35,7 @@ def read_run(
     *,
     repair: bool = False,
     name: str | None = None,
+    axis: str | None = None,
     most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> Run:
@@ -51,6 +53,8 @@ def read_run(
         read or hold missing or infinite values; what was done is counted in the run's findings.
     name
         Name of the run; the file's base name by default.
+    axis
+        Of a file with ``gyro_x``, ``gyro_y``, ``gyro_z``: which of them is the run's gyro.
     most_dropped
         Share of the rows that repair may drop.
     limits
@@ -67,7 +71,7 @@ def read_run(
         Naming file, column, first bad row, and what to do; also if the file changes while it is read,
         and if the clock restarts, so that the file holds several runs (`read_runs`).
     """
-    runs = read_runs(path, repair=repair, name=name, most_dropped=most_dropped, limits=limits)
+    runs = read_runs(path, repair=repair, name=name, axis=axis, most_dropped=most_dropped, limits=limits)
     if len(runs) > 1:
         restart = next(f for f in runs[0].findings if f.code == "repaired_restart")
         raise InputError(
@@ -82,6 +86,7 @@ def read_runs(
     *,
     repair: bool = False,
     name: str | None = None,
+    axis: str | None = None,
     most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
 ) -> list[Run]:
@@ -96,9 +101,10 @@ def read_runs(
     """
     path = Path(path)
     with unchanged(*run_sources(path)):
-        table = _read_table(path, file_format(path), repair, limits)
+        one = OneAxis(axis)
+        table = one.table(_read_table(path, file_format(path), repair, limits))
         runs = runs_of_table(table, path, repair=repair, name=name, most_dropped=most_dropped)
-    return [run.with_findings(check_run(run)) for run in runs]
+    return [run.with_findings(check_run(run)) for run in map(one.run, runs)]
 
 
 def read_blocks(
@@ -106,6 +112,7 @@ def read_blocks(
     *,
     columns: Collection[str] | None = None,
     block_rows: int = BLOCK_ROWS,
+    axis: str | None = None,
     repair: bool = False,
     most_dropped: float = MOST_DROPPED,
     limits: ReadingLimits = DEFAULT_LIMITS,
@@ -126,7 +133,7 @@ def read_blocks(
         not met.
     block_rows
         Most rows of a block.
-    repair, most_dropped
+    axis, repair, most_dropped
         As `read_run`.
     limits
         What reading may take before the file counts as damaged.
@@ -147,13 +154,16 @@ def read_blocks(
         raise InputError(f"{block_rows} rows a block: at least 1 is needed")
     if repair:
         yield from _cut(
-            read_run(path, repair=True, most_dropped=most_dropped, limits=limits), columns, block_rows
+            read_run(path, repair=True, axis=axis, most_dropped=most_dropped, limits=limits),
+            columns,
+            block_rows,
         )
         return
     with unchanged(*run_sources(path)):
         kind = file_format(path)
         assembler = Assembler(path)
-        for table in _table_blocks(path, kind, block_rows, columns, limits):
+        one = OneAxis(axis)
+        for table in map(one.table, _table_blocks(path, kind, block_rows, one.columns(columns), limits)):
             held = [parse_header(cell)[0] for cell in table.columns]
             missing = [column for column in columns or () if column not in held]
             if missing:
@@ -161,9 +171,9 @@ def read_blocks(
                     f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
                 )
             if assembler.samples == 0 and needs_whole(table):
-                yield from _cut(read_run(path, limits=limits), columns, block_rows)
+                yield from _cut(read_run(path, axis=axis, limits=limits), columns, block_rows)
                 return
-            yield assembler.block(table)
+            yield one.run(assembler.block(table))
         if assembler.samples < 2:
             raise too_short(path.name, assembler.samples)
 

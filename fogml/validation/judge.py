@@ -124,11 +124,9 @@ def judgement_of(
     constant = (0.0, 0.0) if earth_known else training_means(train)
     if noise is not None:
         check_noise_run(noise)
-    judged_train = tuple(
-        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise) for e in train
-    )
+    judged_train = tuple(judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise) for e in train)
     judged_test = tuple(
-        _judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs))
+        judge_run(e, averaging_s, constant, earth_known, turn_on_band, noise, _seen(e.run, train_runs))
         for e in test
     )
     return Judgement(
@@ -171,7 +169,7 @@ def _seen(run: Run, train: Sequence[Run]) -> tuple[Finding, ...]:
     return ()
 
 
-def _judge_run(
+def judge_run(
     errors: RunErrors,
     averaging_s: float,
     constant: tuple[float, float],
@@ -180,6 +178,23 @@ def _judge_run(
     noise: Run | None = None,
     seen: tuple[Finding, ...] = (),
 ) -> RunJudgement:
+    """The judgement of one run from a model's errors on it.
+
+    Parameters
+    ----------
+    errors
+        Of the run.
+    averaging_s
+        Averaging time of every figure [s].
+    constant
+        What is taken off the errors before and after [deg/h]: the training runs' means, or nothing.
+    earth_known
+        Whether Earth rate is known, so that nothing has to be taken off.
+    turn_on_band, noise
+        As of `judge`.
+    seen
+        Findings on training runs that hold the same samples.
+    """
     run, used = errors.run, errors.used
     metrics = RunMetrics(run, used, averaging_s, full=errors.full, turn_on_band=turn_on_band)
     before = errors.before - constant[0]
@@ -215,6 +230,7 @@ def _judge_run(
         facts=run.facts,
         short_averages=metrics.short_averages,
         scale_factor_se=metrics.scale_factor_se(after),
+        soaks=metrics.soak_biases(before, after),
         table_rates=(float(run.rate.min()), float(run.rate.max())) if "rate" in run.columns else None,
     )
 

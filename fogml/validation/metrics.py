@@ -11,7 +11,7 @@ from fogml.errors import InputError
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.signals.averages import BlockAverages, block_averages
 from fogml.validation.rate_ladder import find_ladder, ladder_figures
-from fogml.validation.results import Metrics
+from fogml.validation.results import Metrics, SoakBias
 from fogml.validation.scale_factor import LEAST_SHARE, find_steps, scale_factor_error
 from fogml.validation.soaks import find_soaks, hysteresis, temperature_sensitivity
 from fogml.validation.turn_on import check_turn_on_band, turn_on_time
@@ -134,6 +134,18 @@ class RunMetrics:
     def averages(self, *columns: FloatArray, window_s: float | None = None) -> BlockAverages:
         """Averages over the averaging time of columns that hold the used rows only."""
         return block_averages(self._time, *columns, window_s=window_s or self.averaging_s)
+
+    def soak_biases(self, before_deg_h: FloatArray, after_deg_h: FloatArray) -> tuple[SoakBias, ...]:
+        """Mean errors over each soak of error series of the whole run [deg/h], shape (n,)."""
+        return tuple(
+            SoakBias(
+                soak.temperature,
+                soak.approach,
+                float(before_deg_h[soak.rows].mean()),
+                float(after_deg_h[soak.rows].mean()),
+            )
+            for soak in self._soaks
+        )
 
     def figures(self, error_deg_h: FloatArray) -> Metrics:
         """The figures of an error series [deg/h] of the whole run, shape (n,)."""

@@ -83,6 +83,19 @@ class AveragedSeries:
 
 
 @dataclass(frozen=True)
+class SoakBias:
+    """Mean error over a soak before and after compensation [deg/h], its temperature [degC], and how it came.
+
+    ``approach`` is ``up`` or ``down`` after a ramp that led to it, ``none`` at the start of a run.
+    """
+
+    temperature: float
+    approach: str
+    before: float
+    after: float
+
+
+@dataclass(frozen=True)
 class RunJudgement:
     """One model on one run.
 
@@ -91,7 +104,8 @@ class RunJudgement:
     with its 90 % interval and where it comes from; ``noise`` the run's own Allan terms with their intervals
     and the raw minimum, as in ``noise.json``, None where the run is too short for them. ``short_averages`` is
     how many averages over 10 s there are, ``scale_factor_se`` the standard error of the scale factor error
-    after compensation [ppm], by what the turns scatter about it.
+    after compensation [ppm], by what the turns scatter about it, ``soaks`` the
+    bias at each soak.
     """
 
     run: str
@@ -116,6 +130,7 @@ class RunJudgement:
     floor_source: str = "the run itself"
     short_averages: int = 0
     scale_factor_se: float | None = None
+    soaks: tuple[SoakBias, ...] = ()
 
 
 @dataclass(frozen=True)

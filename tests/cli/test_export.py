@@ -85,5 +85,5 @@ def test_a_table_with_what_it_loses(invoke_json, invoke, model, run_files, tmp_p
     again = yaml.safe_load((out / "export.config.yaml").read_text())
     assert again["model"] == str(model)
     assert "leave it out" in invoke("export", model, "--to", "px4", "--bytes", 9, status=2).stderr
-    assert "takes one model" in invoke("export", model, model, status=2).stderr
+    assert "takes one model" in invoke("export", model, model, "--to", "onnx", status=2).stderr
     assert "leave it out" in invoke("export", model, "--breakpoints", 4, status=2).stderr

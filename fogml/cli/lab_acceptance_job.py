@@ -1,0 +1,71 @@
+"""The job of ``fogml lab acceptance``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fogml.cli.lab import AcceptanceSettings
+from fogml.cli.lab_outputs import say_where, tell
+from fogml.cli.runs import open_runs
+from fogml.cli.terminal import Terminal, number
+
+
+def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bool:
+    """Test a gyro's runs, write the report where a folder is named, print it; whether all limits are met."""
+    from fogml.lab.acceptance import ACCEPTED, NO_LIMITS, acceptance_json
+    from fogml.lab.acceptance_limits import read_limits
+    from fogml.models.saved import load_model
+
+    def make() -> dict[str, Any]:
+        limits = None if settings.limits is None else read_limits(settings.limits)
+        model = None if settings.model is None else load_model(settings.model)
+        runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+        noise = None
+        if settings.noise is not None:
+            (noise,) = open_runs([settings.noise], terminal, repair=settings.repair, axis=settings.axis)
+        with terminal.work("testing"):
+            return acceptance_json(
+                runs,
+                model,
+                limits,
+                averaging_s=settings.averaging,
+                turn_on_band=settings.turn_on_band,
+                noise=noise,
+                date=settings.date,
+            )
+
+    def page(values: dict[str, Any]) -> str:
+        from fogml.report.acceptance_page import acceptance_page
+
+        return acceptance_page(values)
+
+    def sheets(values: dict[str, Any], path: Path) -> None:
+        from fogml.report.acceptance_spreadsheet import acceptance_spreadsheet
+
+        acceptance_spreadsheet(values, path)
+
+    values = tell("acceptance", make, page, settings, settings.out, terminal, sheets)
+    _print(values, terminal)
+    terminal.result(values)
+    say_where("acceptance", settings.out, terminal)
+    return values["verdict"] in (ACCEPTED, NO_LIMITS)
+
+
+def _print(values: dict[str, Any], terminal: Terminal) -> None:
+    from fogml.report.acceptance_page import VERDICTS, limit_words, named
+
+    rows = []
+    for row in values["rows"]:
+        if row["tested"]:
+            met = {True: "met", False: "NOT met", None: ""}[row["met"]]
+            figures = [number(row["before"]), number(row["after"])]
+            rows.append([row["name"], *figures, row["unit"], limit_words(row["limit"]), met])
+    terminal.table(
+        f"{named(values)}: acceptance", ["quantity", "before", "after", "unit", "limit", "outcome"], rows
+    )
+    lacking = [row["name"] for row in values["rows"] if not row["tested"]]
+    if lacking:
+        terminal.say(f"Not tested: {', '.join(lacking)}")
+    _, sign, words = VERDICTS[values["verdict"]]
+    terminal.say(f"{sign} {words}: {'; '.join(values['reasons'])}")

@@ -1,0 +1,145 @@
+"""A batch of units from their acceptance reports: yield, distribution of figures, and who fails on what."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.json_files import finite_json
+from fogml.lab.acceptance import ACCEPTED, INCOMPLETE, NO_LIMITS, REJECTED
+from fogml.lab.acceptance import SCHEMA as ACCEPTANCE
+from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.strict_json import json_object, read_json
+
+SCHEMA = "fogml.batch/1"
+REPORT = "acceptance.json"
+_SHARES = {"least": 0.0, "q10": 0.1, "median": 0.5, "q90": 0.9, "largest": 1.0}
+_ORDER = {REJECTED: 0, INCOMPLETE: 1, NO_LIMITS: 2, ACCEPTED: 3}
+
+
+def read_reports(paths: Sequence[str | Path]) -> list[tuple[Path, dict[str, Any]]]:
+    """Acceptance reports by their files; a folder stands for the report in it.
+
+    Raises
+    ------
+    InputError
+        If one is missing or none, or two are of the same unit and axis.
+    """
+    found: list[tuple[Path, dict[str, Any]]] = []
+    of: dict[tuple[Any, Any], Path] = {}
+    for path in map(Path, paths):
+        file = path / REPORT if path.is_dir() else path
+        values = read_json(file, "name acceptance reports (acceptance.json) or their folders")
+        held = json_object(values, str(file), ACCEPTANCE, "'fogml lab acceptance' writes one")
+        who = held.get("serial_number"), held.get("axis")
+        if who in of:
+            told = " ".join(str(part) for part in who if part) or "no unit by name"
+            raise InputError(f"{file} and {of[who]} are both of {told}; give one report a gyro")
+        of[who] = file
+        found.append((file, dict(held)))
+    return found
+
+
+def batch_json(reports: Sequence[tuple[Path, Mapping[str, Any]]], home: Path | None = None) -> dict[str, Any]:
+    """The batch of some acceptance reports.
+
+    Parameters
+    ----------
+    reports
+        As `read_reports` gives them.
+    home
+        Folder of the batch's page, from which the units' pages are linked; absolute links if None.
+
+    Returns
+    -------
+    dict
+        Schema ``fogml.batch/1``: ``counts`` of verdicts, ``yield`` with its 90 % interval, ``quantities``
+        with distribution of sizes, limit and how many are over it, ``units`` with those rejected first.
+    """
+    units = [_unit(file, report, home) for file, report in reports]
+    units.sort(key=lambda one: (_ORDER[one["verdict"]], by_serial(f"{one['serial_number']} {one['axis']}")))
+    counts = Counter(one["verdict"] for one in units)
+    judged = counts[ACCEPTED] + counts[REJECTED]
+    low, high = _interval(counts[ACCEPTED], judged) if judged else (None, None)
+    values = {
+        "schema": SCHEMA,
+        "counts": {name: counts[name] for name in _ORDER},
+        "yield": {
+            "share": counts[ACCEPTED] / judged if judged else None,
+            "ci90": [low, high],
+            "judged": judged,
+        },
+        "quantities": _quantities([report for _, report in reports]),
+        "units": units,
+    }
+    return finite_json(values)
+
+
+def _interval(part: int, whole: int) -> tuple[float, float]:
+    """The exact 90 % interval of a share (Clopper and Pearson, Biometrika 26, 1934)."""
+    from scipy.stats import binomtest
+
+    found = binomtest(part, whole).proportion_ci(0.9, method="exact")
+    return float(found.low), float(found.high)
+
+
+def by_serial(label: str) -> list[tuple[int, int | str]]:
+    """Sort key: numbers in a label by their value."""
+    return [(0, int(part)) if part.isdigit() else (1, part) for part in re.findall(r"\d+|\D+", label)]
+
+
+def figure_of(row: Mapping[str, Any]) -> float | None:
+    """The figure that counts: after compensation where there is a model, else as it is."""
+    value = row["after"] if row["after"] is not None else row["before"]
+    return None if value is None else float(value)
+
+
+def _unit(file: Path, report: Mapping[str, Any], home: Path | None) -> dict[str, Any]:
+    page = file.with_suffix(".html").absolute()
+    link = page.as_uri() if home is None else Path(_relative(page, home.absolute())).as_posix()
+    return {
+        "serial_number": report["serial_number"] or "not stated",
+        "axis": report["axis"] or "",
+        "verdict": report["verdict"],
+        "reasons": report["reasons"],
+        "date": report["date"],
+        "page": link,
+        "figures": {row["quantity"]: figure_of(row) for row in report["rows"] if row["tested"]},
+        "missed": [row["quantity"] for row in report["rows"] if row["met"] is False],
+    }
+
+
+def _relative(page: Path, home: Path) -> str:
+    import os
+
+    return os.path.relpath(page, home)
+
+
+def _quantities(reports: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Of each quantity that any unit was tested for: the sizes of its figures, and the limit."""
+    told = []
+    for quantity in QUANTITIES:
+        rows = [row for report in reports for row in report["rows"] if row["quantity"] == quantity.key]
+        held = [figure for row in rows if (figure := figure_of(row)) is not None]
+        if not held:
+            continue
+        limits = [row["limit"] for row in rows if row["limit"] is not None]
+        quantiles = np.quantile(np.abs(held), list(_SHARES.values()))
+        told.append(
+            {
+                "quantity": quantity.key,
+                "name": quantity.name,
+                "unit": quantity.unit,
+                "tested": len(held),
+                "distribution": dict(zip(_SHARES, map(float, quantiles), strict=True)),
+                "limit": limits[0] if limits and all(limit == limits[0] for limit in limits) else None,
+                "over": sum(row["met"] is False for row in rows),
+            }
+        )
+    return told

@@ -1,0 +1,196 @@
+"""The acceptance report as a page that prints on one to three sheets of A4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from markupsafe import Markup
+
+from fogml.report import style
+from fogml.report.page import render
+from fogml.report.static_svg import Curve, line_figure
+from fogml.report.tables import Row, Table
+from fogml.report.words import MISSING, listed, number, percent, stated
+
+VERDICTS = {
+    "accepted": ("met", "✓", "Accepted"),
+    "rejected": ("missed", "✗", "Rejected"),
+    "incomplete": ("care", "!", "Incomplete"),
+    "no_limits": ("care", "!", "No limits stated"),
+}
+"""Verdicts as they are shown: colour's class, sign, words."""
+_UNITS = {
+    "deg/sqrt(h)": "deg/√h",
+    "deg/h/sqrt(h)": "deg/h/√h",
+    "urad": "µrad",
+    "deg/h/degC": "deg/h/°C",
+    "ppm/degC": "ppm/°C",
+}
+NOT_TESTED = "not tested"
+
+
+def acceptance_page(values: Mapping[str, Any]) -> str:
+    """The self-contained HTML page of an ``acceptance.json`` (schema ``fogml.acceptance/1``)."""
+    kind, sign, words = VERDICTS[values["verdict"]]
+    name = named(values)
+    return render(
+        "acceptance.html",
+        title=f"{name} – acceptance report",
+        name=name,
+        values=values,
+        verdict={"kind": kind, "sign": sign, "words": words},
+        about=_about(values),
+        rows=[_shown(row) for row in values["rows"]],
+        compensated=values["model"] is not None,
+        limited=values["limits"] is not None,
+        soaks=_soaks(values),
+        figure=_figure(values),
+        runs=_runs(values),
+        files=_files(values),
+    )
+
+
+def named(values: Mapping[str, Any]) -> str:
+    """Unit and axis."""
+    unit, axis = values["serial_number"] or "unit not stated", values["axis"]
+    return f"{unit}, axis {axis}" if axis else str(unit)
+
+
+def limit_words(limit: Mapping[str, float | None] | None) -> str:
+    """A limit as people write it."""
+    if limit is None:
+        return ""
+    low, high = limit["from"], limit["to"]
+    if low is None or high is None:
+        return f"≤ {stated(high)}" if low is None and high is not None else f"≥ {stated(low or 0.0)}"
+    return f"± {stated(high)}" if low == -high else f"{stated(low)} … {stated(high)}"
+
+
+def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
+    """A row of the main table in words."""
+    ieee = row["ieee_952"] + (f" ({row['clause']})" if row["clause"] else "")
+    outcome = {True: ("met", "✓ met"), False: ("missed", "✗ not met")}.get(row["met"], ("", ""))
+    if row["limit"] is not None and row["met"] is None:
+        outcome = ("care", "! not tested")
+    return {
+        "name": row["name"],
+        "standards": " · ".join(part for part in (ieee, row["gjb_2426a"]) if part),
+        "unit": _UNITS.get(row["unit"], row["unit"]),
+        "tested": row["tested"],
+        "before": number(row["before"]),
+        "after": number(row["after"]),
+        "limit": limit_words(row["limit"]),
+        "kind": outcome[0],
+        "outcome": outcome[1],
+        "remark": ", ".join(part for part in (row["of"], row["remark"]) if part),
+    }
+
+
+def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    limits, model = values["limits"], values["model"]
+    dates = sorted({run["started"][:10] for run in values["runs"] if run["started"]})
+    temperatures = [end for run in values["runs"] for end in run["temperature_degC"] if end is not None]
+    about = [("Tested", listed(dates, 6) if dates else "date not stated")]
+    if temperatures:
+        about.append(("Temperatures", f"{number(min(temperatures))} to {number(max(temperatures))} °C"))
+    about.append(("Averages", f"{values['averaging_s']:.4g} s"))
+    about.append(("Model", "none: output as it is" if model is None else str(model["kind"])))
+    if limits is not None:
+        by = [limits["document"] or limits["file"], limits["customer"]]
+        about.append(("Limits", ", ".join(part for part in by if part)))
+    return about
+
+
+def _soaks(values: Mapping[str, Any]) -> Table | None:
+    """Bias at each soak temperature."""
+    lines = values["soaks"]
+    if not lines:
+        return None
+    whens = ("before", "after") if values["model"] is not None else ("before",)
+    several = len({line["run"] for line in lines}) > 1
+    parts = [("start", "at the start"), ("up", "on the way up"), ("down", "on the way down")]
+    parts = [part for part in parts if any(line["before"][part[0]] is not None for line in lines)]
+    parts.append(("hysteresis", "hysteresis"))
+    columns = [("Run", "", "text")] if several else []
+    columns.append(("Soak", "°C", "figure"))
+    columns += [
+        (f"{words}, {when}" if len(whens) > 1 else words, "deg/h", "figure")
+        for when in whens
+        for _, words in parts
+    ]
+    rows = [
+        Row(
+            (
+                *((line["run"],) if several else ()),
+                f"{line['temperature_degC']:.1f}".replace("-", "−"),
+                *(number(line[when][key]) for when in whens for key, _ in parts),
+            )
+        )
+        for line in lines
+    ]
+    return Table(tuple(columns), tuple(rows), f"Bias in the soaks of {listed(_names(lines), 3)}.")
+
+
+def _names(lines: list[Mapping[str, Any]]) -> list[str]:
+    return list(dict.fromkeys(str(line["run"]) for line in lines))
+
+
+def _figure(values: Mapping[str, Any]) -> Markup | None:
+    """Bias over soak temperature, up and down, before and after."""
+    lines = values["soaks"]
+    whens = [("before", style.BEFORE)] + ([("after", style.AFTER)] if values["model"] is not None else [])
+    curves = []
+    for when, colour in whens:
+        for way, dash in (("up", ""), ("down", "4 2.5")):
+            held = [(one["temperature_degC"], one[when][way]) for one in lines if one[when][way] is not None]
+            if len(held) > 1:
+                x, y = np.array(sorted(held)).T
+                curves.append(
+                    Curve(
+                        x,
+                        y,
+                        colour,
+                        dash,
+                        label=f"{when}, way {way}" if len(whens) > 1 else f"way {way}",
+                        dots=True,
+                    )
+                )
+    if not curves:
+        return None
+    return line_figure(curves, "T [°C]", "bias [deg/h]", "Bias at each soak temperature, up and down")
+
+
+def _runs(values: Mapping[str, Any]) -> Table:
+    columns = (
+        ("Run", "", "text"),
+        ("Started", "", "text"),
+        ("Length", "h", "figure"),
+        ("T from", "°C", "figure"),
+        ("to", "°C", "figure"),
+        ("Outside training", "", "figure"),
+    )
+    rows = [
+        Row(
+            (
+                run["run"],
+                (run["started"] or MISSING)[:16].replace("T", " "),
+                number(run["span_h"]),
+                *(number(end) for end in run["temperature_degC"]),
+                percent(run["outside_training"]) if values["model"] is not None else MISSING,
+            )
+        )
+        for run in values["runs"]
+    ]
+    return Table(columns, tuple(rows))
+
+
+def _files(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Name and SHA-256 of everything that the report stands on."""
+    files = [(run["run"], run["sha256"]) for run in values["runs"]]
+    if values["model"] is not None:
+        files.append((f"model {values['model']['kind']}", values["model"]["sha256"]))
+    if values["limits"] is not None:
+        files.append((values["limits"]["file"], values["limits"]["sha256"]))
+    return files

@@ -1,0 +1,118 @@
+"""``acceptance.xlsx`` and ``batch.xlsx``: acceptance reports as sheets to go on calculating with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from fogml.escaping import cell_text
+from fogml.report.acceptance_page import VERDICTS, limit_words, named
+from fogml.report.spreadsheet import whole_workbook
+
+_HEADS = ("quantity", "name", "IEEE Std 952", "clause", "GJB 2426A", "unit", "before", "after")
+_MORE = ("limit from", "limit to", "met", "of", "remark")
+
+
+def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
+    """Write an ``acceptance.json`` as an Excel workbook that appears whole or not at all.
+
+    Parameters
+    ----------
+    values
+        Schema ``fogml.acceptance/1``.
+    path
+        The file, ending in ``.xlsx``.
+
+    Raises
+    ------
+    InputError
+        If the folder is missing or can't be written.
+    """
+    with whole_workbook(path) as writer:
+        sheet = writer.sheet("Acceptance")
+        sheet.write_string(0, 0, cell_text(named(values)), writer.title)
+        sheet.write_string(
+            1, 0, cell_text(f"{VERDICTS[values['verdict']][2]}: {'; '.join(values['reasons'])}")
+        )
+        keys = ("quantity", "name", "ieee_952", "clause", "gjb_2426a", "unit", "before", "after")
+        rows = []
+        for row in values["rows"]:
+            limit = row["limit"] or {"from": None, "to": None}
+            met = row["met"] if row["tested"] else "not tested"
+            rows.append(
+                (*(row[key] for key in keys), limit["from"], limit["to"], met, row["of"], row["remark"])
+            )
+        writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
+        sheet.set_column(0, 4, 24)
+        sheet.set_column(5, 12, 14)
+        sheet = writer.sheet("Soaks")
+        parts = ("start", "up", "down", "hysteresis")
+        heads = [f"{part} {when} [deg/h]" for when in ("before", "after") for part in parts]
+        lines = [
+            (
+                line["run"],
+                line["temperature_degC"],
+                *(line[when][part] for when in ("before", "after") for part in parts),
+            )
+            for line in values["soaks"]
+        ]
+        writer.table(sheet, ("run", "temperature [degC]", *heads), lines)
+        sheet.set_column(0, 9, 18)
+        sheet = writer.sheet("Runs")
+        runs = [
+            (run["run"], run["started"], run["span_h"], *run["temperature_degC"], run["sha256"])
+            for run in values["runs"]
+        ]
+        writer.table(sheet, ("run", "started", "length [h]", "T from [degC]", "T to [degC]", "SHA-256"), runs)
+        sheet.set_column(0, 5, 20)
+
+
+def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
+    """Write a ``batch.json`` as an Excel workbook, one line a unit; as `acceptance_spreadsheet`.
+
+    Parameters
+    ----------
+    values
+        Schema ``fogml.batch/1``.
+    path
+        The file, ending in ``.xlsx``.
+    """
+    with whole_workbook(path) as writer:
+        sheet = writer.sheet("Units")
+        keys = [one["quantity"] for one in values["quantities"]]
+        heads = [
+            "unit",
+            "axis",
+            "verdict",
+            "reasons",
+            *(f"{q['name']} [{q['unit']}]" for q in values["quantities"]),
+        ]
+        rows = [
+            (
+                one["serial_number"],
+                one["axis"],
+                one["verdict"],
+                "; ".join(one["reasons"]),
+                *(one["figures"].get(key) for key in keys),
+            )
+            for one in values["units"]
+        ]
+        writer.table(sheet, heads, rows)
+        sheet.set_column(0, len(heads) - 1, 18)
+        sheet.freeze_panes(1, 1)
+        sheet = writer.sheet("Distribution")
+        names = ("quantity", "unit", "tested", "least", "q10", "median", "q90", "largest", "limit", "over")
+        told = [
+            (
+                one["name"],
+                one["unit"],
+                one["tested"],
+                *(one["distribution"][key] for key in ("least", "q10", "median", "q90", "largest")),
+                limit_words(one["limit"]),
+                one["over"],
+            )
+            for one in values["quantities"]
+        ]
+        writer.table(sheet, names, told)
+        sheet.set_column(0, len(names) - 1, 18)

@@ -1,0 +1,167 @@
+"""The index page of a command on files of three gyros: one line an axis, and links to their pages."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from fogml.report.page import render
+from fogml.report.tables import Row, Table
+from fogml.report.verdict import GRADES
+from fogml.report.words import MISSING, averages, duration, number
+
+PAGES = {
+    "train": "report.html",
+    "compare": "compare.html",
+    "inspect": "inspect.html",
+    "noise": "noise.html",
+}
+"""Page of each command in an axis' folder."""
+
+_KICKERS = {
+    "train": "Drift models, one an axis, judged on other runs",
+    "compare": "Models compared, axis by axis",
+    "inspect": "What is in the runs, axis by axis",
+    "noise": "Noise, axis by axis",
+}
+Columns = tuple[tuple[str, str, str], ...]
+
+
+def axes_page(values: Mapping[str, Any], links: Mapping[str, str]) -> str:
+    """The self-contained HTML page of what a command told of each axis.
+
+    Parameters
+    ----------
+    values
+        Schema ``fogml.axes/1``: ``command``, and ``axes`` with what its ``--json`` prints of each.
+    links
+        Axis to the address of its page.
+    """
+    command, axes = values["command"], values["axes"]
+    columns, row = _TABLES[command]
+    table = Table(
+        (("Axis", "", "text"), *columns),
+        tuple(Row((axis, *row(told))) for axis, told in axes.items()),
+    )
+    return render(
+        "axes.html",
+        title=f"fogml {command} – axes {', '.join(axes)}",
+        name=_name(axes),
+        kicker=_KICKERS[command],
+        links=[(axis, links[axis], _mark(told)) for axis, told in axes.items()],
+        table=table,
+    )
+
+
+def _name(axes: Mapping[str, Any]) -> str:
+    """Unit and axes, as far as what was told names them."""
+    first = next(iter(axes.values()))
+    run = first
+    for key in ("test", "runs"):
+        if first.get(key):
+            run = first[key][0]
+    if first.get("models"):
+        run = next(iter(first["models"].values()))["test"][0]
+    unit = run.get("serial_number")
+    return f"{unit}, axes {', '.join(axes)}" if unit else f"{run.get('run', 'run')}, axes {', '.join(axes)}"
+
+
+def _mark(told: Mapping[str, Any]) -> dict[str, str] | None:
+    """The verdict on an axis' model, where there is one."""
+    if "verdict" not in told:
+        return None
+    kind, sign, words = GRADES[told["verdict"]]
+    return {"kind": kind, "sign": sign, "words": words}
+
+
+def _train(told: Mapping[str, Any]) -> tuple[str, ...]:
+    run = max(told["test"], key=lambda one: one["after"]["rms"])
+    figures = (run["before"]["rms"], run["after"]["rms"], run["after"]["bias_stability"], run["floor"])
+    return (
+        str(told["model"]["kind"]),
+        *map(number, figures),
+        averages(run["averaging_s"]),
+        told["reasons"][0],
+    )
+
+
+def _compare(told: Mapping[str, Any]) -> tuple[str, ...]:
+    worst = {
+        name: max(body["test"], key=lambda run: run["after"]["rms"]) for name, body in told["models"].items()
+    }
+    best = min(worst, key=lambda name: float(worst[name]["after"]["rms"]))
+    auto = worst.get("auto")
+    return (
+        number(worst[best]["before"]["rms"]),
+        number(auto["after"]["rms"]) if auto else MISSING,
+        best,
+        number(worst[best]["after"]["rms"]),
+        number(worst[best]["floor"]),
+    )
+
+
+def _inspect(told: Mapping[str, Any]) -> tuple[str, ...]:
+    runs = told["runs"]
+    gyro = [column for run in runs for column in run["columns"] if column["name"] == "gyro"]
+    noticed = {finding["code"].replace("_", " ") for run in runs for finding in run["findings"]}
+    return (
+        str(sum(run["rows"] for run in runs)),
+        duration(sum(run["span_s"] for run in runs)),
+        "; ".join(number(one["mean"], 4) for one in gyro),
+        "; ".join(number(one["standard_deviation"]) for one in gyro),
+        ", ".join(sorted(noticed)) or "nothing",
+    )
+
+
+def _noise(told: Mapping[str, Any]) -> tuple[str, ...]:
+    terms, minimum = told["terms"], told["minimum"]
+    values = (terms[name].get("value") for name in ("Q", "N", "B", "K", "R"))
+    return (*map(number, values), number(minimum["adev"]), number(minimum["tau_s"]))
+
+
+_TABLES: dict[str, tuple[Columns, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
+    "train": (
+        (
+            ("Model", "", "text"),
+            ("Rms before", "deg/h", "figure"),
+            ("Rms after", "deg/h", "figure"),
+            ("Bias stability after", "deg/h", "figure"),
+            ("Noise floor", "deg/h", "figure"),
+            ("Of", "", "text"),
+            ("Why", "", "text"),
+        ),
+        _train,
+    ),
+    "compare": (
+        (
+            ("Rms before", "deg/h", "figure"),
+            ("Rms, auto", "deg/h", "figure"),
+            ("Least on the test runs", "", "text"),
+            ("Its rms", "deg/h", "figure"),
+            ("Noise floor", "deg/h", "figure"),
+        ),
+        _compare,
+    ),
+    "inspect": (
+        (
+            ("Rows", "", "figure"),
+            ("Span", "", "figure"),
+            ("Mean", "deg/h or counts", "figure"),
+            ("Standard deviation", "deg/h or counts", "figure"),
+            ("Noticed", "", "text"),
+        ),
+        _inspect,
+    ),
+    "noise": (
+        (
+            ("Q", "µrad", "figure"),
+            ("N", "deg/√h", "figure"),
+            ("B", "deg/h", "figure"),
+            ("K", "deg/h/√h", "figure"),
+            ("R", "deg/h/h", "figure"),
+            ("Least deviation", "deg/h", "figure"),
+            ("at", "s", "figure"),
+        ),
+        _noise,
+    ),
+}

@@ -1,0 +1,145 @@
+"""Commands on a file of three gyros: a folder an axis, as a file of that axis gives, an index, one C file."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import yaml
+
+from fogml.runs.reading import read_run
+from tests.cli.conftest import csv_text
+
+AXES = ("x", "y", "z")
+GAINS = {"x": 1.0, "y": 2.0, "z": -1.5}
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory):
+    """Two files of three gyros, and beside them the same as a file an axis."""
+    folder = tmp_path_factory.mktemp("three")
+    for seed, name in enumerate(("a", "b")):
+        rows = [line.split(",") for line in csv_text(seed).splitlines()]
+        time, gyro, temperature = zip(*rows[1:], strict=True)
+        of = {axis: [f"{gain * float(g):.6f}" for g in gyro] for axis, gain in GAINS.items()}
+        lines = [",".join(row) for row in zip(time, *of.values(), temperature, strict=True)]
+        head = "time [s],gyro_x [deg/h],gyro_y [deg/h],gyro_z [deg/h],T [degC]"
+        (folder / f"{name}.csv").write_text("\n".join([head, *lines]) + "\n")
+        (folder / f"{name}.yaml").write_text("unit: FOG-3\n")
+        for axis, values in of.items():
+            alone = folder / axis
+            alone.mkdir(exist_ok=True)
+            text = "\n".join(",".join(row) for row in zip(time, values, temperature, strict=True))
+            (alone / f"{name}.csv").write_text(f"time [s],gyro [deg/h],T [degC]\n{text}\n")
+            (alone / f"{name}.yaml").write_text(f"unit: FOG-3\naxis: {axis}\n")
+    return folder
+
+
+def test_train_gives_each_axis_what_its_own_file_gives(home, invoke_json, tmp_path):
+    words = ("--model", "M2")
+    out = tmp_path / "results"
+    values = invoke_json("train", home / "a.csv", "--test", home / "b.csv", *words, "-o", out)
+    assert (values["schema"], values["command"]) == ("fogml.axes/1", "train")
+    for axis in AXES:
+        runs = (home / axis / "a.csv", "--test", home / axis / "b.csv")
+        alone = invoke_json("train", *runs, *words, "-o", tmp_path / axis)
+        assert values["axes"][axis] == alone
+        assert json.loads((out / axis / "report.json").read_text()) == alone
+    page = (out / "index.html").read_text()
+    assert all(f'href="{axis}/report.html"' in page for axis in AXES) and "Use it" in page
+    again = yaml.safe_load((out / "y" / "train.config.yaml").read_text())
+    assert (again["axis"], again["out"]) == ("y", str(out / "y"))
+    assert yaml.safe_load((out / "train.config.yaml").read_text())["axis"] is None
+
+
+@pytest.mark.parametrize(
+    ("words", "page"),
+    [
+        (("inspect", "a.csv"), "inspect"),
+        (("noise", "a.csv"), "noise"),
+        (("compare", "a.csv", "--test", "b.csv", "--models", "mean,M2"), "compare"),
+    ],
+)
+def test_other_commands_write_a_folder_an_axis(home, invoke, tmp_path, monkeypatch, words, page):
+    monkeypatch.chdir(home)
+    out = tmp_path / "results"
+    printed = invoke(*words, "-o", out).stdout
+    assert [f"Axis {axis}" in printed for axis in AXES] == [True] * 3
+    assert "partial" not in printed  # no passing name of a folder
+    for axis in AXES:
+        assert (out / axis / f"{page}.json").is_file()
+    assert all(f'href="{axis}/{page}.html"' in (out / "index.html").read_text() for axis in AXES)
+
+
+def test_without_a_folder_the_axes_are_told(home, invoke_json):
+    values = invoke_json("inspect", home / "a.csv")
+    assert [values["axes"][axis]["runs"][0]["axis"] for axis in AXES] == list(AXES)
+
+
+def test_nothing_is_left_where_one_axis_fails(home, invoke, tmp_path):
+    text = (home / "a.csv").read_text().replace("gyro_z [deg/h]", "gyro_z [count]")
+    (tmp_path / "c.csv").write_text(text)
+    out = tmp_path / "results"
+    invoke("train", tmp_path / "c.csv", "--test", home / "b.csv", "--model", "M2", "-o", out, status=2)
+    assert not out.exists()
+
+
+@pytest.fixture(scope="module")
+def trained(home, tmp_path_factory):
+    """Results of a training on the file of three gyros."""
+    from click.testing import CliRunner
+
+    from fogml.cli.main import app
+
+    out = tmp_path_factory.mktemp("trained") / "results"
+    words = ["train", home / "a.csv", "--test", home / "b.csv", "--model", "M2", "-q", "-o", out]
+    assert CliRunner().invoke(app, list(map(str, words))).exit_code == 0
+    return out
+
+
+def test_compensate_takes_the_model_of_each_axis(home, trained, invoke, tmp_path):
+    out = tmp_path / "comp.csv"
+    invoke("compensate", home / "b.csv", "--model", trained, "-o", out)
+    for axis in AXES:
+        alone = tmp_path / f"alone-{axis}.csv"
+        invoke("compensate", home / axis / "b.csv", "--model", trained / axis, "-o", alone)
+        assert (tmp_path / f"comp-{axis}.csv").read_text() == alone.read_text()
+    told = invoke("compensate", home / "b.csv", "--model", trained / "x", "-o", out, status=2).stderr
+    assert "holds no folder 'x'" in told and "--axis" in told
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invoke, tmp_path, monkeypatch):
+    # Sizes and cycles on another machine are told of each axis alone elsewhere.
+    monkeypatch.setattr("fogml.export.export.cortex_m4_size", lambda *_: None)
+    out = tmp_path / "c"
+    values = invoke_json("export", trained, "--dtype", "float64", "-o", out)
+    assert list(values["axes"]) == list(AXES) and "fogml_axes.c" in values["files"]
+    library = tmp_path / "axes.so"
+    words = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
+    subprocess.run(["gcc", *words, out / "fogml_axes.c", "-o", library], check=True)
+    code = ctypes.CDLL(str(library))
+    assert code.fogml_axes_self_test() == 0
+    state = ctypes.create_string_buffer(3 * max(code[f"fogml_{axis}_state_bytes"]() for axis in AXES) + 64)
+    code.fogml_axes_init(state)
+    runs = [read_run(home / "b.csv", axis=axis) for axis in AXES]
+    left, flags = [], []
+    three = ctypes.c_double * 3
+    for row in range(len(runs[0])):
+        temperature = (ctypes.c_double * 1)(runs[0].columns["T"][row])
+        gyro, got, flag = three(*(run.gyro[row] for run in runs)), three(), (ctypes.c_int * 3)()
+        worst = code.fogml_axes_step(
+            state, ctypes.c_uint64(round(1e6 * runs[0].time[row])), temperature, gyro, got, flag
+        )
+        assert worst == max(flag)
+        left.append(list(got))
+        flags.append(list(flag))
+    invoke("compensate", home / "b.csv", "--model", trained, "-o", tmp_path / "comp.csv")
+    for place, axis in enumerate(AXES):
+        table = np.genfromtxt(tmp_path / f"comp-{axis}.csv", delimiter=",", names=True)
+        np.testing.assert_array_equal(np.array(flags)[:, place], table["flag"])
+        np.testing.assert_allclose(np.array(left)[:, place], table["gyro_compensated_degh"], atol=1e-5)

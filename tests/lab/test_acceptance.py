@@ -1,0 +1,232 @@
+"""The acceptance report against a unit whose bias, hysteresis and scale factor are known in closed form."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import openpyxl
+import pytest
+import yaml
+from click.testing import CliRunner
+
+from fogml.cli.main import app
+from fogml.errors import InputError
+from fogml.lab.acceptance import acceptance_json
+from fogml.lab.acceptance_limits import read_limits
+from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.models.names import make_model
+from fogml.report.acceptance_page import acceptance_page, limit_words
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+from fogml.runs.writing import write_run
+
+EARTH = 15.041067 * np.sin(np.radians(39.9))
+SOAKS = (-40.0, -10.0, 25.0, 60.0, 25.0, -10.0, -40.0)
+STEP_S, SOAK_S, TURN_S = 5.0, 5400.0, 100.0
+
+
+@dataclass(frozen=True)
+class Unit:
+    """What a unit is made of: bias at 25 degC and its slope, loop, scale factor at 25 degC and its slope."""
+
+    bias: float = 0.05
+    slope: float = 0.002
+    loop: float = 0.03
+    scale_ppm: float = 120.0
+    scale_slope_ppm: float = 4.0
+    noise: float = 0.001
+
+    def run(self, name: str = "cycle", seed: int = 0, rates: tuple[float, ...] = (10, -10, 60, -60)) -> Run:
+        """A cycle over the soaks; in each the table turns, one sense after the other."""
+        parts, before = [], SOAKS[0]
+        for number, soak in enumerate(SOAKS):
+            ramp = int(abs(soak - before) * 60.0 / STEP_S)
+            stay = int(SOAK_S / STEP_S)
+            way = float(np.sign(soak - before))
+            rate = np.zeros(stay)
+            for place, value in enumerate(rates):
+                start = int((3000.0 + 2.0 * place * TURN_S) / STEP_S)
+                rate[start : start + int(TURN_S / STEP_S)] = value
+            temperature = np.append(np.linspace(before, soak, ramp, endpoint=False), np.full(stay, soak))
+            parts.append((temperature, np.append(np.zeros(ramp), rate), np.full(ramp + stay, way)))
+            before = soak
+            assert number or ramp == 0
+        temperature, rate, way = (np.concatenate(part) for part in zip(*parts, strict=True))
+        random = np.random.default_rng(seed)
+        off = temperature - 25.0
+        bias = self.bias + self.slope * off + 0.5 * self.loop * way
+        scale = 1.0 + 1e-6 * (self.scale_ppm + self.scale_slope_ppm * off)
+        gyro = 3600.0 * rate * scale + EARTH + bias + self.noise * random.standard_normal(len(off))
+        facts = Facts(unit="FOG-0417", axis="z", latitude=39.9, input_axis="up")
+        time = STEP_S * np.arange(len(off))
+        return Run.from_columns(name, facts, time=time, gyro=gyro, T=temperature, rate=rate)
+
+
+@pytest.fixture(scope="module")
+def cycle() -> Run:
+    return Unit().run()
+
+
+@pytest.fixture(scope="module")
+def report(cycle):
+    """The report of the unit as it is."""
+    return acceptance_json([cycle])
+
+
+def row(values, key):
+    (found,) = [one for one in values["rows"] if one["quantity"] == key]
+    return found
+
+
+def test_soaks_are_those_of_the_unit(report):
+    found = {
+        (round(line["temperature_degC"]), way): line["before"][way]
+        for line in report["soaks"]
+        for way in ("start", "up", "down", "hysteresis")
+        if line["before"][way] is not None
+    }
+    bias = {soak: 0.05 + 0.002 * (soak - 25.0) for soak in (-40, -10, 25, 60)}
+    expected = {(-40, "start"): bias[-40], (-40, "down"): bias[-40] - 0.015, (60, "up"): bias[60] + 0.015}
+    for soak in (-10, 25):
+        expected |= {(soak, "up"): bias[soak] + 0.015, (soak, "down"): bias[soak] - 0.015}
+        expected[soak, "hysteresis"] = 0.03
+    assert found == pytest.approx(expected, abs=5e-4)
+
+
+def test_rows_are_those_of_the_unit(report):
+    assert row(report, "hysteresis")["before"] == pytest.approx(0.03, abs=5e-4)
+    assert row(report, "scale_factor_temperature_sensitivity")["before"] == pytest.approx(4.0, abs=0.01)
+    mean = np.mean(SOAKS) - 25.0
+    assert row(report, "scale_factor_error")["before"] == pytest.approx(120.0 + 4.0 * mean, abs=0.5)
+    # The greatest slope from 25 degC: the loop adds to that of -10 degC, reached on the way down.
+    sensitivity = row(report, "temperature_sensitivity")["before"]
+    assert sensitivity == pytest.approx(0.002 + 0.03 / 35.0, abs=5e-5)
+    for key in ("scale_factor_nonlinearity", "scale_factor_asymmetry"):
+        assert row(report, key)["before"] == pytest.approx(0.0, abs=0.5)
+
+
+def test_what_the_run_does_not_tell_is_not_tested(report):
+    lacking = {one["quantity"] for one in report["rows"] if not one["tested"]}
+    assert {"bias_repeatability", "threshold", "resolution", "turn_on_time", "angle_random_walk"} <= lacking
+    for one in report["rows"]:
+        assert one["tested"] or (one["before"] is None and one["remark"].startswith("not tested: needs"))
+    assert [one["quantity"] for one in report["rows"]] == [one.key for one in QUANTITIES]
+
+
+def test_repeatability_and_noise_where_runs_tell_them():
+    rng = np.random.default_rng(1)
+    offsets = 0.02 * rng.standard_normal(6)
+    facts = Facts(unit="FOG-0417", axis="z", latitude=39.9, input_axis="up", powered_on=0.0)
+    runs = []
+    for place, offset in enumerate(offsets):
+        gyro = EARTH + offset + 0.1 * rng.standard_normal(3000)
+        columns = {"time": np.arange(3000.0), "gyro": gyro, "T": np.full(3000, 25.0)}
+        runs.append(Run.from_columns(f"on{place}", facts, **columns))
+    values = acceptance_json(runs)
+    spread = float(np.std([float(run.gyro.mean()) for run in runs], ddof=1))
+    assert row(values, "bias_repeatability")["before"] == pytest.approx(spread, rel=1e-6)
+    assert "power cycles" in row(values, "bias_repeatability")["of"]
+    # White noise of 0.1 deg/h in a second: N = 0.1 / 60 deg/sqrt(h).
+    assert row(values, "angle_random_walk")["before"] == pytest.approx(0.1 / 60.0, rel=0.05)
+    assert row(values, "angle_random_walk")["clause"] == "annex C"
+
+
+def test_after_a_model_the_slope_is_gone_and_the_loop_stays(cycle):
+    model = make_model("polynomial", "T").fit([Unit().run("train", seed=5)])
+    values = acceptance_json([cycle], model)
+    sensitivity = row(values, "temperature_sensitivity")
+    # The loop tilts the model's own slope a little.
+    assert sensitivity["after"] == pytest.approx(0.03 / 35.0, abs=2e-4)
+    assert row(values, "hysteresis")["after"] == pytest.approx(0.03, abs=5e-4)
+    assert row(values, "scale_factor_temperature_sensitivity")["after"] == pytest.approx(4.0, abs=0.01)
+    assert len(values["model"]["sha256"]) == 64 and values["runs"][0]["sha256"] == cycle.hash
+    page = acceptance_page(values)
+    assert page.count("not tested") and cycle.hash in page and "零偏温度灵敏度" in page
+    fitted = acceptance_json([Unit().run("train", seed=5)], model)
+    assert any("trained on this run" in note for note in fitted["notes"])
+
+
+@pytest.fixture
+def limits(tmp_path):
+    def write(**stated):
+        path = tmp_path / "limits.yaml"
+        path.write_text(yaml.safe_dump({"customer": "ACME", "document": "SPEC 7", "limits": stated}))
+        return read_limits(path)
+
+    return write
+
+
+def test_verdicts(cycle, limits):
+    def verdict(**stated):
+        return acceptance_json([cycle], limits=limits(**stated))
+
+    assert acceptance_json([cycle])["verdict"] == "no_limits"
+    assert verdict(hysteresis=0.05, scale_factor_error={"from": -200, "to": 200})["verdict"] == "accepted"
+    rejected = verdict(hysteresis=0.02, threshold=1.0)
+    assert rejected["verdict"] == "rejected"
+    assert rejected["reasons"][0] == "Thermal hysteresis of the bias is over its limit"
+    assert verdict(threshold=1.0)["verdict"] == "incomplete"
+    assert row(verdict(scale_factor_error={"from": 100}), "scale_factor_error")["met"] is False
+
+
+def test_a_run_of_training_is_no_test(cycle, limits):
+    model = make_model("polynomial", "T").fit([cycle])
+    values = acceptance_json([cycle], model, limits(hysteresis=0.05))
+    assert values["verdict"] == "incomplete" and "training run" in values["reasons"][0]
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("limits: {drift: 1}", "no quantity 'drift'"),
+        ("limits: {bias: -1}", "positive number"),
+        ("limits: {bias: {from: 2, to: 1}}", "from and to"),
+        ("bias: 1", "'limits' was expected"),
+        ("limits: {bias: 1}\nclient: x", "unknown key 'client'"),
+    ],
+)
+def test_faults_of_a_limits_file_are_named(tmp_path, text, told):
+    path = tmp_path / "limits.yaml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=told):
+        read_limits(path)
+
+
+def test_limits_in_words():
+    assert limit_words({"from": -0.1, "to": 0.1}) == "± 0.1"
+    assert limit_words({"from": None, "to": 5.0}) == "≤ 5" and limit_words({"from": 3.0, "to": None}) == "≥ 3"
+    assert limit_words({"from": -1.0, "to": 2.0}) == "−1 … 2" and limit_words(None) == ""
+
+
+def test_runs_of_two_units_are_refused(cycle):
+    other = Run.derived("other", cycle.columns, cycle.facts.model_copy(update={"unit": "FOG-9"}))
+    with pytest.raises(InputError, match="one gyro; the runs are of unit FOG-0417, FOG-9"):
+        acceptance_json([cycle, other])
+
+
+def test_command_writes_page_sheets_and_json(cycle, tmp_path):
+    write_run(cycle, tmp_path / "cycle.csv")
+    (tmp_path / "limits.yaml").write_text("limits: {hysteresis: 0.02}\n")
+    words = ["lab", "acceptance", tmp_path / "cycle.csv", "--limits", tmp_path / "limits.yaml"]
+    result = CliRunner().invoke(app, [*map(str, words), "-o", str(tmp_path / "out")])
+    assert result.exit_code == 1 and "Rejected" in result.stdout
+    values = json.loads((tmp_path / "out" / "acceptance.json").read_text())
+    assert values["verdict"] == "rejected" and values["limits"]["file"] == "limits.yaml"
+    sheet = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Acceptance"]
+    found = {line[0]: line[6] for line in sheet.iter_rows(min_row=5, values_only=True)}
+    assert found["hysteresis"] == pytest.approx(row(values, "hysteresis")["before"])
+    assert "Rejected" in (tmp_path / "out" / "acceptance.html").read_text()
+
+
+def test_what_is_written_and_the_example_are_of_the_documented_schema(report, cycle, limits):
+    jsonschema = pytest.importorskip("jsonschema")
+    text = (Path(__file__).parents[2] / "docs" / "acceptance.md").read_text(encoding="utf-8")
+    schema, example = (json.loads(block) for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL))
+    check = jsonschema.Draft202012Validator(schema)
+    for values in (example, report, acceptance_json([cycle], limits=limits(threshold=1.0))):
+        assert not [error.message for error in check.iter_errors(values)]
+    assert [error.message for error in check.iter_errors({**example, "verdict": "good"})]

@@ -1,0 +1,159 @@
+"""A batch of acceptance reports: yield, distribution, links, order; pages with 200 units and long names."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import openpyxl
+import pytest
+from click.testing import CliRunner
+
+from fogml.cli.main import app
+from fogml.errors import InputError
+from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.lab.batch import batch_json, read_reports
+from fogml.report.acceptance_page import acceptance_page
+from fogml.report.batch_page import batch_page
+from fogml.report.words import number
+from tests.report.chromium import CHROMIUM, open_page
+
+SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
+LIMIT = {"from": -0.05, "to": 0.05}
+
+
+def report(number: int, bias: float | None, runs: int = 1) -> dict:
+    """An acceptance report of a unit with a bias and a limit on it."""
+    rows = []
+    for quantity in QUANTITIES:
+        tested = quantity.key == "bias" and bias is not None
+        limit = LIMIT if quantity.key == "bias" else None
+        rows.append(
+            {
+                "quantity": quantity.key,
+                "name": quantity.name,
+                "ieee_952": quantity.ieee_952,
+                "clause": quantity.clause or None,
+                "gjb_2426a": quantity.gjb_2426a or None,
+                "unit": quantity.unit,
+                "tested": tested,
+                "before": bias if tested else None,
+                "after": None,
+                "of": "cycle.csv" if tested else None,
+                "remark": "" if tested else f"not tested: needs {quantity.needs}",
+                "limit": limit,
+                "met": abs(bias) <= 0.05 if tested and limit and bias is not None else None,
+            }
+        )
+    verdict = "incomplete" if bias is None else "accepted" if abs(bias) <= 0.05 else "rejected"
+    soaks = [
+        {
+            "run": "cycle.csv",
+            "temperature_degC": float(t),
+            **{
+                when: {"start": None, "up": 0.01 * t, "down": 0.011 * t, "hysteresis": 0.001 * t}
+                for when in ("before", "after")
+            },
+        }
+        for t in (-40, 25, 70)
+    ]
+    run = {"sha256": "9f" * 32, "started": "2026-03-02T08:00:00+00:00", "span_h": 14.0}
+    more = {"temperature_degC": [-40.0, 70.0], "outside_training": 0.0}
+    return {
+        "schema": "fogml.acceptance/1",
+        "serial_number": SERIAL.format(number),
+        "axis": "z",
+        "date": None,
+        "synthetic": True,
+        "averaging_s": 100.0,
+        "runs": [{"run": f"{SERIAL.format(number)}-run-{i}.csv", **run, **more} for i in range(runs)],
+        "model": None,
+        "limits": {"file": "limits.yaml", "sha256": "ab" * 32, "customer": "ACME", "document": None},
+        "soaks": soaks,
+        "rows": rows,
+        "verdict": verdict,
+        "reasons": [verdict],
+        "notes": [],
+    }
+
+
+@pytest.fixture
+def folders(tmp_path):
+    """Reports of ten units, one of which is rejected and one incomplete."""
+    biases = [0.01, -0.02, 0.03, 0.09, 0.0, 0.02, 0.01, None, -0.01, 0.04]
+    for number, bias in enumerate(biases, start=1):
+        folder = tmp_path / f"unit{number}"
+        folder.mkdir()
+        (folder / "acceptance.json").write_text(json.dumps(report(number, bias)))
+    return sorted(tmp_path.glob("unit*"))
+
+
+def test_yield_distribution_and_order(folders, tmp_path):
+    values = batch_json(read_reports(folders), tmp_path / "batch")
+    assert values["counts"] == {"rejected": 1, "incomplete": 1, "no_limits": 0, "accepted": 8}
+    found = values["yield"]
+    assert (found["share"], found["judged"]) == (8 / 9, 9)
+    # Clopper and Pearson: at the lower end, 8 or more of 9 come up in 5 % of the cases.
+    low, high = found["ci90"]
+    assert 9 * low**8 * (1 - low) + low**9 == pytest.approx(0.05) and high < 1.0
+    assert 1.0 - high**9 == pytest.approx(0.05)
+    (bias,) = values["quantities"]
+    sizes = np.abs([0.01, -0.02, 0.03, 0.09, 0.0, 0.02, 0.01, -0.01, 0.04])
+    assert bias["distribution"]["median"] == pytest.approx(np.median(sizes))
+    assert (bias["over"], bias["tested"], bias["limit"]) == (1, 9, LIMIT)
+    names = [unit["serial_number"][-4:] for unit in values["units"]]
+    assert names[:2] == ["0004", "0008"] and names[2:] == sorted(names[2:])
+    assert values["units"][0]["page"] == "../unit4/acceptance.html"
+
+
+def test_a_unit_twice_and_a_file_of_another_kind_are_refused(folders, tmp_path):
+    (tmp_path / "more").mkdir()
+    (tmp_path / "more" / "acceptance.json").write_text(json.dumps(report(1, 0.0)))
+    with pytest.raises(InputError, match="are both of"):
+        read_reports([*folders, tmp_path / "more"])
+    (tmp_path / "more" / "acceptance.json").write_text('{"schema": "fogml.train/1"}')
+    with pytest.raises(InputError, match=r"expected 'fogml.acceptance/1'"):
+        read_reports([tmp_path / "more"])
+
+
+def test_command(folders, tmp_path):
+    words = ["lab", "batch", *folders, "--title", "Lot 17", "-o", tmp_path / "batch"]
+    result = CliRunner().invoke(app, list(map(str, words)))
+    assert result.exit_code == 1
+    assert "8 of 9 units accepted: a yield of 88.9 %" in result.stdout
+    page = (tmp_path / "batch" / "batch.html").read_text()
+    assert 'href="../unit4/acceptance.html"' in page and "Lot 17" in page
+    sheet = openpyxl.load_workbook(tmp_path / "batch" / "batch.xlsx")["Units"]
+    lines = list(sheet.iter_rows(min_row=2, values_only=True))
+    assert len(lines) == 10 and lines[0][2] == "rejected"
+
+
+MEASURE = """
+<script>
+var wide = Array.from(document.querySelectorAll("main *")).filter(function (e) {
+  return e instanceof HTMLElement && e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== "inline" && e.clientWidth;
+}).map(function (e) { return e.tagName + "." + e.className; });
+document.title = "wide:" + wide.join(",") + " rows:" + document.querySelectorAll("tbody tr").length;
+var sort = document.querySelectorAll("th button")[2];
+if (sort) { sort.click(); sort.click();
+  document.title += " first:" + document.querySelector(".sortable tbody td.figure").textContent; }
+</script></main>
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no Chromium at {CHROMIUM}")
+@pytest.mark.parametrize("kind", ["acceptance", "batch"])
+def test_nothing_is_wider_than_its_place(kind, tmp_path):
+    if kind == "batch":
+        biases = np.random.default_rng(0).normal(0, 0.03, 200).tolist()
+        reports = [(tmp_path / f"{n}.json", report(n, bias)) for n, bias in enumerate(biases)]
+        html = batch_page(batch_json(reports, tmp_path))
+    else:
+        html = acceptance_page(report(1, 0.01, runs=6))
+    page = tmp_path / "page.html"
+    page.write_text(html.replace("</main>", MEASURE), encoding="utf-8")
+    dom = open_page(page, tmp_path / "profile").dom
+    assert "<title>wide: rows:" in dom, dom[dom.index("<title>") :][:300]
+    if kind == "batch":
+        assert f"first:{number(max(biases, key=abs))} ✗" in dom
