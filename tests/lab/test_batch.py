@@ -22,7 +22,7 @@ SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
 LIMIT = {"from": -0.05, "to": 0.05}
 
 
-def report(number: int, bias: float | None, runs: int = 1) -> dict:
+def report(place: int, bias: float | None, runs: int = 1) -> dict:
     """An acceptance report of a unit with a bias and a limit on it."""
     rows = []
     for quantity in QUANTITIES:
@@ -61,12 +61,12 @@ def report(number: int, bias: float | None, runs: int = 1) -> dict:
     more = {"temperature_degC": [-40.0, 70.0], "outside_training": 0.0}
     return {
         "schema": "fogml.acceptance/1",
-        "serial_number": SERIAL.format(number),
+        "serial_number": SERIAL.format(place),
         "axis": "z",
         "date": None,
         "synthetic": True,
         "averaging_s": 100.0,
-        "runs": [{"run": f"{SERIAL.format(number)}-run-{i}.csv", **run, **more} for i in range(runs)],
+        "runs": [{"run": f"{SERIAL.format(place)}-run-{i}.csv", **run, **more} for i in range(runs)],
         "model": None,
         "limits": {"file": "limits.yaml", "sha256": "ab" * 32, "customer": "ACME", "document": None},
         "soaks": soaks,
@@ -81,10 +81,10 @@ def report(number: int, bias: float | None, runs: int = 1) -> dict:
 def folders(tmp_path):
     """Reports of ten units, one of which is rejected and one incomplete."""
     biases = [0.01, -0.02, 0.03, 0.09, 0.0, 0.02, 0.01, None, -0.01, 0.04]
-    for number, bias in enumerate(biases, start=1):
-        folder = tmp_path / f"unit{number}"
+    for place, bias in enumerate(biases, start=1):
+        folder = tmp_path / f"unit{place}"
         folder.mkdir()
-        (folder / "acceptance.json").write_text(json.dumps(report(number, bias)))
+        (folder / "acceptance.json").write_text(json.dumps(report(place, bias)))
     return sorted(tmp_path.glob("unit*"))
 
 
@@ -131,7 +131,8 @@ def test_command(folders, tmp_path):
 MEASURE = """
 <script>
 var wide = Array.from(document.querySelectorAll("main *")).filter(function (e) {
-  return e instanceof HTMLElement && e.scrollWidth > e.clientWidth + 1 && getComputedStyle(e).display !== "inline" && e.clientWidth;
+  var block = e instanceof HTMLElement && getComputedStyle(e).display !== "inline" && e.clientWidth;
+  return block && e.scrollWidth > e.clientWidth + 1;
 }).map(function (e) { return e.tagName + "." + e.className; });
 document.title = "wide:" + wide.join(",") + " rows:" + document.querySelectorAll("tbody tr").length;
 var sort = document.querySelectorAll("th button")[2];
