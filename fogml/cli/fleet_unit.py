@@ -63,7 +63,7 @@ class UnitWork:
             else:
                 from fogml.fleet.shared import shared_model
 
-                model = shared_model(self.shared).fit(train_runs)
+                model = shared_model(self.shared, unit.covariates).fit(train_runs)
                 judgement = judge(
                     model,
                     train_runs,
@@ -75,7 +75,11 @@ class UnitWork:
                     noise=noise_run(settings, terminal),
                 )
             write_results(staging, settings, model, judgement, terminal)
-        return {**_told(judgement), "constants": self._constants(train_runs), "parameters": _count(model)}
+        return {
+            **_told(judgement),
+            "constants": self._constants(unit, train_runs),
+            "parameters": _count(model),
+        }
 
     def _compare(self, unit: Unit, folder: Path) -> dict[str, Any]:
         import json
@@ -132,11 +136,11 @@ class UnitWork:
         known = {key: value for key, value in self.settings.items() if key in kind.model_fields}
         return kind.model_validate({**known, **own, "out": str(folder)})
 
-    def _constants(self, runs: Sequence[Run]) -> dict[str, Any] | None:
+    def _constants(self, unit: Unit, runs: Sequence[Run]) -> dict[str, Any] | None:
         from fogml.fleet.constants import UnitConstants
 
         try:
-            return UnitConstants.of(runs, self.form).as_dict()
+            return UnitConstants.of(runs, self.form, unit.covariates).as_dict()
         except InputError:
             return None
 

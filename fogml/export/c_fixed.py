@@ -149,16 +149,21 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
     found: dict[int, str] = {}
     bits = _operator_bits(windows, plan, scales)
     for i, operator in windows.of_method("block"):
-        unit = 0 if operator.unit_s is None else round(operator.unit_s / windows.tick_s)
-        divide = _divide_bits(unit) if unit else 0
-        shift = _HELD_BITS + divide - bits[i]
-        found[i] = f"block_value(&newest, &before, INT64_C({unit}), {divide}, {shift})"
+        unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
+        unit = round(unit_s / windows.tick_s)
+        divide = _divide_bits(unit)
+        value = f"block_value(&newest, &before, INT64_C({unit}), {divide}, {_HELD_BITS + divide - bits[i]})"
+        if operator.unit_s is None:
+            whole = f"block_value(&newest, &before, 0, 0, {_HELD_BITS - bits[i]})"
+            value = f"known < INT64_C({operator.needed_ticks}) ? {value} : {whole}"
+        found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, operator) in enumerate(windows.of_method("slope")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
         divide = _divide_bits(unit)
         arguments = f"state, &SLOPE[{place}], &sums, bins, INT64_C({unit}), {divide}"
-        found[i] = f"slope_value({arguments}, {_HELD_BITS + divide - bits[i]})"
+        value = f"slope_value({arguments}, {_HELD_BITS + divide - bits[i]})"
+        found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("lag")):
@@ -201,8 +206,7 @@ def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     if plan.atoms[i].operator == "sign":
         band = round(DEAD_BAND * (1.0 + 1e-9) * 2.0 ** _operator_bits(windows, plan, scales)[place])
         value = f"direction({value}, INT64_C({band}), INT64_C({2**bits}))"
-    clipped = f"(int32_t)clipped({value}, INT32_MAX)"
-    return clipped if plan.atoms[i].operator == "lag" else f"full ? {clipped} : 0"
+    return f"(int32_t)clipped({value}, INT32_MAX)"
 
 
 def _columns(plan: Plan, scales: Scales) -> list[str]:

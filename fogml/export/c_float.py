@@ -136,7 +136,7 @@ def _atom(i: int, plan: Plan, windows: Layout, zero: str, number: Any) -> str:
     if operator < 0:
         return signal
     value = f"direction(value[{operator}])" if atom.operator == "sign" else f"value[{operator}]"
-    return value if atom.operator == "lag" else f"full ? {value} : {zero}"
+    return value
 
 
 def _signal(signal: Signal, plan: Plan, number: Any) -> str:
@@ -174,15 +174,19 @@ def input_units(plan: Plan) -> dict[str, str]:
 
 
 def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
-    """For each operator the expression of its value once it is full."""
+    """For each operator the expression of its value, from two samples on."""
     found: dict[int, str] = {}
     for i, operator in windows.of_method("block"):
-        unit = number(0.0 if operator.unit_s is None else operator.unit_s / windows.tick_s)
-        found[i] = f"block_value(&newest, &before, {unit})"
+        length = number(operator.window.length_s / windows.tick_s)
+        unit = f"known < INT64_C({operator.needed_ticks}) ? {length} : {number(0.0)}"
+        if operator.unit_s is not None:
+            unit = number(operator.unit_s / windows.tick_s)
+        found[i] = f"told_part(block_value(&newest, &before, {unit}), {operator.filling})"
     for place, (i, operator) in enumerate(windows.of_method("slope")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = number(unit_s / (windows.tick_s * operator.window_ticks))
-        found[i] = f"slope_value(state, &SLOPE[{place}], &sums, bins, {unit})"
+        value = f"slope_value(state, &SLOPE[{place}], &sums, bins, {unit})"
+        found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, operator) in enumerate(windows.of_method("exp")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"

@@ -15,12 +15,13 @@ from fogml import __version__
 from fogml.errors import InputError
 from fogml.escaping import CCode, c_text
 from fogml.export.c_fixed import fixed_context
-from fogml.export.c_float import float_context, input_units, sensor_identifier
-from fogml.export.layout import Layout, Number, layout
+from fogml.export.c_float import float_context, input_units, literal, sensor_identifier
+from fogml.export.layout import NOISE_TICKS, Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
 from fogml.features.bins import MOST_IN_BIN
 from fogml.runs.columns import is_temperature
+from fogml.signals.clock import LEAST_SHARE
 
 C_DTYPES = ("float64", "float32", "q31", "q15")
 """Number formats that C code computes in."""
@@ -111,7 +112,7 @@ def c_source(plan: Plan, dtype: str, card: Sequence[str], test: SelfTest | None 
     )
     numbers["card"] = list(card)
     test = test or make_self_test(plan, windows, dtype, numbers)
-    numbers["constants"] = [*_clock_constants(windows, plan.sample_s), *numbers["constants"]]
+    numbers["constants"] = [*_clock_constants(windows, plan.sample_s, dtype), *numbers["constants"]]
     told = "\n".join(map(str, (dtype, plan.names, windows, numbers["constants"])))
     numbers["model_id"] = int(sha256(told.encode()).hexdigest()[:8], 16)
     context = {**_shared(plan, windows), **numbers, "test": test.literals(dtype)}
@@ -159,6 +160,7 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
         "atoms": plan.atoms,
         "sample_s": repr(plan.sample_s),
         "spare": _spare(plan, windows),
+        "noise_ticks": NOISE_TICKS,
         "bin_ticks": round(windows.bin_samples * plan.sample_s / windows.tick_s),
         "sample_us": round(plan.sample_s * 1e6),
         "counted": COUNTED,
@@ -179,8 +181,8 @@ def _shared(plan: Plan, windows: Layout) -> dict[str, Any]:
     }
 
 
-def _clock_constants(windows: Layout, sample_s: float) -> list[str]:
-    """Lines of the clock's constants: longest gap, tick, where ticks begin, and length of bins."""
+def _clock_constants(windows: Layout, sample_s: float, dtype: str) -> list[str]:
+    """Lines of the clock's constants: longest gap, tick, where ticks begin, filling, and length of bins."""
     if not windows.operators:
         return []
     longest = round(windows.longest_gap_s * 1e6)
@@ -192,6 +194,12 @@ def _clock_constants(windows: Layout, sample_s: float) -> list[str]:
         f"#define FIRST_TICK INT64_C({(1 << 32) - needed // 2 - 1})",
         *([f"#define TICK_US INT64_C({windows.tick_us})"] if windows.tick_us > 1 else []),
     ]
+    if windows.ring:
+        cubed = LEAST_SHARE**3
+        share = literal(cubed, dtype) if dtype.startswith("float") else f"INT64_C({round(cubed * 2.0**30)})"
+        lines.append(
+            f"#define LEAST_CUBED {share} /* variance of a full window's rate to that of the rates */"
+        )
     if longest >= 1 << 31:
         lines += ["#ifdef FOGML_CLOCK_32", "#error a window spans more than a 32-bit clock tells", "#endif"]
     if windows.binned:

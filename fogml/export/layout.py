@@ -19,6 +19,7 @@ from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
     EXPONENTIAL_SPAN,
     GAP_INTERVALS,
+    LEAST_SHARE,
     check_window,
     longest_gap_s,
     needed_s,
@@ -34,7 +35,8 @@ TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
 RANGE_BITS = 9
 """Temperatures up to 2**9 degC either way are taken."""
 _SPAN_BITS = 30
-_NOISE_TICKS = 2
+NOISE_TICKS = 2
+"""Ticks by which an age falls short of a window's edge and leaves it all the same."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,8 @@ class Operator:
         Longest interval that does not restart it.
     window_ticks, both_ticks, needed_ticks
         Age at which a sample leaves the newest window, both windows; time until full.
+    counting_ticks, span_ticks
+        Time until what the window holds counts; what it reaches over.
     lag
         Whether it is a first-order lag, with the window's length as its time constant.
     """
@@ -67,7 +71,14 @@ class Operator:
     window_ticks: int
     both_ticks: int
     needed_ticks: int
+    counting_ticks: int
+    span_ticks: int
     lag: bool = False
+
+    @property
+    def filling(self) -> str:
+        """Arguments in C of how far its window is filled."""
+        return f"known, INT64_C({self.needed_ticks}), INT64_C({self.span_ticks})"
 
     @property
     def method(self) -> str:
@@ -228,7 +239,7 @@ def _tick_us(sample_s: float, longest_s: float) -> int:
     tick_us = 1
     while longest_s * 1e6 / tick_us >= 2.0**_SPAN_BITS:
         tick_us *= 10
-    if sample_s * 1e6 < 8.0 * _NOISE_TICKS * tick_us:
+    if sample_s * 1e6 < 8.0 * NOISE_TICKS * tick_us:
         raise InputError(
             f"export: samples every {sample_s:g} s with windows of {longest_s:g} s need a finer clock than C "
             "code has; use shorter windows, or [exp, ...]"
@@ -249,7 +260,7 @@ def _operator(
     needed = needed_s(span_s * window.length_s, sample_s)
 
     def ticks(seconds: float) -> int:
-        return max(1, round(seconds / tick_s) - _NOISE_TICKS)
+        return max(1, round(seconds / tick_s) - NOISE_TICKS)
 
     return Operator(
         window,
@@ -260,4 +271,6 @@ def _operator(
         ticks(window.length_s),
         ticks(2.0 * window.length_s),
         max(0, ticks(needed)) if needed > 0 else 0,
+        ticks(LEAST_SHARE * span_s * window.length_s),
+        round(span_s * window.length_s / tick_s),
     )

@@ -194,7 +194,7 @@ class Atom:
 
 def windowed_values(
     signal: FloatArray, clock: Clock, window: Window, unit_s: float | None, out: FloatArray | None = None
-) -> tuple[FloatArray, BoolArray]:
+) -> windows.Windowed:
     """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
     if window.method == "first":
         return windows.first_difference(clock, signal, unit_s=unit_s, out=out)
@@ -218,12 +218,14 @@ class AtomValues(NamedTuple):
     Attributes
     ----------
     values
-        Shape (n, a), column by column contiguous. Where `full` is False every windowed atom is 0, so
-        that of the composed features only the static part is left.
+        Shape (n, a), column by column contiguous. While a window fills its atoms begin at 0, what the
+        static part is of, and come near the rate as it tells more (`fogml.signals.windows`).
     full
-        Where all windows are full, shape (n,).
+        Where all windows hold enough to count, shape (n,): these are the rows that models are fitted to and
+        judged on.
     settled
-        Where all memories are settled, shape (n,): what was before the run no longer matters.
+        Where all windows are full and all memories settled, shape (n,): what was before the run no longer
+        matters.
     """
 
     values: FloatArray
@@ -250,8 +252,7 @@ def evaluate(
     sample_s
         Nominal sample interval [s]; the run's own if None.
     columns
-        Where the values go, an array (n,) per atom. Where a window is not full all windowed atoms
-        are 0.
+        Where the values go, an array (n,) per atom.
     memories
         Operators to go on with, and to leave for the next block; fresh ones if None.
     skip
@@ -308,20 +309,17 @@ def _evaluated(
             continue
         key = (atom.signal, atom.window)
         if atom.operator == "diff":
-            _, atom_full = windowed_values(signal, clock, atom.window, None, column)
-            full &= atom_full
+            _, atom_full, counts = windowed_values(signal, clock, atom.window, None, column)
+            full &= counts
+            settled &= atom_full
             continue
         if key not in rates:
             place = column if atom.operator == "d" else None
-            rates[key], atom_full = windowed_values(signal, clock, atom.window, RATE_UNIT_S, place)
-            full &= atom_full
+            rates[key], atom_full, counts = windowed_values(signal, clock, atom.window, RATE_UNIT_S, place)
+            full &= counts
+            settled &= atom_full
         if atom.operator == "sign":
             column[:] = direction(rates[key])
         elif rates[key] is not column:
             column[:] = rates[key]
-    if not full.all():
-        partial = np.flatnonzero(~full)
-        for atom, column in zip(atoms, columns):
-            if atom.window is not None:
-                column[partial] = 0.0
     return full, settled

@@ -57,8 +57,8 @@ class Box:
                 highs.append([column[full].max() for column in values.T])
         if not lows:
             raise InputError(
-                "features: no training row has a full window; give longer runs, or state shorter windows, "
-                "e.g. dT[block, 16 s]"
+                "features: no training run is as long as an eighth of a feature window; give longer runs, or "
+                "state shorter windows, e.g. dT[block, 16 s]"
             )
         return cls(np.min(lows, axis=0), np.max(highs, axis=0))
 

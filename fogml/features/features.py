@@ -131,7 +131,7 @@ class Features(Transformer):
         return max((atom.window.memory_s for atom in self._atoms if atom.window is not None), default=0.0)
 
     def fit(self, runs: Run | Sequence[Run], y: object = None) -> Self:
-        """Learn the box: each atom's lowest and highest value over the runs' rows with full windows.
+        """Learn the box: each atom's lowest and highest value over the runs' rows whose windows count.
 
         Parameters
         ----------

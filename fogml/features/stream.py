@@ -28,11 +28,11 @@ class StreamStep(NamedTuple):
     values
         Features, shape (k,).
     atoms
-        Atom values before any limit, shape (a,); windowed atoms are 0 where not full.
+        Atom values before any limit, shape (a,).
     full
-        Whether all windows are full.
+        Whether all windows hold enough to count.
     settled
-        Whether all memories are settled.
+        Whether all windows are full and all memories settled.
     outside
         Whether an atom is outside the learned box; False where none was learned.
     """
@@ -108,7 +108,7 @@ class FeatureStream:
         """Take one sample.
 
         One at which a temperature was not measured (`fogml.runs.dropouts`) is not taken in: what the last
-        measured sample gave is held, its windows not full.
+        measured sample gave is held, its windows not counting.
 
         Parameters
         ----------
@@ -143,8 +143,8 @@ class FeatureStream:
         steps = {
             key: operator.step(time_s, signal_values[key[0]]) for key, operator in self._operators.items()
         }
-        full = all(step[1] for step in steps.values())
-        settled = True
+        settled = all(step[1] for step in steps.values())
+        full = all(step[2] for step in steps.values())
         now = np.array([time_s])
         atoms = np.zeros((1, len(self._features.atoms)))
         for column, atom in enumerate(self._features.atoms):
@@ -156,7 +156,7 @@ class FeatureStream:
                 settled &= bool(is_settled[0])
             elif key is None:
                 atoms[0, column] = signal_values[atom.signal]
-            elif full:
+            else:
                 value = steps[key][0]
                 atoms[0, column] = direction(np.array(value)) if atom.operator == "sign" else value
         heeded, outside = atoms, np.array([False])

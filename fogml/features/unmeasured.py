@@ -28,7 +28,7 @@ def evaluate_measured(
     """As `evaluate` of atoms into `values` of shape (n, a), from the rows alone at which all was measured.
 
     To windows and memories the other rows are a gap. At those the values of the last measured row are held,
-    before the first one its own, and no window counts as full.
+    before the first one its own, and no window counts.
     """
     unmeasured = unmeasured_rows(atoms, run)
     if unmeasured is None:
@@ -49,8 +49,7 @@ def evaluate_measured(
 def heeded_rows(atoms: Sequence[Atom], values: FloatArray, full: BoolArray | None) -> list[BoolArray | None]:
     """For each atom the rows (n,) at which its value (n, a) means something; None where all do.
 
-    A windowed atom is 0 where its window is not full, save what is held of a full one while a thermometer
-    fails.
+    A windowed atom is 0 where its window holds nothing yet.
     """
     if full is None:
         return [None] * len(atoms)

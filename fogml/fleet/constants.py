@@ -7,13 +7,14 @@ that tells all of them, so a fleet's constants can be put together without its r
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
+from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
 from fogml.models.box import learn_box
 from fogml.models.coefficient_errors import told_by_rows
 from fogml.models.prior import Prior
@@ -29,7 +30,7 @@ _TOLERANCE = 1e-6
 _FREEDOM = 5.0
 # Degrees of freedom of the fleet's t distribution: odd units do not pull at the mean.
 _WORTH_UNITS = 2.0
-# Units' worth of belief that constants vary independently.
+# Units' worth of belief that constants vary independently, and that a covariate tells nothing of them.
 LEAST_UNITS = 3
 
 
@@ -52,6 +53,8 @@ class UnitConstants:
         Mean and standard deviation of the features, shape (k,).
     box
         Range of each of the features' atoms.
+    covariates
+        What is known of the unit's production.
     """
 
     features: str
@@ -61,10 +64,13 @@ class UnitConstants:
     shift: FloatArray
     scale: FloatArray
     box: dict[str, list[float]]
+    covariates: dict[str, str] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, runs: Sequence[Run], features: str = FORM) -> UnitConstants:
-        """The constants of a unit from its training runs.
+    def of(
+        cls, runs: Sequence[Run], features: str = FORM, covariates: Covariates | None = None
+    ) -> UnitConstants:
+        """The constants of a unit from its training runs, in any features, those with memory among them.
 
         Raises
         ------
@@ -82,7 +88,8 @@ class UnitConstants:
         told = told_by_rows(replace(table, X=columns / np.append(1.0, scale)))
         triangle = np.column_stack([told.columns * np.append(1.0, scale), told.target])
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
-        return cls(form.text, np.asarray(triangle), 1.0, len(table), table.X.mean(axis=0), scale, box)
+        known = dict(covariates or {})
+        return cls(form.text, np.asarray(triangle), 1.0, len(table), table.X.mean(axis=0), scale, box, known)
 
     def in_columns(self, shift: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Information and image of the rows in the columns ``[1, (x - shift) / scale]``."""
@@ -119,6 +126,9 @@ class UnitConstants:
                 precision=float(values["precision"]),
                 rows=int(values["rows"]),
                 box=dict(values["box"]),
+                covariates={
+                    str(name): str(value) for name, value in dict(values.get("covariates", {})).items()
+                },
                 **arrays,
             )
             shape = (found.triangle.ndim, found.triangle.shape[-1:], found.scale.shape)
@@ -140,18 +150,22 @@ class FleetConstants:
     features
         The form.
     prior
-        Distribution of the constants over units.
+        Distribution of the constants over units, whatever their covariates.
+    effects
+        How the constants go with covariates of production; of none where none are stated.
     values, errors
         Constant and coefficients of each unit in the prior's columns, drawn to the fleet where the
         unit's runs tell little, and their standard errors [deg/h], shapes (u, k + 1).
     distances
-        How far each unit lies from the fleet: Mahalanobis distance over the root of k + 1, shape (u,).
+        How far each unit lies from the fleet, or from what it says of units with such covariates: Mahalanobis
+        distance over the root of k + 1, shape (u,).
     box
         Range of each atom that half of the units cover.
     """
 
     features: str
     prior: Prior
+    effects: CovariateEffects
     values: FloatArray
     errors: FloatArray
     distances: FloatArray
@@ -168,7 +182,8 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
 
     Each unit's constants are drawn from a multivariate t distribution with the fleet's mean and
     covariance, and seen through its rows (N. Laird & J. Ware, Biometrics 38 (1982) 963; K. Lange,
-    R. Little & J. Taylor, J. Am. Stat. Assoc. 84 (1989) 881).
+    R. Little & J. Taylor, J. Am. Stat. Assoc. 84 (1989) 881). The mean is linear in the units' covariates,
+    whose slopes are drawn to 0 by two units' worth: few units, or many lots, tell little of them.
 
     Raises
     ------
@@ -183,29 +198,43 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
     scale = np.sqrt(np.mean([unit.scale**2 for unit in units], axis=0))
     seen = [unit.in_columns(shift, scale) for unit in units]
     width = len(shift) + 1
-    mean, covariance = _begin(seen, width)
+    columns = CovariateColumns.of([unit.covariates for unit in units])
+    rows = np.array([columns.row(unit.covariates)[0] for unit in units])
+    design = np.column_stack([np.ones(len(units)), rows])
+    draw = np.diag(np.append(0.0, np.full(rows.shape[1], _WORTH_UNITS)))
+    middle, covariance = _begin(seen, width)
+    centres = np.tile(middle, (len(units), 1))
     for _ in range(_ROUNDS):
-        means, spreads, distances = _each(seen, mean, covariance)
+        means, spreads, distances = _each(seen, centres, covariance)
         weights = (_FREEDOM + width) / (_FREEDOM + distances)
-        new_mean = weights @ means / weights.sum()
-        apart = means - new_mean
+        inverse = np.linalg.inv(design.T @ (weights[:, None] * design) + draw)
+        slopes = inverse @ design.T @ (weights[:, None] * means)
+        new_centres = design @ slopes
+        apart = means - new_centres
         scatter = np.einsum("u,ui,uj->ij", weights, apart, apart) + spreads.sum(axis=0)
         belief = np.diag(np.diag(scatter)) / len(units)
         new = (scatter + _WORTH_UNITS * belief) / (len(units) + _WORTH_UNITS)
         still = np.allclose(new, covariance, rtol=_TOLERANCE, atol=0.0) and np.allclose(
-            new_mean, mean, rtol=_TOLERANCE
+            new_centres, centres, rtol=_TOLERANCE
         )
-        mean, covariance = new_mean, new
+        centres, covariance = new_centres, new
         if still:
             break
-    means, spreads, distances = _each(seen, mean, covariance)
+    means, spreads, distances = _each(seen, centres, covariance)
     errors = np.sqrt(np.diagonal(spreads, axis1=1, axis2=2))
-    prior = Prior(mean, covariance / _of_normal(width), shift, scale, float(len(units)))
+    # What the covariates' slopes take of the units' freedom.
+    taken = float(np.einsum("ui,ij,uj,u->", design, inverse, design, weights)) - 1.0
+    left = max(len(units) - taken, 1.0)
+    covariance = covariance * (len(units) / left) / _of_normal(width)
+    within = Prior(slopes[0], covariance, shift, scale, left)
+    spread = np.atleast_2d(rows.T @ rows / len(units)) if rows.shape[1] else np.empty((0, 0))
+    effects = CovariateEffects(columns, slopes[1:], spread, inverse, within)
+    prior = effects.prior({})
     box = {
         name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
         for name in units[0].box
     }
-    return FleetConstants(units[0].features, prior, means, errors, np.sqrt(distances / width), box)
+    return FleetConstants(units[0].features, prior, effects, means, errors, np.sqrt(distances / width), box)
 
 
 def _of_normal(width: int) -> float:
@@ -234,12 +263,12 @@ def _begin(seen: Sequence[tuple[FloatArray, FloatArray]], width: int) -> tuple[F
 
 
 def _each(
-    seen: Sequence[tuple[FloatArray, FloatArray]], mean: FloatArray, covariance: FloatArray
+    seen: Sequence[tuple[FloatArray, FloatArray]], centres: FloatArray, covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Posterior mean and covariance of every unit, and its expected squared distance from the mean."""
+    """Posterior mean and covariance of every unit, and its expected squared distance from its centre."""
     inverse = np.linalg.inv(covariance)
     means, spreads, distances = [], [], []
-    for information, image in seen:
+    for (information, image), mean in zip(seen, centres, strict=True):
         spread = np.linalg.inv(information + inverse)
         own = spread @ (image + inverse @ mean)
         means.append(own)

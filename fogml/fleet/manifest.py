@@ -6,7 +6,7 @@ import csv
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,11 @@ MANIFEST_SCHEMA = "fogml.manifest/1"
 _LONGEST_FOLDER = 100
 """Characters of a unit's folder: names of files may have 255 bytes, and some stand beside it."""
 COLUMNS = ("unit", "job", "train", "test", "axis")
+COVARIATE = "covariate:"
+"""What the names of columns begin with that state a number or a label of a unit's production."""
 JOBS = ("train", "compare", "diagnose")
 SHIPPED = "shipped:"
+_COVARIATE_NAME = re.compile(COVARIATE + r"[A-Za-z0-9_ -]+")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
 
 
@@ -41,6 +44,8 @@ class Unit:
         Name of the unit's own folder, unlike every other's.
     fault
         What is wrong with the unit's runs: it fails with that, and the others go on.
+    covariates
+        What is known of its production, numbers or labels by name.
     """
 
     name: str
@@ -50,6 +55,7 @@ class Unit:
     axis: str
     folder: str
     fault: str = ""
+    covariates: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def label(self) -> str:
@@ -60,7 +66,8 @@ class Unit:
 def read_manifest(path: str | Path) -> list[Unit]:
     """The units of a manifest, in its order.
 
-    A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``.
+    A CSV file has the columns ``unit, job, train, test, axis``, lists of runs separated by ``;``. Columns
+    such as ``covariate:coil_lot`` state what is known of a unit's production; empty cells are not known.
     A YAML file is a list of mappings with these keys, or has them under ``units``. Runs are looked
     for from here, then from where the manifest lies.
 
@@ -117,10 +124,13 @@ def _yaml_rows(path: Path) -> list[tuple[str, Mapping[str, Any]]]:
 def _check_keys(keys: Iterable[str], place: str) -> None:
     keys = list(keys)
     for key in keys:
-        if key not in COLUMNS:
+        if key not in COLUMNS and not (key.startswith(COVARIATE) and _COVARIATE_NAME.fullmatch(key)):
             near = get_close_matches(key, COLUMNS, n=1)
             hint = f"did you mean '{near[0]}'? " if near else ""
-            raise InputError(f"{place}: unknown column {quoted(key)}; {hint}known are {', '.join(COLUMNS)}")
+            raise InputError(
+                f"{place}: unknown column {quoted(key)}; {hint}known are {', '.join(COLUMNS)}, and those of "
+                f"production such as {COVARIATE}coil_lot"
+            )
     for key in ("unit", "train"):
         if key not in keys:
             raise InputError(f"{place}: column '{key}' is missing; columns are {', '.join(COLUMNS)}")
@@ -148,7 +158,12 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
         raise InputError(f"{where}: column 'train' names no run")
     if not test and job != "diagnose":
         raise InputError(f"{where}: column 'test' names no run; '{job}' judges on at least one")
-    return Unit(name, job, train, test, axis, "", "; ".join(faults))
+    known = {
+        key.removeprefix(COVARIATE): text
+        for key in row
+        if key.startswith(COVARIATE) and (text := _text(row[key], f"{where}: column '{key}'"))
+    }
+    return Unit(name, job, train, test, axis, "", "; ".join(faults), known)
 
 
 def _text(value: Any, place: str) -> str:

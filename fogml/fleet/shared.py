@@ -9,6 +9,7 @@ from typing import Any, Self
 from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.fleet.constants import ROWS, FleetConstants
+from fogml.fleet.covariates import CovariateEffects, Covariates
 from fogml.models.feature_model import FeatureModel
 from fogml.models.linear import LinearRegressor
 from fogml.models.prior import Prior, PriorRegressor
@@ -115,13 +116,17 @@ class SharedModel(FeatureModel):
         return [atom.text for atom in self.features_.atoms if atom.operator == "value"]
 
 
-def shared_model(fleet: FleetConstants | Mapping[str, Any]) -> SharedModel:
+def shared_model(
+    fleet: FleetConstants | Mapping[str, Any], covariates: Covariates | None = None
+) -> SharedModel:
     """An unfitted model of a unit whose constants are drawn to its fleet's.
 
     Parameters
     ----------
     fleet
         The fleet's constants, or ``shared`` of a ``fleet.json``.
+    covariates
+        What is known of the unit's production; then it is drawn to units like it in that.
 
     Raises
     ------
@@ -129,7 +134,7 @@ def shared_model(fleet: FleetConstants | Mapping[str, Any]) -> SharedModel:
         If the values are no fleet's constants.
     """
     if isinstance(fleet, FleetConstants):
-        return SharedModel(fleet.features, fleet.prior.as_dict(), fleet.box)
+        return SharedModel(fleet.features, fleet.effects.prior(covariates or {}).as_dict(), fleet.box)
     try:
         features, prior, box = str(fleet["features"]), dict(fleet["prior"]), dict(fleet["box"])
         box = {str(name): [float(low), float(high)] for name, (low, high) in box.items()}
@@ -139,6 +144,8 @@ def shared_model(fleet: FleetConstants | Mapping[str, Any]) -> SharedModel:
         ) from None
     Prior.from_dict(prior)
     parse_features(features)
+    if "covariates" in fleet:
+        prior = CovariateEffects.from_dict(fleet["covariates"]).prior(covariates or {}).as_dict()
     return SharedModel(features, prior, box)
 
 

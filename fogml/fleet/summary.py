@@ -49,6 +49,8 @@ def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
         labels, found = constants
         values["constants"] = _constants_json(labels, found)
         values["shared"] = {"features": found.features, "prior": found.prior.as_dict(), "box": found.box}
+        if found.effects.columns.names:
+            values["shared"]["covariates"] = found.effects.as_dict()
     return values
 
 

@@ -105,6 +105,7 @@ class Task:
         files = [run_sources(path) for path in (*self.unit.train, *self.unit.test)]
         values = {
             "unit": [self.unit.name, self.unit.job, self.unit.axis, self.unit.fault],
+            "covariates": dict(self.unit.covariates),
             "runs": [len(self.unit.train), sources_stamp(file for of_run in files for file in of_run)],
             "settings": self.settings,
             "version": __version__,

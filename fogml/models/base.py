@@ -35,9 +35,11 @@ class Evaluation:
     drift
         What is to be subtracted from the output [deg/h], shape (n,).
     full
-        Whether every feature window was full; elsewhere the drift is the static part, shape (n,).
+        Whether every feature window held enough to count, shape (n,); before, the drift is little more than
+        the static part.
     settled
-        Whether every memory had settled, shape (n,); elsewhere the drift starts from what the run tells.
+        Whether every window was full and every memory settled, shape (n,); elsewhere the drift starts from
+        what the run tells.
     outside
         Whether the sample lies outside the trained box, shape (n,).
     measure
@@ -60,7 +62,7 @@ class Evaluation:
 
     @property
     def flag(self) -> NDArray[np.int8]:
-        """0 good, 1 outside what the model was trained on, 2 window not full or memory not settled; (n,)."""
+        """0 good, 1 outside what the model was trained on, 2 a window or memory not settled; (n,)."""
         flag = np.where(self.outside, np.int8(OUTSIDE), np.int8(GOOD))
         flag[~(self.full & self.settled)] = NOT_FULL
         return flag

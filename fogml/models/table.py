@@ -1,4 +1,4 @@
-"""Training rows: features and error of the gyro, of full windows, turntable transitions cut."""
+"""Training rows: features and error of the gyro, of windows that count, turntable transitions cut."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def training_table(runs: Sequence[Run], features: Features, max_rows: int | None
 def run_rows(run: Run, features: Features) -> RunRows:
     """The rows of a run that models are fitted to.
 
-    Left out are rows without full windows, rows about changes of the table's rate, and, where a
+    Left out are rows whose windows don't count yet, rows about changes of the table's rate, and, where a
     run both stands and turns, rows at which the table turns: the error there is mostly the scale
     factor's, 10 ppm of 10 deg/s being 0.36 deg/h, and a drift model does not know the rate.
     """
@@ -185,8 +185,8 @@ def row_count(rows: Sequence[RunRows]) -> int:
     count = sum(len(part.y) for part in rows)
     if count == 0:
         raise InputError(
-            "no training row has a full feature window; give longer runs, or state shorter windows in the "
-            "features, e.g. dT[block, 16 s]"
+            "no training row holds an eighth of a feature window; give longer runs, or state shorter windows "
+            "in the features, e.g. dT[block, 16 s]"
         )
     return count
 

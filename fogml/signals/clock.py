@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +12,7 @@ from fogml.errors import InputError
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+Number = TypeVar("Number", float, FloatArray)
 
 EDGE_TOLERANCE = 1e-6
 """Float noise forgiven at window edges, in sample intervals."""
@@ -19,7 +21,11 @@ GAP_INTERVALS = 3.0
 GAP_SHARE = 0.25
 """A gap longer than this share of the window restarts the operator."""
 EXPONENTIAL_SPAN = 3.0
-"""Time constants until an exponential window counts as full."""
+"""Time constants until an exponential window is full."""
+LEAST_SHARE = 0.125
+"""Share of its span from which on a window that fills counts. Rates are taken to be its inverse to the power
+of 1.5, 23 times, the noise of a full window; below that share the noise is larger than they are. Usual
+windows are better: one of 64 s on samples of 1 s in steps of 1/16 degC has 1/330 of 1 degC/min."""
 
 _CHUNK = 1 << 15
 _GRID_TOLERANCE = 2e-10
@@ -106,6 +112,25 @@ def longest_gap_s(window_s: float, sample_s: float) -> float:
 def needed_s(span_s: float, sample_s: float) -> float:
     """Time from a restart until a window of that span is full [s]: one sample interval less."""
     return span_s - sample_s * (1.0 + EDGE_TOLERANCE)
+
+
+def counting_s(span_s: float, sample_s: float) -> float:
+    """Time from a restart until what a window of that span holds counts [s], float noise forgiven."""
+    return LEAST_SHARE * span_s - EDGE_TOLERANCE * sample_s
+
+
+def told_share(share: Number, least: float) -> Number:
+    r"""What a window that holds a share s of its span tells of its rate: :math:`(1+q)g/(g+q)`.
+
+    The variance of a rate goes with one over the cube of the time that it is taken over, so
+    :math:`g = s^3` is that of the full window as a share of its own. With :math:`q` the full window's
+    variance over that of the rates, :math:`g/(g+q)` times what was measured is the expected rate given it:
+    put in its place, it does not pull at coefficients (regression calibration: Carroll, Ruppert, Stefanski &
+    Crainiceanu, Measurement Error in Nonlinear Models, 2006, ch. 4). It is 1 at a share of 1, and a half
+    at the share `least`, whose cube is q.
+    """
+    g, q = share**3, least**3
+    return (1.0 + q) * g / (g + q)
 
 
 def check_window(window_s: float, sample_s: float, intervals: int, what: str) -> None:

@@ -1,8 +1,9 @@
 """Compiled loops of the window operators, for times off a regular grid.
 
-Each fills `values` and `full`, which come in zeroed. `edge_s` is the noise forgiven at window edges,
-`needed_s` the time from a restart until the window is full, `gap_s` the longest interval that may be
-spanned, all in seconds; `fogml.signals.windows` tells the rules. They are arguments, not constants,
+Each fills `values`, `full` and `counts`, which come in zeroed. `span_s` is what a window reaches over,
+`edge_s` the noise forgiven at its edges, `needed_s` the time from a restart until it is full, `gap_s` the
+longest interval that may be spanned, all in seconds, and `least` the share of its span from which on a
+window that fills counts; `fogml.signals.windows` tells the rules. They are arguments, not constants,
 because compiled code is kept on disk and would not notice a change of another module.
 """
 
@@ -12,7 +13,7 @@ import math
 
 from numba import boolean, float64, types
 
-from fogml.signals.clock import BoolArray, FloatArray
+from fogml.signals.clock import BoolArray, FloatArray, told_share
 from fogml.signals.compiled import kernel
 
 # Declared read-only, the inputs take both the frozen columns of a run and ordinary arrays.
@@ -25,10 +26,14 @@ _KERNEL = types.void(
     float64,
     float64,
     float64,
+    float64,
+    float64,
     types.Array(float64, 1, "C"),
+    types.Array(boolean, 1, "C"),
     types.Array(boolean, 1, "C"),
 )
 _FEWEST_STEPS = 32
+told = kernel("float64(float64, float64)")(told_share)
 
 
 @kernel(_KERNEL)
@@ -36,14 +41,20 @@ def block_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
+    span_s: float,
     edge_s: float,
     needed_s: float,
     gap_s: float,
+    least: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
+    counts: BoolArray,
 ) -> None:
-    """Newest mean less the mean before; divided by their time distance where unit_s > 0."""
+    """Newest mean less the mean before; divided by their time distance where unit_s > 0.
+
+    While the windows fill, each is half of what is there, and a difference is the rate times their length.
+    """
     start = newest = before = afresh = 0
     time_0 = x_0 = 0.0
     newest_t = newest_x = before_t = before_x = 0.0
@@ -63,7 +74,15 @@ def block_kernel(
             afresh = i + max(i - before, _FEWEST_STEPS)
         newest_t += time[i] - time_0
         newest_x += x[i] - x_0
-        while time[i] - time[newest] >= window_s - edge_s:
+        known = time[i] - time[start]
+        half = window_s if known >= needed_s else 0.5 * known
+        while newest > before and time[i] - time[newest - 1] < half - edge_s:
+            newest -= 1
+            newest_t += time[newest] - time_0
+            newest_x += x[newest] - x_0
+            before_t -= time[newest] - time_0
+            before_x -= x[newest] - x_0
+        while time[i] - time[newest] >= half - edge_s and newest < i:
             newest_t -= time[newest] - time_0
             newest_x -= x[newest] - x_0
             before_t += time[newest] - time_0
@@ -73,13 +92,18 @@ def block_kernel(
             before_t -= time[before] - time_0
             before_x -= x[before] - x_0
             before += 1
-        if newest > before and time[i] - time[start] >= needed_s:
+        if newest > before:
             in_newest, in_before = i - newest + 1, newest - before
             difference = newest_x / in_newest - before_x / in_before
-            if unit_s > 0.0:
-                difference *= unit_s / (newest_t / in_newest - before_t / in_before)
-            values[i] = difference
-            full[i] = True
+            full[i] = known >= needed_s
+            if unit_s > 0.0 or not full[i]:
+                unit = unit_s if unit_s > 0.0 else window_s
+                difference *= unit / (newest_t / in_newest - before_t / in_before)
+            if full[i]:
+                values[i], counts[i] = difference, True
+            else:
+                share = known / span_s
+                values[i], counts[i] = told(share, least) * difference, known >= least * span_s - edge_s
 
 
 @kernel(_KERNEL)
@@ -87,12 +111,15 @@ def slope_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
+    span_s: float,
     edge_s: float,
     needed_s: float,
     gap_s: float,
+    least: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
+    counts: BoolArray,
 ) -> None:
     """Least-squares slope over the window, times unit_s."""
     start = oldest = afresh = 0
@@ -124,10 +151,16 @@ def slope_kernel(
             sum_tx -= t * v
             oldest += 1
         count = i - oldest + 1
-        if count > 1 and time[i] - time[start] >= needed_s:
+        if count > 1:
+            known = time[i] - time[start]
             mean_t = sum_t / count
-            values[i] = unit_s * (sum_tx - mean_t * sum_x) / (sum_tt - mean_t * sum_t)
-            full[i] = True
+            slope = unit_s * (sum_tx - mean_t * sum_x) / (sum_tt - mean_t * sum_t)
+            full[i] = known >= needed_s
+            if full[i]:
+                values[i], counts[i] = slope, True
+            else:
+                share = known / span_s
+                values[i], counts[i] = told(share, least) * slope, known >= least * span_s - edge_s
 
 
 @kernel(_KERNEL)
@@ -135,12 +168,15 @@ def exponential_kernel(
     time: FloatArray,
     x: FloatArray,
     window_s: float,
+    span_s: float,
     edge_s: float,
     needed_s: float,
     gap_s: float,
+    least: float,
     unit_s: float,
     values: FloatArray,
     full: BoolArray,
+    counts: BoolArray,
 ) -> None:
     """Exponentially remembered rate with time constant window_s, times unit_s."""
     start = 0
@@ -156,9 +192,9 @@ def exponential_kernel(
             last_interval = interval
             weight = -math.expm1(-interval / window_s)
         rate += weight * ((x[i] - x[i - 1]) / interval - rate)
-        if time[i] - time[start] >= needed_s:
-            values[i] = unit_s * rate
-            full[i] = True
+        known = time[i] - time[start]
+        values[i], full[i] = unit_s * rate, known >= needed_s
+        counts[i] = known >= least * span_s - edge_s
 
 
 __all__ = ["block_kernel", "exponential_kernel", "slope_kernel"]

@@ -1,6 +1,6 @@
 """The window operators sample by sample, in bounded memory.
 
-Each has ``step(time_s, x) -> (value, full)`` and gives what its namesake in
+Each has ``step(time_s, x) -> (value, full, counts)`` and gives what its namesake in
 `fogml.signals.windows` gives for the whole recording; the rules are told there.
 """
 
@@ -14,19 +14,24 @@ from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
     GAP_INTERVALS,
+    LEAST_SHARE,
     check_window,
+    counting_s,
     longest_gap_s,
     needed_s,
+    told_share,
 )
 
 _FEWEST_STEPS = 32
+Step = tuple[float, bool, bool]
+_NOTHING: Step = (0.0, False, False)
 
 
 class WindowStream(Protocol):
     """A window operator that is fed one sample at a time."""
 
-    def step(self, time_s: float, x: float) -> tuple[float, bool]:
-        """Value after this sample, and whether its window is full (else the value is 0)."""
+    def step(self, time_s: float, x: float) -> Step:
+        """Value after this sample, whether the window is full, and whether the value counts."""
         ...
 
 
@@ -38,6 +43,7 @@ class BlockDifferenceStream:
         self._window_s, self._unit_s = window_s, unit_s
         self._edge = EDGE_TOLERANCE * sample_s
         self._needed = needed_s(2.0 * window_s, sample_s)
+        self._counting = counting_s(2.0 * window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._restart(0.0)
@@ -57,8 +63,8 @@ class BlockDifferenceStream:
         self._before_x = sum((v - x for _, v in self._before), 0.0)
         self._steps_left = max(len(self._newest) + len(self._before), _FEWEST_STEPS)
 
-    def step(self, time_s: float, x: float) -> tuple[float, bool]:
-        """Value after this sample, and whether both windows are full."""
+    def step(self, time_s: float, x: float) -> Step:
+        """Value after this sample, whether the window is full, and whether the value counts."""
         if time_s - self._last > self._gap_s:
             self._restart(time_s)
         self._last = time_s
@@ -69,7 +75,17 @@ class BlockDifferenceStream:
         newest.append((time_s, x))
         self._newest_t += time_s - self._time_0
         self._newest_x += x - self._x_0
-        while time_s - newest[0][0] >= self._window_s - self._edge:
+        known = time_s - self._start
+        filling = known < self._needed
+        half = 0.5 * known if filling else self._window_s
+        while before and time_s - before[-1][0] < half - self._edge:
+            newest.appendleft(before.pop())
+            t, v = newest[0][0] - self._time_0, newest[0][1] - self._x_0
+            self._newest_t += t
+            self._newest_x += v
+            self._before_t -= t
+            self._before_x -= v
+        while len(newest) > 1 and time_s - newest[0][0] >= half - self._edge:
             t, v = newest.popleft()
             before.append((t, v))
             t, v = t - self._time_0, v - self._x_0
@@ -81,12 +97,13 @@ class BlockDifferenceStream:
             t, v = before.popleft()
             self._before_t -= t - self._time_0
             self._before_x -= v - self._x_0
-        if not before or time_s - self._start < self._needed:
-            return 0.0, False
+        if not before:
+            return _NOTHING
         difference = self._newest_x / len(newest) - self._before_x / len(before)
-        if self._unit_s is not None:
-            difference *= self._unit_s / (self._newest_t / len(newest) - self._before_t / len(before))
-        return difference, True
+        if self._unit_s is not None or filling:
+            unit_s = self._window_s if self._unit_s is None else self._unit_s
+            difference *= unit_s / (self._newest_t / len(newest) - self._before_t / len(before))
+        return _told(difference, known, self._needed, self._counting, 2.0 * self._window_s)
 
 
 class SlopeStream:
@@ -96,7 +113,7 @@ class SlopeStream:
         check_window(window_s, sample_s, 2, "a slope's window")
         self._window_s, self._unit_s = window_s, window_s if unit_s is None else unit_s
         self._edge = EDGE_TOLERANCE * sample_s
-        self._needed = needed_s(window_s, sample_s)
+        self._needed, self._counting = needed_s(window_s, sample_s), counting_s(window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._restart(0.0)
@@ -120,8 +137,8 @@ class SlopeStream:
         self._sum_x += sign * v
         self._sum_tx += sign * t * v
 
-    def step(self, time_s: float, x: float) -> tuple[float, bool]:
-        """Value after this sample, and whether the window is full."""
+    def step(self, time_s: float, x: float) -> Step:
+        """Value after this sample, whether the window is full, and whether the value counts."""
         if time_s - self._last > self._gap_s:
             self._restart(time_s)
         self._last = time_s
@@ -133,11 +150,12 @@ class SlopeStream:
         self._add(held[-1], 1.0)
         while time_s - held[0][0] >= self._window_s - self._edge:
             self._add(held.popleft(), -1.0)
-        if len(held) < 2 or time_s - self._start < self._needed:
-            return 0.0, False
+        if len(held) < 2:
+            return _NOTHING
         mean_t = self._sum_t / len(held)
         slope = (self._sum_tx - mean_t * self._sum_x) / (self._sum_tt - mean_t * self._sum_t)
-        return self._unit_s * slope, True
+        known = time_s - self._start
+        return _told(self._unit_s * slope, known, self._needed, self._counting, self._window_s)
 
 
 class ExponentialStream:
@@ -147,12 +165,13 @@ class ExponentialStream:
         check_window(window_s, sample_s, 1, "a time constant")
         self._window_s, self._unit_s = window_s, window_s if unit_s is None else unit_s
         self._needed = needed_s(EXPONENTIAL_SPAN * window_s, sample_s)
+        self._counting = counting_s(EXPONENTIAL_SPAN * window_s, sample_s)
         self._gap_s = longest_gap_s(window_s, sample_s)
         self._start = self._last = -math.inf
         self._x = self._rate = 0.0
 
-    def step(self, time_s: float, x: float) -> tuple[float, bool]:
-        """Value after this sample, and whether the window is full."""
+    def step(self, time_s: float, x: float) -> Step:
+        """Value after this sample, whether the window is full, and whether the value counts."""
         interval = time_s - self._last
         if interval > self._gap_s:
             self._start, self._rate = time_s, 0.0
@@ -160,9 +179,10 @@ class ExponentialStream:
             weight = -math.expm1(-interval / self._window_s)
             self._rate += weight * ((x - self._x) / interval - self._rate)
         self._last, self._x = time_s, x
-        if interval > self._gap_s or time_s - self._start < self._needed:
-            return 0.0, False
-        return self._unit_s * self._rate, True
+        if interval > self._gap_s:
+            return _NOTHING
+        known = time_s - self._start
+        return self._unit_s * self._rate, known >= self._needed, known >= self._counting
 
 
 class FirstDifferenceStream:
@@ -173,10 +193,17 @@ class FirstDifferenceStream:
         self._last = -math.inf
         self._x = 0.0
 
-    def step(self, time_s: float, x: float) -> tuple[float, bool]:
-        """Value after this sample, and whether there is one to compare with."""
+    def step(self, time_s: float, x: float) -> Step:
+        """Value after this sample, whether the window is full, and whether the value counts."""
         interval, difference = time_s - self._last, x - self._x
         self._last, self._x = time_s, x
         if interval > self._longest_s:
-            return 0.0, False
-        return difference if self._unit_s is None else difference * self._unit_s / interval, True
+            return _NOTHING
+        return difference if self._unit_s is None else difference * self._unit_s / interval, True, True
+
+
+def _told(value: float, known: float, needed: float, counting: float, span: float) -> Step:
+    """A value of a window that is full, or fills: what it tells there, and whether it counts."""
+    if known >= needed:
+        return value, True, True
+    return told_share(known / span, LEAST_SHARE) * value, False, known >= counting

@@ -1,7 +1,7 @@
 """Differences and rates over causal time windows, with true times and gaps.
 
 Every operator looks back from each sample, the newest sample included, and gives one value per
-sample and a mask of the samples whose window was full. Values are 0 where it was not.
+sample, and masks of the samples whose window was full and whose value counts.
 
 The rules, shared by all:
 
@@ -12,6 +12,9 @@ The rules, shared by all:
 - A window is full once the time since the start, or since the last restart, reaches its span less
   one sample interval: 2w for `block_difference`, w for `slope`, three time constants for
   `exponential`, one earlier sample for `first_difference`.
+- From the second sample on a window that is not full gives what is there: `block_difference` halves it,
+  `slope` draws its line through it, both times `told_share` of the share that is there; `exponential`
+  begins at rate 0. It counts from an eighth of its span on (`LEAST_SHARE`).
 
 Each operator gives a difference (``unit_s=None``, in the unit of x), or a rate per ``unit_s``
 seconds (60: per minute).
@@ -20,6 +23,7 @@ seconds (60: per minute).
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,15 +33,36 @@ from fogml.signals.clock import (
     EDGE_TOLERANCE,
     EXPONENTIAL_SPAN,
     GAP_INTERVALS,
+    LEAST_SHARE,
     BoolArray,
     Clock,
     FloatArray,
     check_window,
+    counting_s,
     longest_gap_s,
     needed_s,
+    told_share,
 )
 
 _CHUNK = 1 << 15
+
+
+class Windowed(NamedTuple):
+    """What a window operator gives at n samples.
+
+    Attributes
+    ----------
+    values
+        Differences or rates, shape (n,); 0 at the first sample, and after a gap.
+    full
+        Where the window is full, shape (n,).
+    counts
+        Where what the window holds counts, shape (n,).
+    """
+
+    values: FloatArray
+    full: BoolArray
+    counts: BoolArray
 
 
 def block_difference(
@@ -48,7 +73,7 @@ def block_difference(
     *,
     unit_s: float | None = None,
     out: FloatArray | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> Windowed:
     """Mean of the newest window less the mean of the window before it.
 
     The newest is (t - w, t], the one before is (t - 2w, t - w]. As a rate, the difference is
@@ -71,10 +96,7 @@ def block_difference(
 
     Returns
     -------
-    values : (n,) array
-        Differences or rates; 0 where the windows are not full.
-    full : (n,) bool array
-        Where both windows are full.
+    Windowed
 
     Raises
     ------
@@ -105,7 +127,7 @@ def slope(
     *,
     unit_s: float | None = None,
     out: FloatArray | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> Windowed:
     """Least-squares slope over the window (t - w, t].
 
     Parameters and results are those of `block_difference`. As a difference (``unit_s=None``) it
@@ -131,7 +153,7 @@ def exponential(
     *,
     unit_s: float | None = None,
     out: FloatArray | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> Windowed:
     r"""Rate with exponential memory: :math:`r(t) = (x - m)/\tau` with :math:`\dot m = (x - m)/\tau`.
 
     Parameters and results are those of `block_difference`; `window_s` is the time constant. As a
@@ -165,7 +187,7 @@ def first_difference(
     *,
     unit_s: float | None = None,
     out: FloatArray | None = None,
-) -> tuple[FloatArray, BoolArray]:
+) -> Windowed:
     """Each sample less the one before it, never across a gap.
 
     Parameters and results are those of `block_difference`; there is no window.
@@ -175,19 +197,19 @@ def first_difference(
     values, full = np.empty(n) if out is None else out, np.ones(n, dtype=np.bool_)
     values[:1], full[:1] = 0.0, False
     if n < 2:
-        return values, full
+        return Windowed(values, full, full)
     np.subtract(x[1:], x[:-1], out=values[1:])
     grid = clock.grid_s
     if grid is not None:
         if unit_s is not None:
             values *= unit_s / grid
-        return values, full
+        return Windowed(values, full, full)
     interval = np.diff(clock.time)
     np.less_equal(interval, GAP_INTERVALS * clock.sample_s, out=full[1:])
     if unit_s is not None:
         values[1:] *= unit_s / interval
     values[~full] = 0.0
-    return values, full
+    return Windowed(values, full, full)
 
 
 def _prepared(time: ArrayLike | Clock, x: ArrayLike, sample_s: float | None) -> tuple[Clock, FloatArray]:
@@ -206,15 +228,31 @@ def _run_kernel(
     span_s: float,
     unit_s: float,
     out: FloatArray | None,
-) -> tuple[FloatArray, BoolArray]:
-    """Values and full mask from a compiled operator whose window is full after `span_s`."""
-    values, full = np.zeros(len(x)) if out is None else out, np.zeros(len(x), dtype=np.bool_)
+) -> Windowed:
+    """What a compiled operator gives whose window is full after `span_s`."""
+    values = np.zeros(len(x)) if out is None else out
+    full, counts = np.zeros((2, len(x)), dtype=np.bool_)
     if out is not None:
         out[:] = 0.0
     sample_s = clock.sample_s
     rules = (EDGE_TOLERANCE * sample_s, needed_s(span_s, sample_s), longest_gap_s(window_s, sample_s))
-    kernel(clock.time, x, window_s, *rules, unit_s, values, full)
-    return values, full
+    kernel(clock.time, x, window_s, span_s, *rules, LEAST_SHARE, unit_s, values, full, counts)
+    return Windowed(values, full, counts)
+
+
+def _filling_on_grid(
+    x: FloatArray, grid_s: float, span_s: float, unit_s: float
+) -> tuple[FloatArray, BoolArray]:
+    """Block rates over the halves of what is there, at the first n samples, and where they count."""
+    known = np.arange(len(x))
+    newest = np.maximum((known + 1) // 2, 1)
+    sums = np.append(0.0, np.cumsum(x - x[:1]))
+    in_newest = sums[known + 1] - sums[known + 1 - newest]
+    before = np.maximum(known + 1 - newest, 1)
+    difference = in_newest / newest - (sums[known + 1] - in_newest) / before
+    share = known * (grid_s / span_s)
+    told = told_share(share, LEAST_SHARE) * difference * (unit_s / (0.5 * grid_s * (known + 1)))
+    return np.where(known > 0, told, 0.0), known * grid_s >= counting_s(span_s, grid_s)
 
 
 def _block_on_grid(
@@ -224,16 +262,19 @@ def _block_on_grid(
     window_s: float,
     unit_s: float | None,
     out: FloatArray | None,
-) -> tuple[FloatArray, BoolArray]:
+) -> Windowed:
     """Block differences by index arithmetic, chunk by chunk in the processor's cache."""
     n = len(x)
     edge = EDGE_TOLERANCE * sample_s
     newest = int(np.ceil((window_s - edge) / grid_s))
     both = int(np.ceil((2.0 * window_s - edge) / grid_s))
     before = both - newest
-    values, full = np.empty(n) if out is None else out, np.zeros(n, dtype=np.bool_)
-    values[: both - 1] = 0.0
-    full[both - 1 :] = True
+    values = np.empty(n) if out is None else out
+    full, counts = np.ones((2, n), dtype=np.bool_)
+    filling = slice(0, both - 1)
+    unit = window_s if unit_s is None else unit_s
+    values[filling], counts[filling] = _filling_on_grid(x[filling], grid_s, 2.0 * window_s, unit)
+    full[filling] = False
     # The two windows' mean times lie half of both counts apart.
     scale = 1.0 if unit_s is None else unit_s / (0.5 * both * grid_s)
     step = max(_CHUNK, 4 * both)
@@ -255,7 +296,7 @@ def _block_on_grid(
         earlier = _window_sums(near, before, scratch)[: len(block)]
         earlier *= scale / before
         block -= earlier
-    return values, full
+    return Windowed(values, full, counts)
 
 
 def _window_sums(x: FloatArray, count: int, scratch: FloatArray) -> FloatArray:

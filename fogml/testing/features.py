@@ -155,11 +155,12 @@ def _check_gap(features: Features, run: Run) -> None:
     half = len(run) // 2
     shift = features.window_s + 100.0 * run.sample_s
     time = np.concatenate([run.time[:half], run.time[half:] + shift])
-    values, full, _ = features.atom_values(run.with_columns(time=time), run.sample_s)
-    assert not full[half], "a window is full right after a gap longer than itself"
-    assert not full[0], "a window is full at the first sample"
-    assert full.any(), "no window ever becomes full"
-    assert not values[~full][:, windowed].any(), "a windowed atom is not 0 where its window is not full"
+    values, full, settled = features.atom_values(run.with_columns(time=time), run.sample_s)
+    assert not full[half], "a window counts right after a gap longer than itself"
+    assert not full[0], "a window counts at the first sample"
+    assert full.any(), "no window ever counts"
+    assert not (settled & ~full).any(), "a window is settled that does not count"
+    assert not values[[0, half]][:, windowed].any(), "a windowed atom does not begin at 0"
 
 
 def _check_box(features: Features, runs: Sequence[Run]) -> None:
@@ -177,8 +178,9 @@ def _check_box(features: Features, runs: Sequence[Run]) -> None:
     fitted.transform(test, limited=True)
     assert dict(fitted.box) == box, "a transform of another run changed the box"
     assert dict(fitted.fit([train]).box) == box, "a second fit finds another box"
-    limited, outside = fitted.limit(values, full)
-    assert np.array_equal(limited, values), "the limit changes values inside the box"
+    inside = values[full]
+    limited, outside = fitted.limit(inside)
+    assert np.array_equal(limited, inside), "the limit changes values inside the box"
     assert not outside.any(), "a training row counts as outside"
     span = np.where(high > low, high - low, 1.0)
     for bound, away in ((high, 1.0), (low, -1.0)):

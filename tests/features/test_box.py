@@ -18,16 +18,16 @@ def ramp(rate: float, start: float = 20.0, count: int = 600) -> Run:
     return Run.from_columns(time=time, gyro=np.zeros(count), T=start + rate * time / 60.0)
 
 
-def test_the_box_is_that_of_full_rows() -> None:
+def test_the_box_is_that_of_rows_that_count() -> None:
     up, down = ramp(1.0), ramp(-2.0)
     box = parse_features("T, dT, T*dT").fit([up, down]).box
     assert set(box) == {"T", "dT"}
-    # Row 127 is the first with a full window; neither the start's temperature nor its rate 0 count.
+    # Row 16 is the first that counts, with half of the rate; neither the start's temperature nor rate 0 do.
     assert box["T"] == pytest.approx((20.0 - 2.0 * 599 / 60.0, 20.0 + 599 / 60.0))
     assert box["dT"] == pytest.approx((-2.0, 1.0))
     only_up = parse_features("T, dT").fit(up).box
-    assert only_up["T"] == pytest.approx((20.0 + 127 / 60.0, 20.0 + 599 / 60.0))
-    assert only_up["dT"] == pytest.approx((1.0, 1.0))
+    assert only_up["T"] == pytest.approx((20.0 + 16 / 60.0, 20.0 + 599 / 60.0))
+    assert only_up["dT"] == pytest.approx((0.5, 1.0), abs=0.02)
 
 
 def test_a_fit_sees_only_the_training_runs() -> None:
@@ -41,9 +41,9 @@ def test_a_fit_sees_only_the_training_runs() -> None:
         assert dict(parse_features("T, dT").fit([train]).box) == before
 
 
-def test_a_fit_needs_a_full_window() -> None:
-    with pytest.raises(InputError, match="no training row has a full window"):
-        parse_features("dT").fit([ramp(1.0, count=100)])
+def test_a_fit_needs_a_window_that_counts() -> None:
+    with pytest.raises(InputError, match="an eighth of a feature window"):
+        parse_features("dT").fit([ramp(1.0, count=16)])
     with pytest.raises(InputError, match="fit them to training runs first"):
         parse_features("T").transform(ramp(1.0), limited=True)
     with pytest.raises(InputError, match="fit them to training runs first"):
@@ -84,12 +84,12 @@ def test_the_limit_is_the_identity_inside_and_levels_off_beyond(
     )
 
 
-def test_rows_without_a_full_window_keep_the_static_part() -> None:
+def test_rows_before_a_window_holds_anything_keep_the_static_part() -> None:
     features = parse_features("T, dT").fit([ramp(1.0)])
     test = ramp(1.0, start=100.0)
     values, full, _ = features.atom_values(test)
     limited, outside = features.limit(values, full)
-    assert not limited[~full, 1].any()
+    assert limited[0, 1] == 0.0 and limited[1:, 1].all()
     high, span = features.box["T"][1], features.box["T"][1] - features.box["T"][0]
     assert outside.all()
     assert (limited[:, 0] <= high + 0.05 * span).all()

@@ -79,7 +79,7 @@ def test_streaming_saving_and_c_tell_the_same(tmp_path):
     assert np.array_equal(load_model(tmp_path / "model").compensate(TEST).flag, flag)
     stream = model.stream(TEST.sample_s)
     steps = [stream.step(float(t), {"T": float(T)}) for t, T in zip(TEST.columns["time"], TEST.columns["T"])]
-    assert np.array_equal([2 if not s.full else int(s.outside) for s in steps], flag)
+    assert np.array_equal([int(s.outside) if s.full and s.settled else 2 for s in steps], flag)
 
 
 def test_slices_of_a_file_are_checked():

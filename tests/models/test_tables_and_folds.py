@@ -20,13 +20,13 @@ def run():
     return synthetic_run("a", 1.0)
 
 
-def test_rows_are_those_with_full_windows(run):
+def test_rows_are_those_whose_windows_count(run):
     features = parse_features(FEATURES)
     table = training_table([run], features)
     _, full, _ = features.atom_values(run)
     np.testing.assert_array_equal(table.X, features.transform(run)[full])
     np.testing.assert_array_equal(table.y, run.error_deg_h[full])
-    assert len(table) == len(run) - 127 and table.averaging_s == 0.0
+    assert len(table) == len(run) - 16 and table.averaging_s == 0.0
 
 
 def test_averages_are_means_of_composed_rows(run):
@@ -69,8 +69,8 @@ def test_run_that_always_turns_keeps_its_rows(run):
 
 
 def test_too_short_a_run_is_told(run):
-    with pytest.raises(InputError, match="full feature window"):
-        training_table([run[:100]], parse_features("T, dT"))
+    with pytest.raises(InputError, match="an eighth of a feature window"):
+        training_table([run[:16]], parse_features("T, dT"))
 
 
 def test_blocks_go_on_from_run_to_run(run):

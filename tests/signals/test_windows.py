@@ -37,8 +37,8 @@ def operate(
 def by_definition(  # type: ignore[no-untyped-def]
     method: str, time: FloatArray, x: FloatArray, window_s: float, sample_s: float, unit_s: float | None
 ):
-    """Each sample's value from the definition alone, over all earlier samples."""
-    values, full = np.zeros(len(x)), np.zeros(len(x), dtype=bool)
+    """Values from the definition alone, over all earlier samples; where full; where they count."""
+    values, (full, counts) = np.zeros(len(x)), np.zeros((2, len(x)), dtype=bool)
     edge = 1e-6 * sample_s
     span = {"block": 2.0, "slope": 1.0, "exp": 3.0, "first": 0.0}[method] * window_s
     longest = 3.0 * sample_s if method == "first" else max(window_s / 4.0, 3.0 * sample_s)
@@ -46,11 +46,14 @@ def by_definition(  # type: ignore[no-untyped-def]
     for i in range(len(x)):
         if i and time[i] - time[i - 1] > longest:
             start = i
-        if time[i] - time[start] < span - sample_s - edge or (method == "first" and i == start):
+        if i == start:
             continue
         t, v = time[start : i + 1], x[start : i + 1]
         age = time[i] - t
-        newest, before = age < window_s - edge, (age >= window_s - edge) & (age < 2.0 * window_s - edge)
+        filling = age[0] < span - sample_s - edge
+        part = 0.5 * age[0] if filling else window_s
+        newest, before = age < part - edge, (age >= part - edge) & (age < 2.0 * window_s - edge)
+        share = age[0] / span if filling else 1.0
         if method == "first":
             change, per = v[-1] - v[-2], t[-1] - t[-2]
         elif method == "block":
@@ -58,7 +61,9 @@ def by_definition(  # type: ignore[no-untyped-def]
                 continue
             change = math.fsum(v[newest]) / newest.sum() - math.fsum(v[before]) / before.sum()
             per = np.mean(age[before]) - np.mean(age[newest])
+            change *= window_s / per if filling and unit_s is None else 1.0
         elif method == "slope":
+            newest = age < window_s - edge
             if newest.sum() < 2:
                 continue
             t, v = t[newest] - t[newest].mean(), v[newest]
@@ -67,9 +72,12 @@ def by_definition(  # type: ignore[no-untyped-def]
             # Each past straight piece's slope, by the share of the exponential memory it covers.
             weight = np.exp(-age[1:] / window_s) - np.exp(-age[:-1] / window_s)
             change, per = window_s * np.sum(weight * np.diff(v) / np.diff(t)), window_s
-        values[i] = change if unit_s is None else change * unit_s / per
-        full[i] = True
-    return values, full
+        # Rates are 8**1.5 times a full window's noise; a part's goes with its length to the power of -1.5.
+        noise = (8.0 * share) ** -3.0
+        weight = (1.0 + 8.0**-3.0) / (1.0 + noise) if filling and method != "exp" else 1.0
+        values[i] = weight * (change if unit_s is None else change * unit_s / per)
+        full[i], counts[i] = not filling, age[0] >= 0.125 * span - edge
+    return values, full, counts
 
 
 @st.composite
@@ -101,9 +109,9 @@ def test_values_and_fullness_are_those_of_the_definition(
 ) -> None:
     time, x, sample_s = recording
     window_s = windows * sample_s
-    values, full = operate(method, time, x, window_s, sample_s, unit_s)
-    wanted, wanted_full = by_definition(method, time, x, window_s, sample_s, unit_s)
-    np.testing.assert_array_equal(full, wanted_full)
+    values, *masks = operate(method, time, x, window_s, sample_s, unit_s)
+    wanted, *wanted_masks = by_definition(method, time, x, window_s, sample_s, unit_s)
+    np.testing.assert_array_equal(masks, wanted_masks)
     size = 1.0 if unit_s is None else unit_s / sample_s
     np.testing.assert_allclose(values, wanted, rtol=1e-9, atol=1e-10 * size)
 
@@ -120,14 +128,14 @@ def test_streams_give_the_same_sample_by_sample(
 ) -> None:
     time, x, sample_s = recording
     window_s = windows * sample_s
-    values, full = operate(method, time, x, window_s, sample_s, unit_s)
+    values, *masks = operate(method, time, x, window_s, sample_s, unit_s)
     stream = (
         streams.FirstDifferenceStream(sample_s, unit_s)
         if method == "first"
         else STREAMS[method](window_s, sample_s, unit_s)
     )
     steps = [stream.step(t, v) for t, v in zip(time.tolist(), x.tolist())]
-    np.testing.assert_array_equal(full, [step[1] for step in steps])
+    np.testing.assert_array_equal(masks, np.transpose([step[1:] for step in steps]))
     size = 1.0 if unit_s is None else unit_s / sample_s
     np.testing.assert_allclose([step[0] for step in steps], values, rtol=1e-9, atol=1e-11 * size)
 
@@ -141,9 +149,9 @@ def test_no_value_depends_on_later_samples(
     cut = min(cut, len(x))
     changed = np.concatenate([x[:cut], 1000.0 - 3.0 * x[cut:]])
     later = np.concatenate([time[:cut], time[cut:] + 5.5 * sample_s])
-    values, full = operate(method, time, x, 8.0 * sample_s, sample_s, 60.0)
-    again, full_again = operate(method, later, changed, 8.0 * sample_s, sample_s, 60.0)
-    np.testing.assert_array_equal(full[:cut], full_again[:cut])
+    values, *masks = operate(method, time, x, 8.0 * sample_s, sample_s, 60.0)
+    again, *masks_again = operate(method, later, changed, 8.0 * sample_s, sample_s, 60.0)
+    np.testing.assert_array_equal(np.array(masks)[:, :cut], np.array(masks_again)[:, :cut])
     np.testing.assert_allclose(values[:cut], again[:cut], rtol=1e-9, atol=1e-10 / sample_s)
 
 
@@ -152,12 +160,12 @@ def test_no_value_depends_on_later_samples(
 def test_a_ramp_gives_its_rate(method: str, irregular: bool) -> None:
     rng = np.random.default_rng(3)
     time = np.cumsum(rng.uniform(0.5, 1.5, 3000)) if irregular else np.arange(3000.0)
-    values, full = operate(method, time, 25.0 + time / 60.0, 64.0, 1.0, 60.0)
+    values, full, _ = operate(method, time, 25.0 + time / 60.0, 64.0, 1.0, 60.0)
     assert full.sum() > 2500
     # An exponential memory has taken up all but e**-3 of the ramp when it first counts as full.
     settled = full & (time > 2000.0)
     np.testing.assert_allclose(values[settled], 1.0, rtol=1e-10)
-    difference, _ = operate(method, time, 25.0 + time / 60.0, 64.0, 1.0, None)
+    difference, *_ = operate(method, time, 25.0 + time / 60.0, 64.0, 1.0, None)
     if method != "first" and not irregular:
         np.testing.assert_allclose(difference[settled], 64.0 / 60.0, rtol=1e-10)
 
@@ -167,14 +175,15 @@ def test_exponential_is_the_recursive_filter() -> None:
     x = np.cumsum(rng.normal(size=5000))
     weight = -math.expm1(-0.5 / 20.0)
     filtered = lfilter([weight], [1.0, weight - 1.0], np.diff(x, prepend=x[0]) / 0.5)
-    values, full = exponential(0.5 * np.arange(5000), x, 20.0, 0.5, unit_s=1.0)
-    np.testing.assert_allclose(values[full], filtered[full], rtol=1e-10, atol=1e-12)
+    values, full, _ = exponential(0.5 * np.arange(5000), x, 20.0, 0.5, unit_s=1.0)
+    np.testing.assert_allclose(values, filtered, rtol=1e-10, atol=1e-12)
+    assert int(np.argmax(full)) == 119
 
 
 def test_block_is_the_difference_of_means_of_so_many_samples() -> None:
     x = np.random.default_rng(6).normal(size=500)
-    values, full = block_difference(np.arange(500.0), x, 64.0)
-    assert int(np.argmax(full)) == 127
+    values, full, counts = block_difference(np.arange(500.0), x, 64.0)
+    assert int(np.argmax(full)) == 127 and int(np.argmax(counts)) == 16
     for i in (127, 300, 499):
         wanted = x[i - 63 : i + 1].mean() - x[i - 127 : i - 63].mean()
         assert values[i] == pytest.approx(wanted, abs=1e-14)
@@ -186,18 +195,17 @@ def test_means_of_windows_of_any_count(window_s: float, given: bool) -> None:
     """Beyond one chunk; 2.5 s and the like make a newest window of a sample more than the one before."""
     x = 1e3 + np.random.default_rng(10).normal(size=70_000)
     out = np.full(len(x), np.nan) if given else None
-    values, full = block_difference(np.arange(70_000.0), x, window_s, out=out)
+    values, full, _ = block_difference(np.arange(70_000.0), x, window_s, out=out)
     assert values is out or not given
     newest, both = math.ceil(window_s), round(2.0 * window_s)
     means = [np.convolve(x, np.full(n, 1.0 / n), "valid") for n in (newest, both - newest)]
     np.testing.assert_array_equal(full, np.arange(len(x)) >= both - 1)
-    np.testing.assert_array_equal(values[~full], 0.0)
     wanted = means[0][both - newest :] - means[1][: len(x) - both + 1]
     np.testing.assert_allclose(values[full], wanted, atol=1e-11)
 
 
 def test_a_steady_signal_changes_by_nothing() -> None:
-    values, _ = block_difference(np.arange(50_000.0), np.full(50_000, 25.3), 63.5)
+    values, *_ = block_difference(np.arange(50_000.0), np.full(50_000, 25.3), 63.5)
     assert not values.any()
 
 
@@ -205,13 +213,13 @@ def test_a_steady_signal_changes_by_nothing() -> None:
 def test_float_noise_of_the_times_does_not_move_window_edges(sample_s: float) -> None:
     count, window_s = 2000, 40 * sample_s
     x = np.random.default_rng(7).normal(size=count)
-    wanted, wanted_full = block_difference(np.arange(float(count)), x, 40.0, 1.0)
+    wanted, wanted_full, _ = block_difference(np.arange(float(count)), x, 40.0, 1.0)
     for time in (
         sample_s * np.arange(count),
         np.cumsum(np.full(count, sample_s)),
         1e6 + sample_s * np.arange(count),
     ):
-        values, full = block_difference(time, x, window_s, sample_s)
+        values, full, _ = block_difference(time, x, window_s, sample_s)
         np.testing.assert_array_equal(full, wanted_full)
         np.testing.assert_allclose(values, wanted, atol=1e-12)
 
@@ -225,11 +233,11 @@ def test_running_sums_stay_exact_over_a_long_recording(method: str) -> None:
     x[0] = -40.0
     for jitter in (0.0, 1e-3):
         time = 1e6 + sample_s * np.arange(count) + jitter * sample_s * rng.uniform(-1.0, 1.0, count)
-        values, full = operate(method, time, x, window_s, sample_s, None)
+        values, full, _ = operate(method, time, x, window_s, sample_s, None)
         assert full[200:].all()
         for i in rng.integers(1000, count, 200):
             piece = slice(i - 199, i + 1)
-            wanted, _ = by_definition(method, time[piece] - time[i], x[piece], window_s, sample_s, None)
+            wanted, *_ = by_definition(method, time[piece] - time[i], x[piece], window_s, sample_s, None)
             assert values[i] == pytest.approx(wanted[-1], abs=1e-9)
 
 
@@ -240,7 +248,7 @@ def test_streams_stay_exact_over_a_long_recording() -> None:
     for method, make in STREAMS.items():
         stream = make(8.0, 0.1, None)
         last = [stream.step(t, v)[0] for t, v in zip((0.1 * np.arange(count)).tolist(), x.tolist())]
-        wanted, _ = operate(method, 0.1 * np.arange(5000), x[-5000:], 8.0, 0.1, None)
+        wanted, *_ = operate(method, 0.1 * np.arange(5000), x[-5000:], 8.0, 0.1, None)
         assert last[-1] == pytest.approx(wanted[-1], abs=1e-9)
 
 
@@ -249,7 +257,7 @@ def test_gaps_restart_only_beyond_a_quarter_of_the_window() -> None:
     x = np.sin(time / 50.0)
     for gap, spanned in ((15.0, True), (17.0, False)):
         shifted = time + np.where(time >= 500, gap - 1.0, 0.0)
-        _, full = block_difference(shifted, x, 64.0, 1.0)
+        _, full, _ = block_difference(shifted, x, 64.0, 1.0)
         assert full[499]
         assert full[500] == spanned
         assert full[500 + 127]
@@ -257,7 +265,7 @@ def test_gaps_restart_only_beyond_a_quarter_of_the_window() -> None:
 
 
 def test_first_difference_never_crosses_a_gap() -> None:
-    values, full = first_difference([0.0, 1.0, 5.0, 6.0], [0.0, 1.0, 9.0, 10.0], 1.0)
+    values, full, _ = first_difference([0.0, 1.0, 5.0, 6.0], [0.0, 1.0, 9.0, 10.0], 1.0)
     assert full.tolist() == [False, True, False, True]
     assert values.tolist() == [0.0, 1.0, 0.0, 1.0]
 
@@ -281,7 +289,7 @@ def test_lengths_must_agree() -> None:
 @pytest.mark.parametrize("method", ["block", "slope", "exp", "first"])
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_the_shortest_recordings_have_no_full_window(method: str, count: int) -> None:
-    values, full = operate(method, np.arange(float(count)), np.ones(count), 5.0, 1.0, 60.0)
+    values, full, _ = operate(method, np.arange(float(count)), np.ones(count), 5.0, 1.0, 60.0)
     assert values.shape == full.shape == (count,)
     assert full.sum() == (method == "first" and count == 2)
 
@@ -312,3 +320,31 @@ def test_streams_hold_no_more_than_their_windows() -> None:
         line.step(0.1 * i, float(i % 7))
         assert len(block._newest) + len(block._before) <= 100
         assert len(line._held) <= 50
+
+
+@pytest.mark.parametrize("method", ["block", "slope"])
+def test_what_a_filling_window_tells_is_the_best_guess_of_the_rate(method: str) -> None:
+    """Rates of 23 times a full window's noise: their least squares on the values has slope 1 at any share."""
+    rng = np.random.default_rng(12)
+    time, runs, window_s = np.arange(130.0), 3000, 64.0
+    # A mean of 64 less the one before, over 64 s; a line through 64 samples of 1 s.
+    noise = 60.0 * (math.sqrt(2.0 / 64.0) / 64.0 if method == "block" else math.sqrt(12.0 / 64.0**3))
+    rates = 8.0**1.5 * noise * rng.normal(size=runs)
+    values = np.empty((runs, len(time)))
+    for i, rate in enumerate(rates):
+        x = rate * time / 60.0 + rng.normal(size=len(time))
+        values[i] = operate(method, time, x, window_s, 1.0, 60.0)[0]
+    for part in (0.125, 0.25, 0.5, 1.0):
+        value = values[:, min(round(part * (128 if method == "block" else 64)), 127)]
+        slope_of = float(rates @ value / (value @ value))
+        # Few samples tell a line worse than the cube of their number says.
+        assert slope_of == pytest.approx(1.0, abs=0.05 if part > 0.2 else 0.2), part
+
+
+def test_a_ramp_that_goes_on_at_the_start_is_told_nearly_whole_at_half_a_window() -> None:
+    time = np.arange(200.0)
+    for operator in (block_difference, slope):
+        values, full, counts = operator(time, 50.0 - 0.1 * time, 64.0, unit_s=60.0)
+        span = int(np.argmax(full)) + 1
+        assert values[span // 2] == pytest.approx(-6.0 * (1.0 + 8.0**-3) / (1.0 + 4.0**-3), rel=1e-9)
+        assert np.argmax(counts) == span // 8
