@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from experiments.results import write_results
-from experiments.thermal_cycle.recurrent import Recurrent
+from experiments.thermal_cycle.recurrent import Convolutional, Recurrent
 from fogml import __version__
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -41,9 +41,11 @@ MODELS = {
     "support vectors": (MACHINE, "T, dT"),
     "kernel ridge": (KERNEL_RIDGE, "T, dT"),
     "GRU, 404 bytes": ("recurrent", None),
+    "TCN, 340 bytes": ("convolutional", None),
     "mixed effects": ("mixed-effects", None),
     "auto": ("auto", None),
 }
+NETWORKS = {"recurrent": Recurrent, "convolutional": Convolutional}
 SINGLE = [((first,), second) for first, second in permutations(LEGS, 2)]
 PAIRS = [(("1", "2"), "3"), (("1", "3"), "2"), (("2", "3"), "1")]
 AXES = "xyz"
@@ -77,7 +79,7 @@ def pairing(
     """One entry for each model on one pairing of legs."""
     averaging_s = ROWS_PER_AVERAGE * test_run.sample_s
     makers = {
-        label: Recurrent if name == "recurrent" else partial(make_model, name, features)
+        label: NETWORKS[name] if name in NETWORKS else partial(make_model, name, features)
         for label, (name, features) in MODELS.items()
         if label in models or label == WINDOWED
     }

@@ -1,4 +1,4 @@
-"""A recurrent network of 101 numbers, 404 bytes in float32, as a drift model to compare with."""
+"""Networks over sequences of at most 500 bytes in float32, as drift models to compare with."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from experiments.benchmarks.gru import GRULearner
+from experiments.benchmarks.gru import GRULearner, TCNLearner
 from fogml.features.atoms import AtomValues
 from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel, Evaluation
@@ -19,16 +19,19 @@ from fogml.models.intervals import intervals_from_residuals
 from fogml.models.table import run_rows, table_of_rows
 from fogml.runs.run import Run
 
-HIDDEN = 4
 ROWS = 800
-"""Averages that it is fitted to."""
+"""Averages that they are fitted to."""
 
 
 class Recurrent(DriftModel):
-    """A GRU of four units over T and its rate; its interval is that of the training residuals."""
+    """A GRU of four units over T and its rate, 101 numbers; its interval is of the training residuals."""
 
     form: ClassVar[str] = "recurrent"
     kind: str = "recurrent"
+
+    def learner(self) -> GRULearner:
+        """What is trained."""
+        return GRULearner(4, epochs=120)
 
     def fit(self, runs: Run | Sequence[Run]) -> Self:
         """Fit to training runs."""
@@ -38,7 +41,7 @@ class Recurrent(DriftModel):
         rows = [run_rows(run, self.features_) for run in group]
         learn_box(self.features_, [part.atoms for part in rows])
         table = table_of_rows(rows, self.features_.compose, ROWS)
-        self.learner_ = GRULearner(HIDDEN, epochs=120)
+        self.learner_ = self.learner()
         every = np.arange(len(table))
         self.learner_.fit(table, every)
         residuals = table.y - self.learner_.at_rows(table, every)
@@ -47,7 +50,7 @@ class Recurrent(DriftModel):
         return self
 
     def evaluate_atoms(self, run: Run, atoms: AtomValues) -> Evaluation:
-        """Drift, the state running from the first full window on."""
+        """Drift, the state running from the first window that counts on."""
         values, full, settled = atoms
         assert self.features_ is not None
         limited, outside = self.features_.limit(values, full)
@@ -72,3 +75,14 @@ class Recurrent(DriftModel):
     def from_saved(cls, values: dict[str, Any], arrays: dict[str, Any], card: TrainingCard) -> DriftModel:
         """It is there to compare with alone."""
         raise NotImplementedError("a model to compare with is not saved")
+
+
+class Convolutional(Recurrent):
+    """As `Recurrent`, of three layers of three channels, 85 numbers."""
+
+    form: ClassVar[str] = "convolutional"
+    kind: str = "convolutional"
+
+    def learner(self) -> TCNLearner:
+        """What is trained."""
+        return TCNLearner(3, epochs=120)

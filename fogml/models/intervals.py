@@ -132,22 +132,29 @@ def intervals_from_residuals(residuals: ArrayLike, averaging_s: float, folds: st
 
 
 def half_widths_of_runs(lefts: Sequence[FloatArray]) -> FloatArray:
-    r"""Half-widths at `LEVELS` [deg/h] from sizes of what is left on each of K runs left out.
+    r"""Half-widths at `LEVELS` [deg/h] from what is left on each of K runs left out.
 
-    What is left on a run is mostly shifted as a whole, so K runs are K observations. At a level
+    A run is shifted as a whole, so K runs are K observations. At a level
     :math:`p \le K/(K+1)` the half-width is conformal: the quantile of what is left where each run holds the
     share 1/(K + 1) and the rest lies at infinity (hierarchical conformal prediction: Lee, Barber & Willett,
     "Distribution-free inference with hierarchical data", 2023). Above, it is Student's quantile with K
-    degrees of freedom times the rms of the runs.
+    degrees of freedom times the rms of the runs' means, and the normal one, as of many observations, times
+    what is left about them, in quadrature.
     """
+    from scipy.stats import norm
     from scipy.stats import t as student
 
     count, levels = len(lefts), np.array(LEVELS)
-    rms = float(np.sqrt(np.mean([np.mean(left**2) for left in lefts])))
-    conformal = quantiles_of_parts(lefts, np.minimum(levels * (count + 1) / count, 1.0))
-    normal = rms * student.ppf(0.5 + levels / 2.0, count)
+    shift = np.sqrt(np.mean([np.mean(left) ** 2 for left in lefts]))
+    about = np.sqrt(np.mean([np.var(left) for left in lefts]))
+    conformal = quantiles_of_parts(
+        [np.abs(left) for left in lefts], np.minimum(levels * (count + 1) / count, 1.0)
+    )
+    place = 0.5 + levels / 2.0
+    normal = np.hypot(shift * student.ppf(place, count), about * norm.ppf(place))
     half = np.where(levels <= count / (count + 1), conformal, normal)
-    return np.asarray(np.maximum.accumulate(half))
+    # No level is wider than one above it.
+    return np.asarray(np.minimum.accumulate(half[::-1])[::-1])
 
 
 def quantiles_of_parts(lefts: Sequence[FloatArray], levels: FloatArray) -> FloatArray:

@@ -59,6 +59,6 @@ def out_of_fold_intervals(
         folds, name = time_folds(table), "time blocks"
     residuals = [table.y[held] - predicted(table.take(fitted), table.take(held)) for fitted, held in folds]
     if name == WHOLE_RUNS:
-        half = half_widths_of_runs([np.abs(left) for left in residuals])
+        half = half_widths_of_runs(residuals)
         return Intervals(table.averaging_s, tuple(half.tolist()), len(table), name)
     return intervals_from_residuals(np.concatenate(residuals), table.averaging_s, name)

@@ -120,7 +120,7 @@ def intervals_of(
     runs = [part for part in parts if part.kind == "runs"]
     kinds = ["runs"] if runs else list(dict.fromkeys(part.kind for part in parts))
     if runs:
-        half = half_widths_of_runs([np.abs(part.told - part.predicted @ weights) for part in runs])
+        half = half_widths_of_runs([part.told - part.predicted @ weights for part in runs])
     else:
         widest = [quantiles_of_parts(_lefts(parts, weights, kind), np.array(LEVELS)) for kind in kinds]
         half = UNSEEN_SHIFT * np.max([np.zeros(len(LEVELS)), *widest], axis=0)

@@ -38,9 +38,12 @@ def fleet(units):
 
 
 def error(model, seed: int, constants: np.ndarray) -> float:
-    """Rms left by a model fitted to a run of an hour and a half, on a whole cycle of another phase."""
+    """Rms error of a model of a noisy run of an hour and a half, against the truth of a whole cycle."""
     short, other = unit_run(seed, constants, hours=1.5), unit_run(seed + 1, constants, phase=2.0)
-    return float(np.sqrt(np.mean((model.fit(short).predict(other) - other.gyro) ** 2)))
+    short = short.with_columns(gyro=short.gyro + 2.0 * np.random.default_rng(seed).normal(size=len(short)))
+    u, rate = other.columns["T"] - 20.0, 60.0 * np.gradient(other.columns["T"], other.time)
+    truth = np.column_stack([np.ones(len(u)), u, u**2, rate]) @ constants
+    return float(np.sqrt(np.mean((model.fit(short).predict(other) - truth) ** 2)))
 
 
 def test_a_prior_helps_and_a_covariate_that_explains_half_of_the_spread_helps_further(fleet):
