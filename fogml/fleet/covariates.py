@@ -16,7 +16,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.models.prior import Prior
-from fogml.runs.run import FloatArray
+from fogml.runs.run import BoolArray, FloatArray
 from fogml.strict import Strict, strictly
 
 Covariates = Mapping[str, str]
@@ -55,7 +55,7 @@ class CovariateColumns:
         centre, scale = np.nanmean(rows, axis=0), np.nanstd(rows, axis=0)
         return cls(raw.names, centre, np.where(["=" in name for name in names], 1.0, scale))
 
-    def row(self, unit: Covariates) -> tuple[FloatArray, FloatArray]:
+    def row(self, unit: Covariates) -> tuple[FloatArray, BoolArray]:
         """A unit's columns, 0 where nothing is known, and where something is; shapes (c,)."""
         values, known = np.zeros(len(self.names)), np.zeros(len(self.names), dtype=np.bool_)
         for i, column in enumerate(self.names):

@@ -250,7 +250,7 @@ def _filling_on_grid(
     in_newest = sums[known + 1] - sums[known + 1 - newest]
     before = np.maximum(known + 1 - newest, 1)
     difference = in_newest / newest - (sums[known + 1] - in_newest) / before
-    share = known * (grid_s / span_s)
+    share = np.multiply(known, grid_s / span_s, dtype=np.float64)
     told = told_share(share, LEAST_SHARE) * difference * (unit_s / (0.5 * grid_s * (known + 1)))
     return np.where(known > 0, told, 0.0), known * grid_s >= counting_s(span_s, grid_s)
 

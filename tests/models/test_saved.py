@@ -58,7 +58,7 @@ def test_file_states_what_the_model_is(folder, train):
     assert card["fogml_version"] == fogml.__version__
     assert set(card["box"]) == {"T", "dT"}
     low, high = card["box"]["T"]
-    assert low == train.temperature()[127:].min() and high == train.temperature()[127:].max()
+    assert low == train.temperature()[16:].min() and high == train.temperature()[16:].max()
 
 
 def test_same_fit_gives_the_same_bytes(train, folder, tmp_path):
