@@ -1,1 +1,1 @@
-"""The diagnosis on families beside the present one, on the same blind cases."""
+"""The diagnosis on development cases, and the record of the one before it."""

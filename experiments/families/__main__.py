@@ -1,8 +1,8 @@
-"""The diagnosis on families beside the present one: every wanted figure, on the cases that both answered.
+"""The diagnosis on development cases: every wanted figure, by reality.
 
 ``python -m experiments.families DIR...`` reads the suites in the folders, made by ``fogml blind make`` and
 answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``, and the rates that pages of
-diagnoses tell. Of a suite that one method alone has answered, that method alone stands in the table.
+diagnoses tell. ``record.md`` holds the figures of the diagnosis before this one on some of these cases.
 
 With ``--calibrate`` it prints the trust and the doubt of `fogml.gap.families.priors.Priors` that what is
 listed asks for: the one monotone map between evidence and probability, fitted by likelihood.
@@ -33,9 +33,6 @@ from fogml.report.error_rates import ERROR_RATES, error_rates
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
-FAMILIES = "families"
-"""Answers by families that stand beside others."""
-METHODS = (DIAGNOSIS, FAMILIES)
 LAPSES = 0.04
 """Share of names that are right or false whatever the odds are."""
 
@@ -44,39 +41,38 @@ def main() -> None:
     """Score both methods and write the page."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("suites", type=Path, nargs="+", help="folders of blind suites")
+    parser.add_argument("--answers", default=DIAGNOSIS, help="name of the answers (diagnosis)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
     parser.add_argument("--calibrate", action="store_true", help="print trust and doubt; no page")
     given = parser.parse_args()
     suites = [BlindFolder(path) for path in given.suites]
-    alone = {m: [x for s in suites for x in answered_marks(s, m, given.workers)] for m in METHODS}
-    answered = {m: {_case(x) for x in marks} for m, marks in alone.items()}
-    shared = answered[DIAGNOSIS] & answered[FAMILIES]
-    both = {m: [x for x in marks if _case(x) in shared] for m, marks in alone.items()}
-    seeds = {x.truth.seed for marks in alone.values() for x in marks}
+    marks = [x for s in suites for x in answered_marks(s, given.answers, given.workers)]
+    seeds = sorted({x.truth.seed for x in marks})
     if given.calibrate:
-        trust, doubt, count = fitted_map(names_of(suites))
-        print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {sorted(seeds)}")
+        trust, doubt, count = fitted_map(names_of(suites, given.answers))
+        print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {seeds}")
         return
-    values: dict[str, Any] = {"seeds": sorted(seeds)}
-    values["same_twin"] = list(same_twin(alone[FAMILIES]))
-    alone, both = ({m: _drawn(marks) for m, marks in held.items()} for held in (alone, both))
-    values["shared"] = {m: by_reality(both[m]) for m in METHODS if both[m]}
-    values["cases"] = {m: len(alone[m]) for m in METHODS} | {"shared": len(both[FAMILIES])}
-    values["families"] = by_reality(alone[FAMILIES])
-    values["fit_runs"] = {"shared": _fit_runs(both[FAMILIES]), FAMILIES: _fit_runs(alone[FAMILIES])}
+    drawn = [x for x in marks if x.truth.reality != SAME_TWIN]
+    counts = Counter(x.truth.reality for x in drawn)
+    values: dict[str, Any] = {
+        "seeds": seeds,
+        "cases": dict(sorted(counts.items())),
+        "fit_runs": _fit_runs(drawn),
+        "by_reality": by_reality(drawn),
+        "same_twin": list(same_twin(marks)),
+    }
     write_results(HERE, values, page(values))
-    counts = Counter(x.truth.reality for x in alone[FAMILIES])
-    rates = error_rates(values["families"][ALL], dict(sorted(counts.items())), values["seeds"], final=False)
+    rates = error_rates(values["by_reality"][ALL], values["cases"], seeds, final=False)
     with whole_file(ERROR_RATES) as partial:
         partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
 
 
-def names_of(suites: Sequence[BlindFolder]) -> list[tuple[float, float, bool]]:
+def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, float, bool]]:
     """Of each cause that is listed its log odds against something unknown and among known ones; if right."""
     found = []
     for suite in suites:
-        for mark in answered_marks(suite, FAMILIES):
-            path = suite.answers(FAMILIES) / mark.truth.case / "gap.json"
+        for mark in answered_marks(suite, answers):
+            path = suite.answers(answers) / mark.truth.case / "gap.json"
             told = read_json(path) if path.is_file() else {"which": [], "suspected": []}
             odds = {w["effect"]: w["log_odds"] for w in (*told["which"], *told["suspected"])}
             for item in (*mark.items, *mark.suspected):
@@ -106,10 +102,6 @@ def fitted_map(names: Sequence[tuple[float, float, bool]]) -> tuple[float, float
     return float(np.exp(found[0])), float(found[1]), len(right)
 
 
-def _drawn(marks: Sequence[Mark]) -> list[Mark]:
-    return [x for x in marks if x.truth.reality != SAME_TWIN]
-
-
 def _fit_runs(marks: Sequence[Mark]) -> dict[str, int]:
     """How many cases have so many fit runs."""
     counts = Counter(len(x.truth.runs.fit) for x in marks)
@@ -120,41 +112,27 @@ def _runs_told(counts: Mapping[str, int]) -> str:
     return "Fit runs: " + ", ".join(f"{n} in {plural(count, 'case')}" for n, count in counts.items()) + "."
 
 
-def _case(mark: Mark) -> tuple[Any, ...]:
-    truth = mark.truth
-    return truth.reality, truth.seed, truth.sample_s, truth.kind, truth.d_prime, truth.case
-
-
 def page(values: Mapping[str, Any]) -> str:
     """``results.md`` of what ``results.json`` holds."""
-    lines = [
-        "# Families beside the present diagnosis",
-        "",
-        f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no final "
-        "figures, and families were widened with failures among these cases in view. Each figure with its "
-        "95 % interval (Wilson's for shares) and what it rests on. Times are of the clock where answers "
-        "were sealed, on a machine that many others used, and of the processor elsewhere.",
-        "",
-    ]
-    if values["shared"]:
-        lines += [
-            f"## Cases that both answered ({values['cases']['shared']})",
+    cases = ", ".join(f"{name} {count}" for name, count in values["cases"].items())
+    return "\n".join(
+        [
+            "# The diagnosis on development cases",
             "",
-            _runs_told(values["fit_runs"]["shared"]),
+            f"Synthetic blind cases at 10 s, development seeds {', '.join(map(str, values['seeds']))}: no "
+            "final figures, and families were widened with failures among these cases in view. Cases: "
+            f"{cases}. Each figure with its 95 % interval (Wilson's for shares) and what it rests on. Times "
+            "are of the clock where answers were sealed, on a machine that many others used, and of the "
+            "processor elsewhere. The diagnosis before this one, on some of these cases: "
+            "[record](record.md).",
             "",
-            *_table({f"{m}, {ALL}": parts[ALL] for m, parts in values["shared"].items()}),
+            _runs_told(values["fit_runs"]),
             "",
+            *_table(values["by_reality"]),
+            "",
+            *twin_lines(values["same_twin"]),
         ]
-    lines += [
-        f"## Families on all cases that they answered ({values['cases'][FAMILIES]}), by reality",
-        "",
-        _runs_told(values["fit_runs"][FAMILIES]),
-        "",
-        *_table(values["families"]),
-        "",
-        *twin_lines(values["same_twin"]),
-    ]
-    return "\n".join(lines)
+    )
 
 
 def _table(columns: Mapping[str, Sequence[Mapping[str, Any]]]) -> list[str]:

@@ -81,6 +81,7 @@ def gap_page(found: Diagnosis) -> str:
         by_stage=figures_gap_where.by_stage(where.stage) if where.stage else None,
         regimes=gap_tables.regimes_table(found) if where.regime else None,
         segments=gap_tables.segments_table(found),
+        shares=gap_tables_ahead.shares_table(found, names),
         evidence=(
             figures_gap_evidence.evidence_bars(found.evidence)
             if figures_gap_evidence.shown_evidence(found.evidence)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fogml.gap.how_far_result import Rehearsed, WhatIf
+from fogml.gap.how_far_result import CauseShare, Rehearsed, WhatIf
 from fogml.gap.result import Diagnosis
 from fogml.report.gap_words import interval_words, probability_words, title_of
+from fogml.report.shading import regime_word
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, number, percent
 
@@ -32,6 +33,34 @@ def nearest_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
         rows=tuple(rows),
         caption="What each holds alone, in whatever form its family has: it is no name.",
     )
+
+
+def shares_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """What share of the gap each cause makes: in all, on each run, in each regime; None without causes."""
+    if not found.shares:
+        return None
+    causes = list(dict.fromkeys(s.effect for s in found.shares))
+    groups: dict[tuple[str | None, str | None], dict[str, CauseShare]] = {}
+    for share in found.shares:
+        groups.setdefault((share.run, share.regime), {})[share.effect] = share
+    rows = []
+    for (run, regime), held in groups.items():
+        where = run or (regime_word(regime) if regime else "in all")
+        cells = [f"{percent(held[c].share)} ({interval_words(*held[c].ci90)})" for c in causes]
+        rows.append(Row((where, *cells)))
+    return Table(
+        columns=(
+            ("Run or regime", "", "text"),
+            *((_cause(c, names), "90 % interval", "figure") for c in causes),
+        ),
+        rows=tuple(rows),
+        caption="Of what all causes of the likeliest set together take away of the gap's energy, named or "
+        "not. Where causes cancel, one may have less than none.",
+    )
+
+
+def _cause(id: str, names: dict[str, str]) -> str:
+    return "Something unknown" if id == "unknown" else title_of(id, names)
 
 
 def what_if_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
