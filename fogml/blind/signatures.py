@@ -20,8 +20,10 @@ from fogml.runs.run import FloatArray
 from fogml.signals.noise_fit import fit_noise
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
+from fogml.twin.nominal import nominal_columns
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect
+from fogml.twin.replay import Replayer
 from fogml.twin.twin_file import load_twin
 
 LARGEST_ROWS = 4096
@@ -71,12 +73,21 @@ class Stack:
     @cached_property
     def gap(self) -> FloatArray:
         """Recorded less replayed at the priors' means [deg/h], shape (n,)."""
-        return np.concatenate([part.gap for part in self.parts])
+        twin = self.model.twin
+        return np.concatenate(
+            [part.samples(part.run.gyro_deg_h - Replayer(part.run).output(twin)) for part in self.parts]
+        )
 
     @cached_property
     def nominal(self) -> FloatArray:
         """Response to each nominal constant [deg/h per unit], shape (n, k)."""
-        return np.concatenate([part.constants for part in self.parts])
+        columns = []
+        for part in self.parts:
+            # As a replay has them, of readings as they are.
+            given = nominal_columns(Replayer(part.run).recorded)
+            zeros = np.zeros(len(part.run))
+            columns.append(np.column_stack([part.samples(given.get(name, zeros)) for name in self.constants]))
+        return np.concatenate(columns)
 
     @cached_property
     def prior_sd(self) -> FloatArray:

@@ -73,7 +73,6 @@ def test_with_nothing_added_there_is_no_gap_and_a_run_that_can_not_be_used_says_
 
 ADDED = {
     "thermal_hysteresis": (0.2, {"half_width": 8.0}),
-    "shupe_pure": (0.3, {}),
 }
 
 
@@ -105,7 +104,9 @@ def test_a_line_has_its_amplitude_though_its_phase_is_another_one_on_each_run():
     found = diagnose(TWIN, runs[:2], runs[2:], noise=static(), plan=False)
     (one,) = found.named
     assert one.effect == "sinusoidal"
-    assert abs(one.amplitude.value - amplitude) < 2.0 * one.amplitude.se < amplitude
+    assert one.amplitude.value == pytest.approx(amplitude, rel=0.2)
+    # Two runs tell little of a spread over runs.
+    assert one.amplitude.se < amplitude
     assert one.parameters["frequency"].value == pytest.approx(frequency, rel=0.01)
     # The twin that is written has the same.
     assert [e.amplitude for e in found.effects] == [one.amplitude.value]

@@ -125,11 +125,11 @@ class Blocks:
 
 
 def _range_penalties(held: Field, nodes: list[int], lengths: FloatArray) -> FloatArray:
-    """Logarithm of how likely each node's sizes are by the card's range, shape (nodes, sizes)."""
+    """Logarithm of how likely each node's sizes are by the card's or family's range, shape (nodes, sizes)."""
     families, scene = held.columns.families, held.setting.scene
     highest = np.array(
         [
-            scene.candidates[f.id].amplitude.range(scene.grade)[1] if f.kind == "known" else np.inf  # type: ignore[arg-type]
+            scene.candidates[f.id].amplitude.range(scene.grade)[1] if f.kind == "known" else f.largest  # type: ignore[arg-type]
             for f in families
         ]
     )[[held.columns.nodes[n].family for n in nodes]]

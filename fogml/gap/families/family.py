@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -49,6 +50,8 @@ class Family:
         Whether each run draws its coefficients anew.
     place
         Where it acts, for words.
+    largest
+        Usual most of a coefficient, in its unit, where no card says it.
     """
 
     id: str
@@ -57,6 +60,7 @@ class Family:
     words: str = ""
     drawn_per_run: bool = False
     place: str = ""
+    largest: float = math.inf
 
 
 def column_block(*columns: FloatArray, positive: bool = False, **shape: Any) -> Block:

@@ -16,7 +16,7 @@ from fogml.gap.families.rows import Rows
 from fogml.gap.result import SeparatingRun
 from fogml.gap.separating import LEAST_DISTANCE
 from fogml.runs.run import FloatArray
-from fogml.twin.programme import programme_from
+from fogml.twin.programme import Programme, programme_from
 
 LATER_H = (1.0, 2.0, 4.0)
 """How much later than the power the chamber's programme may begin [h]."""
@@ -60,7 +60,8 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
     if distance < LEAST_DISTANCE:
         return None
     soak = f"soak at {_start(rows):g} degC for"
-    steps = [f"{soak} {OFF_H:g} h", {f"{soak} {hours:g} h": ["power on"]}, *_steps(rows)]
+    course_again, fastest = _steps(rows)
+    steps = [f"{soak} {OFF_H:g} h", {f"{soak} {hours:g} h": ["power on"]}, *course_again]
     values: dict[str, Any] = {
         "schema": "fogml.programme/1",
         "name": "repeat-run",
@@ -68,9 +69,11 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
         "power": "off",
         "steps": steps,
     }
+    if fastest > Programme.fastest_rate:
+        values["fastest_rate"] = f"{fastest:.3g} degC/min"
     programme = programme_from(values, "repeat-run")
     total = OFF_H + hours + float(rows.run.span_s) / 3600.0
-    told = (f"{soak} {OFF_H:g} h, power off", f"{soak} {hours:g} h, power on", *_steps(rows))
+    told = (f"{soak} {OFF_H:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
     return SeparatingRun(TOLD, programme.as_yaml(), float(distance), total, told)
 
 
@@ -92,8 +95,8 @@ def _start(rows: Rows) -> float:
     return float(round(float(_course(rows)[1][0]), 1))
 
 
-def _steps(rows: Rows) -> list[str]:
-    """The recorded course in sentences: soaks, and ramps from corner to corner."""
+def _steps(rows: Rows) -> tuple[list[str], float]:
+    """The recorded course in sentences: soaks, and ramps from corner to corner; its fastest [degC/min]."""
     time, x = _course(rows)
     corners = _corners(time, x, SETTLED_DEGC)
     wider = SETTLED_DEGC
@@ -101,7 +104,7 @@ def _steps(rows: Rows) -> list[str]:
         wider *= 1.5
         corners = _corners(time, x, wider)
     said: list[str] = []
-    at, soaked = _start(rows), 0.0
+    at, soaked, fastest = _start(rows), 0.0, 0.0
     for one, other in pairwise(corners):
         minutes, to = float(time[other] - time[one]) / 60.0, float(round(float(x[other]), 1))
         if abs(to - at) < wider:
@@ -109,9 +112,11 @@ def _steps(rows: Rows) -> list[str]:
             continue
         if soaked:
             said.append(f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min")
-        said.append(f"ramp to {to:g} degC at {abs(to - at) / minutes:.3g} degC/min")
+        speed = float(f"{abs(to - at) / minutes:.3g}")
+        fastest = max(fastest, speed)
+        said.append(f"ramp to {to:g} degC at {speed:g} degC/min")
         at, soaked = to, 0.0
-    return [*said, f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min"]
+    return [*said, f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min"], fastest
 
 
 def _corners(time: FloatArray, x: FloatArray, within: float) -> Sequence[int]:

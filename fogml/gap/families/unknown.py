@@ -13,7 +13,7 @@ from fogml.gap.families.family import Block, Family
 from fogml.gap.families.places import DIRECTION_DEGC_MIN, Scene, lag, rate
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.thermal_families import bumps
-from fogml.gap.families.unknown_readings import reading_errors, reading_errors_in_time
+from fogml.gap.families.unknown_readings import LARGEST_DEGC, reading_errors, reading_errors_in_time
 from fogml.runs.run import FloatArray
 from fogml.signals.recursions import play_kernel
 
@@ -243,8 +243,8 @@ def unknown_families() -> tuple[Family, ...]:
         Family("excursion", "unknown", _excursion, "remembers how far and how often temperature went"),
         Family("events", "unknown", _events, "follows turns, starts and ends of changes of temperature"),
         Family("differences", "unknown", _differences, "goes with how much warmer one place is than another"),
-        Family("readings", "unknown", reading_errors, A_READING),
-        Family("reading_times", "unknown", reading_errors_in_time, A_READING, True),
+        Family("readings", "unknown", reading_errors, A_READING, largest=LARGEST_DEGC),
+        Family("reading_times", "unknown", reading_errors_in_time, A_READING, True, largest=LARGEST_DEGC),
         Family("lines", "unknown", _lines, "is a line that comes and goes", True),
         Family("line", "unknown", _lines, "is a line"),
         Family("between", "unknown", _between, "comes of constants that changed between two runs"),

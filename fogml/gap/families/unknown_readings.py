@@ -15,8 +15,10 @@ from fogml.signals.recursions import play_kernel
 
 GROUPS = (("T", "T_in"), ("T_out",))
 """Sensors that err apart."""
-SLACK_DEGC = (0.1, 0.3, 1.0, 3.0, 10.0)
-"""What a sensor that sticks has to move by before it moves on."""
+SLACK_DEGC = (0.1, 0.3, 1.0)
+"""What a sensor that sticks has to move by before it moves on: it errs by as much, and more would be seen."""
+LARGEST_DEGC = 0.3
+"""Usual most that a thermometer is wrong by: class A of IEC 60751 between -40 and 70 degC."""
 HEALS_S = (1800.0, 7200.0, 30000.0)
 STEPS, SINGLE_STEPS, WAVES = 20, 12, 12
 Constants = Mapping[str, float]
