@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -30,6 +31,12 @@ def errors_at_other_rates(unit: World, run: Run, candidate: Candidate) -> np.nda
     sample_s = run.sample_s
     tests = [unit.run(cycle(rate, sample_s), sample_s, 0, "test") for rate in (0.4, 3.0)]
     return np.array(default_rates.model_errors(trial.fit_candidate(candidate, [run], 0), tests))
+
+
+@cache
+def fitted_to_one_rate() -> AutoModel:
+    """The choice among linear forms on one run, for tests that change nothing of it."""
+    return AutoModel().fit(world_run(1.0, 0)[0])
 
 
 @pytest.fixture
@@ -160,8 +167,7 @@ def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
 
 
 def test_it_finds_the_drift_and_holds_at_another_rate(linear_only: None) -> None:
-    run, _ = world_run(1.0, 0)
-    model = AutoModel().fit(run)
+    model = fitted_to_one_rate()
     other, truth = world_run(0.6, 1)
     evaluation = model.evaluate(other)
     error = (evaluation.drift - truth)[evaluation.full]
@@ -218,9 +224,8 @@ def test_rates_of_the_training_runs_are_told() -> None:
 def test_one_direction_only_is_said(linear_only: None) -> None:
     chamber = programme([("soak", 30.0, 0.0), ("ramp", 60.0, 1.0)], -20.0, SAMPLE_S)
     up, _ = WORLD.run(chamber, SAMPLE_S, 0, "up.csv")
-    both, _ = world_run(1.0, 0)
     assert any("one way only" in note for note in AutoModel().fit(up).card_.notes)
-    assert not any("one way only" in note for note in AutoModel().fit(both).card_.notes)
+    assert not any("one way only" in note for note in fitted_to_one_rate().card_.notes)
 
 
 def test_left_out_runs_reveal_what_one_run_hides(linear_only: None) -> None:
@@ -238,7 +243,7 @@ def test_left_out_runs_reveal_what_one_run_hides(linear_only: None) -> None:
 
 def test_saving_keeps_choice_and_numbers(linear_only: None, tmp_path) -> None:
     run, _ = world_run(1.0, 0)
-    model = AutoModel().fit(run)
+    model = fitted_to_one_rate()
     save_model(model, tmp_path / "model")
     loaded = load_model(tmp_path / "model")
     np.testing.assert_array_equal(loaded.predict(run), model.predict(run))

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 from sklearn.linear_model import Ridge
 from sklearn.preprocessing import StandardScaler
-from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from fogml.errors import InputError
 from fogml.models import tall_least_squares
 from fogml.models.folds import dealt_folds
 from fogml.models.linear import RIDGE_GRID, LinearRegressor
 from fogml.models.tall_least_squares import Part
+from tests.models.contract import with_scikit_learns_checks
 
 
-@parametrize_with_checks(
+@with_scikit_learns_checks(
     [LinearRegressor(), LinearRegressor(ridge=0.1), LinearRegressor(fit_intercept=False)]
 )
 def test_scikit_learn_contract(estimator, check):
     check(estimator)
 
 
-@parametrize_with_checks([LinearRegressor(ridge="auto")])
+@with_scikit_learns_checks([LinearRegressor(ridge="auto")])
 def test_scikit_learn_contract_with_automatic_ridge(estimator, check):
     check(estimator)
 

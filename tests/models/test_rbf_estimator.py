@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.signal import lfilter
-from sklearn.utils.estimator_checks import parametrize_with_checks
 
 from fogml.errors import InputError
 from fogml.models.rbf import PatentRBFRegressor, RBFRegressor, search
+from tests.models.contract import with_scikit_learns_checks
 
 NOISE = 0.05
 
 
-@parametrize_with_checks(
+@with_scikit_learns_checks(
     [RBFRegressor(), RBFRegressor(centres=4, objective="validation"), PatentRBFRegressor()]
 )
 def test_contract_of_scikit_learn(estimator: Any, check: Any) -> None:
