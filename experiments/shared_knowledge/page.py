@@ -35,7 +35,8 @@ def page(rows: list[Row], *, fleet: int, averaging_s: float) -> str:
         "(`python -m experiments.shared_knowledge`)",
         "",
         "The check for odd units sees training rows alone. It was fixed on other units (seeds below 9000); "
-        "those of this page were first looked at with it fixed.",
+        "those of this page were looked at twice, with an earlier check and with this one, each fixed "
+        "before.",
         "",
         "| units | hours | before, median | alone, median | drawn, median | drawn / alone, median | "
         f"drawn / alone, largest | above {HARM:g} | left | floor, median |",
