@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 from fogml.cli.import_ import ImportSettings
 from fogml.cli.runs import most_dropped
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
-from fogml.outputs import whole_folder
+from fogml.outputs import whole_file, whole_folder
+from fogml.runs.columns import header
+
+_FIRST_ROWS = 5
 
 
 def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
@@ -19,8 +23,14 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
 
     if not settings.file:
         raise InputError("no file is given; name the logger's file")
+    if settings.draft:
+        _draft(settings, terminal)
+        return
     if not settings.profile:
-        raise InputError(f"no --profile is given; those that ship are {', '.join(profile_names())}")
+        raise InputError(
+            f"no --profile is given; those that ship are {', '.join(profile_names())}, and "
+            f"'fogml import {Path(settings.file).name} --draft -o profile.yaml' writes a first one"
+        )
     if not settings.out:
         raise InputError("no --out is given; name the folder for the runs")
     written = []
@@ -54,6 +64,38 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
     rows = [[run.name, str(len(run)), f"{run.span_s:.6g}"] for run in runs]
     terminal.table(f"Written to {settings.out}", ["run", "rows", "span [s]"], rows)
     terminal.result({"schema": "fogml.import/1", "runs": written})
+
+
+def _draft(settings: ImportSettings, terminal: Terminal) -> None:
+    """Write or print a profile with guesses, and show the first rows that it reads."""
+    from fogml.runs.profile_draft import draft_profile
+    from fogml.runs.profiles import import_recording
+
+    assert settings.file is not None
+    path = Path(settings.file)
+    text = draft_profile(path)
+    shown: list[dict[str, object]] = []
+    with TemporaryDirectory(prefix="fogml-draft-") as folder:
+        draft = Path(folder) / "profile.yaml"
+        draft.write_text(text, encoding="utf-8")
+        try:
+            runs = import_recording(path, draft)
+        except InputError as error:
+            runs = []
+            terminal.note(f"the draft does not read the file yet: {error}")
+    if settings.out:
+        with whole_file(settings.out) as file:
+            file.write_text(text, encoding="utf-8")
+        terminal.say(f"Written to {settings.out}; correct what it calls a guess, then")
+        terminal.say(f"fogml import {path.name} --profile {Path(settings.out).name} -o FOLDER")
+    else:
+        terminal.say(text.rstrip())
+    for run in runs:
+        first = run[:_FIRST_ROWS]
+        rows = [[f"{values[i]:.9g}" for values in first.columns.values()] for i in range(len(first))]
+        terminal.table(f"{run.name}: the first rows", [header(name) for name in run.columns], rows)
+        shown.append({"run": run.name, "rows": len(run), "span_s": run.span_s})
+    terminal.result({"schema": "fogml.import/1", "profile": text, "runs": shown})
 
 
 def _check_apart(file: str, out: str, names: Sequence[str]) -> None:

@@ -19,6 +19,7 @@ _USER_BLOCK = 512
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
 _LONGEST_MARK = 100
+_MOST_OF_MATRIX = 64
 _RESERVED = ("units", "facts")
 
 
@@ -97,11 +98,19 @@ class Mat:
         self.opened = Hdf5(path, []) if is_hdf5 else None
         variables = self.members(self.opened.file) if self.opened else self.loaded(path)
         run = variables.get("run")
+        structs = [v for v in variables.values() if isinstance(v, dict) and "time" in map(str.lower, v)]
+        if not isinstance(run, dict) and "time" not in map(str.lower, variables) and len(structs) == 1:
+            run = structs[0]
         held: Mapping[str, Any] = run if isinstance(run, dict) else variables
         units = held.get("units", variables.get("units", {}))
         facts = held.get("facts", variables.get("facts"))
-        names = [name for name in held if name not in _RESERVED]
-        self.arrays = [self.array(held[name]) for name in names]
+        columns = [
+            column
+            for name in held
+            if name not in _RESERVED
+            for column in columns_of(name, self.array(held[name]))
+        ]
+        names, self.arrays = [name for name, _ in columns], [array for _, array in columns]
         told = [
             described(name, array, fault=self.fault_of(array))
             for name, array in zip(names, self.arrays, strict=True)
@@ -121,6 +130,7 @@ class Mat:
 
     def fault_of(self, array: Any) -> str | None:
         """As `Hdf5.fault_of`; what is in memory has none."""
+        array = getattr(array, "matrix", array)
         return self.opened.fault_of(array) if self.opened and is_dataset(array) else None
 
     def members(self, group: Any, depth: int = 0) -> dict[str, Any]:
@@ -236,6 +246,29 @@ class ParquetColumn:
             if len(found) > _MOST_NAMES:
                 raise Refused(f"more than {_MOST_NAMES} different marks")
         return list(found), codes
+
+
+class MatrixColumn:
+    """A column of a matrix whose samples still lie in the file, along its longer axis."""
+
+    ndim = 1
+
+    def __init__(self, matrix: Any, place: int) -> None:
+        self.matrix, self.place = matrix, place
+        self.along = int(matrix.shape[1] > matrix.shape[0])
+        self.shape = (matrix.shape[self.along],)
+        self.dtype = matrix.dtype
+
+    def __getitem__(self, part: tuple[slice]) -> Any:
+        return self.matrix[(self.place, part[0]) if self.along else (part[0], self.place)]
+
+
+def columns_of(name: str, array: Any) -> list[tuple[str, Any]]:
+    """An array under its name; a matrix of few columns as these, counted from 1."""
+    is_numeric = getattr(array, "ndim", 0) == 2 and array.dtype.kind in "fiub"
+    if not is_numeric or not 1 < min(array.shape) <= _MOST_OF_MATRIX:
+        return [(name, array)]
+    return [(f"{name} column {i + 1}", MatrixColumn(array, i)) for i in range(min(array.shape))]
 
 
 def is_dataset(value: Any) -> bool:

@@ -260,7 +260,8 @@ def _internal_columns(
             found = _listed(seen)
             raise InputError(
                 f"{table.file}: no column '{name}'; a run needs time and gyro, e.g. 'time [s]', "
-                f"'gyro [deg/h]'; the header holds {found}"
+                f"'gyro [deg/h]'; the header holds {found}; where other names mean these, "
+                f"'fogml import {table.file} --draft -o profile.yaml' writes a profile to correct"
             )
     notes = []
     if unknown:

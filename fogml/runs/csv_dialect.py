@@ -168,6 +168,32 @@ def csv_dialect(path: Path) -> CsvDialect:
     return replace(dialect, text=frozenset(text))
 
 
+def decoded_head(path: Path) -> tuple[str, str]:
+    """The first lines of a text file, and its encoding.
+
+    Raises
+    ------
+    InputError
+        If it is no text.
+    """
+    with path.open("rb") as file:
+        raw = file.read(_HEAD_BYTES)
+    source = csv_source(path, raw)
+    with source.open() as opened:
+        head = opened.read(_HEAD_BYTES)
+    if any(byte < 32 and byte not in b"\t\r\n\f" for byte in head[:1000]):
+        raise _no_text(path.name)
+    encoding = _encoding(head, len(head) == _HEAD_BYTES)
+    text = head.decode(encoding, errors="replace")
+    # A line that the head cuts is left out.
+    return text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
+
+
+def marks_of(path: Path, rows: Sequence[Sequence[str]], separator: str) -> str:
+    """The decimal mark of a text file, told from its first rows."""
+    return _marks(CsvSource(path), rows, separator)[0]
+
+
 def is_sure(content: bytes) -> bool:
     """Whether a text has a header that names a time and a gyro."""
     head = content[:_HEAD_BYTES].decode("utf-8", errors="ignore")

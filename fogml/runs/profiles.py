@@ -12,7 +12,7 @@ from fogml.errors import InputError, quoted
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion, parse_header
-from fogml.runs.facts import Facts, read_side_file, side_file
+from fogml.runs.facts import NAMES, Facts, read_side_file, side_file
 from fogml.runs.findings import Finding
 from fogml.runs.logger_rows import (
     chosen_rows,
@@ -28,6 +28,7 @@ from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
 from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
+from fogml.yaml_text import read_yaml
 
 __all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
 
@@ -73,7 +74,7 @@ def import_recording(
     beside = side_file(path)
     if beside is not None and not isinstance(profile, ImportProfile) and Path(profile).is_file():
         # A profile of the log's own name lies where its side file would.
-        beside = None if beside.samefile(profile) else beside
+        beside = None if beside.samefile(profile) or _is_profile(beside) else beside
     profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
     _check_axis(profile, axis)
     with unchanged(*run_sources(path)):
@@ -91,6 +92,12 @@ def import_recording(
         repair=repair or profile.repair,
         most_dropped=most_dropped,
     )
+
+
+def _is_profile(side: Path) -> bool:
+    """Whether a file beside a log is an import profile and states no facts."""
+    values = read_yaml(side, NAMES)
+    return isinstance(values, dict) and str(values.get("schema", "")).startswith("fogml.import/")
 
 
 def run_names(profile: ImportProfile, stem: str) -> dict[str, tuple[str | None, str | None]]:

@@ -1,0 +1,276 @@
+"""A first import profile for a file that nobody has described: guesses with reasons, to be corrected."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.runs.columns import column_spec, is_accepted, parse_header
+from fogml.runs.container_files import groups_of, sheet_file
+from fogml.runs.csv_dialect import decoded_head, marks_of
+from fogml.runs.csv_header import fields_of, is_number_like
+from fogml.runs.header_spelling import canonical_cells, with_units_below
+from fogml.runs.profile_parts import SEPARATORS
+from fogml.runs.reader_process import stored_file
+from fogml.runs.reading import file_format
+from fogml.runs.reading_limits import DEFAULT_LIMITS
+from fogml.runs.stamps import stamp_form
+
+_MOST_ROWS = 200
+_TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
+_DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
+_GYRO = re.compile(r"gyr|fog|omega|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
+_WARM = re.compile(r"temp|die|oven|therm|^t[_.]?\w{0,3}$|温", re.IGNORECASE)
+_AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
+_UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
+_KELVIN = 200.0  # no chamber is so hot in degC, and none so cold in kelvin
+_MARK = "# GUESS: "
+
+
+@dataclass
+class _Field:
+    """A field of the file: how a profile names it, its name and unit, and its first values as text."""
+
+    source: str | int
+    name: str
+    unit: str | None
+    first: list[str] = field(default_factory=list)
+    mark: str = "."
+
+    @property
+    def numbers(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
+        texts = [text.strip(' "').replace(self.mark, ".") for text in self.first]
+        return np.array([float(text) if _is_float(text) else np.nan for text in texts])
+
+
+def draft_profile(path: Path) -> str:
+    """The text of an import profile (YAML) for a file: what is sure, and what is a guess and why.
+
+    Raises
+    ------
+    InputError
+        If the file can't be read, or holds no rows of numbers.
+    """
+    kind = file_format(path)
+    if kind == "workbook":
+        with sheet_file(path) as sheet:
+            layout, fields = _of_text(sheet)
+    elif kind == "csv":
+        layout, fields = _of_text(path)
+    else:
+        layout, fields = _of_container(path, kind)
+    lines = [
+        "schema: fogml.import/1",
+        f"description: {_quoted('draft for ' + path.name)}",
+        *layout,
+        *_columns(fields),
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _of_text(path: Path) -> tuple[list[str], list[_Field]]:
+    """The layout's keys and the fields of a text file."""
+    head, encoding = decoded_head(path)
+    name, lines, data = _table_of(head)
+    mark = SEPARATORS[name]
+    if data is None:
+        raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
+    rows = [_split(line, mark) for line in lines[data : data + _MOST_ROWS] if line.strip()]
+    width = len(rows[0])
+    decimal = marks_of(path, rows, mark or " ")
+    layout = [f"separator: {name}"] + ([f'decimal: "{decimal}"'] if decimal != "." else [])
+    if encoding not in ("utf-8-sig", "utf-8"):
+        layout.append(f"encoding: {encoding}")
+    above = [i for i in range(data) if lines[i].strip() and len(_split(lines[i], mark)) == width]
+    names = [
+        _split(lines[i], mark) for i in above if not any(is_number_like(f) for f in _split(lines[i], mark))
+    ]
+    if not names:
+        layout += [f"skip_lines: {data}"] if data else []
+        layout += ["header: false", f"fields: {width}"]
+        fields = [_Field(i, f"column {i}", None) for i in range(width)]
+    else:
+        cells, units = names[-1], None
+        if len(names) > 1 and (units := with_units_below([c.strip() for c in names[-2]], names[-1])):
+            cells = names[-2]
+            layout.append("reject: {not_numbers: true}    # the row of units below the header is left out")
+        line = lines[above[len(above) - (2 if units else 1)]].strip()
+        if next(i for i, text in enumerate(lines) if text.strip()) < data - (2 if units else 1):
+            layout.append(
+                f"header_text: {_quoted(line[:60])}    # the header is the first line that holds this"
+            )
+        known = units or canonical_cells([cell.strip().strip('"') for cell in cells])
+        fields = [
+            _Field(cell.strip(' "'), *parse_header(right)) for cell, right in zip(cells, known, strict=False)
+        ]
+    for place, one in enumerate(fields):
+        one.first, one.mark = [row[place] for row in rows if len(row) == width], decimal
+    return layout, fields
+
+
+def _table_of(text: str) -> tuple[str, list[str], int | None]:
+    """The separator's name, the lines, and the first line of numbers."""
+    lines = re.split(r"\r\n|\r|\n", text)[:-1] or [text]
+    best: tuple[float, str, int | None] = (0.0, "comma", None)
+    for name, mark in SEPARATORS.items():
+        rows = [_split(line, mark) for line in lines[-_MOST_ROWS:] if line.strip()]
+        counts = [len(row) for row in rows]
+        width = max(set(counts), key=counts.count) if counts else 0
+        first = next((i for i, line in enumerate(lines) if _is_data(_split(line, mark), width)), None)
+        numbers = [sum(is_number_like(f.strip(' "')) for f in row) for row in rows]
+        score = float(np.median(numbers)) if numbers else 0.0
+        if first is not None and score > best[0]:
+            best = (score, name, first)
+    return best[1], lines, best[2]
+
+
+def _is_data(fields: Sequence[str], width: int) -> bool:
+    return len(fields) == width and 2 * sum(is_number_like(f.strip(' "')) for f in fields) >= width
+
+
+def _split(line: str, mark: str | None) -> list[str]:
+    return line.split() if mark is None else fields_of(line, mark)
+
+
+def _of_container(path: Path, kind: str) -> tuple[list[str], list[_Field]]:
+    """The fields of the group that looks most like a gyro's, and of the others' temperatures."""
+    with stored_file(path, kind, (), DEFAULT_LIMITS) as stored:
+        groups = groups_of(stored, kind)
+        scores = {g.name: sum(bool(_GYRO.search(n)) for n in g.names) + 2 * g.is_run for g in groups}
+        if not scores:
+            raise InputError(f"{path.name}: holds no columns of numbers; a draft needs some")
+        main = max(scores, key=lambda name: scores[name])
+        fields = []
+        for group in groups:
+            for cell, array in group.columns:
+                name, unit = parse_header(cell)
+                if group.name == main or (_WARM.search(name) and name != "time"):
+                    source = f"{group.name}/{array.name}" if group.name else array.name
+                    held = stored.read(array, 0, min(max(array.shape), _MOST_ROWS)) if array.is_vector else ()
+                    fields.append(_Field(source, name, unit, [repr(float(value)) for value in held]))
+    others = [name for name in scores if name != main]
+    return ([f"# Other groups of the file: {', '.join(others[:20])}"] if others else []), fields
+
+
+def _columns(fields: Sequence[_Field]) -> list[str]:
+    """The keys that say which field is which."""
+    left = list(fields)
+    lines = ["columns:", *_clock(left)]
+    gyros = _taken(left, lambda f: f.name == "gyro" or f.name.startswith("gyro_")) or _taken(
+        left, lambda f: bool(_GYRO.search(f.name)) and not _DATE.search(f.name)
+    )
+    if not gyros:
+        held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
+        gyros = held[:1]
+        left = [f for f in left if f not in gyros]
+    axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
+    many = len(gyros) > 1 and len(axes) == len(gyros)
+    lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
+    used: set[str] = set()
+    for one in _taken(left, lambda f: column_spec(f.name) is not None or bool(_WARM.search(f.name))):
+        lines.append(_other(one, used))
+    if many:
+        lines.append("axes: {" + ", ".join(f"{axis}: {_quoted(f.source)}" for axis, f in axes.items()) + "}")
+    if "time" not in "".join(lines[1:3]):
+        lines.append(f"sample_s: 0.01    {_MARK}no clock was found; write the true interval [s]")
+    rest = [f for f in [*left, *([] if many else gyros[1:])] if isinstance(f.source, str)]
+    if rest:
+        lines.append(
+            f"# keep: [{', '.join(_quoted(f.source) for f in rest)}]    # other columns, under their names"
+        )
+    lines += [
+        "# facts: {unit: FOG-0417, latitude: 39.9, input_axis: up}",
+        "# where: [{source: STATE, equals: 2}]        # rows to keep",
+        "# legs: {up: {from_s: 0, to_s: 3600}}        # runs of their own",
+    ]
+    return lines
+
+
+def _clock(left: list[_Field]) -> list[str]:
+    """The clock's line: stamps, else a column that only grows and is named as one."""
+    stamped = [f for f in left if f.first and f.first[0].strip() and (stamp_form([f.first[0].strip()]))]
+    if stamped:
+        for one in stamped:
+            left.remove(one)
+        sources = [_quoted(f.source) for f in stamped[:2]]
+        shown = f"[{', '.join(sources)}]" if len(sources) > 1 else sources[0]
+        return [f"  time: {{source: {shown}, unit: stamp}}"]
+    known = [f for f in left if f.name == "time" or _TIME.search(f.name)] or [f for f in left if _grows(f)][
+        :1
+    ]
+    growing = [f for f in known if _grows(f) or not f.first]
+    if not growing:
+        return []
+    one = growing[0]
+    left.remove(one)
+    if one.unit is not None and is_accepted("time", one.unit):
+        return [f"  time: {{source: {_quoted(one.source)}, unit: {one.unit}}}"]
+    unit = next((u for u, hint in _UNIT_IN_NAME if re.search(hint, one.name, re.IGNORECASE)), "s")
+    step = f"steps of {np.median(np.diff(one.numbers)):.6g}; " if len(one.first) > 1 else ""
+    return [f"  time: {{source: {_quoted(one.source)}, unit: {unit}}}    {_MARK}{step}is the unit right?"]
+
+
+def _grows(one: _Field) -> bool:
+    values = one.numbers
+    return len(values) > 1 and bool(np.all(np.diff(values) > 0.0))
+
+
+def _gyro(one: _Field | None, many: bool) -> str:
+    """The gyro's entry."""
+    if one is None:
+        return f"{{source: GYRO, unit: deg/h}}    {_MARK}no column looks like a gyro; name it"
+    source = "" if many else f"source: {_quoted(one.source)}, "
+    if one.unit is not None and is_accepted("gyro", one.unit):
+        return f"{{{source}unit: {one.unit}}}"
+    values = one.numbers
+    hints = (("deg/h", r"dph|deg_?h"), ("deg/s", r"dps|deg_?s"), ("rad/s", r"rad"))
+    unit = next((u for u, hint in hints if re.search(hint, one.name, re.IGNORECASE)), None)
+    if unit is None and len(values) and np.all(values == np.round(values)):
+        unit, why = "count", "whole numbers; with 'scale: 1/K' it may be deg/s or deg/h"
+    else:
+        why = "the file states no unit"
+    return f"{{{source}unit: {unit or 'deg/s'}}}    {_MARK}{why}"
+
+
+def _other(one: _Field, used: set[str]) -> str:
+    """The entry of a temperature or another column of the run format."""
+    name = one.name if column_spec(one.name) is not None and one.name not in used else ""
+    name = name or next(n for n in ["T", *(f"T{i}" for i in range(1, 99))] if n not in used)
+    used.add(name)
+    spec = column_spec(name)
+    assert spec is not None
+    if one.unit is not None and is_accepted(name, one.unit):
+        return f"  {name}: {{source: {_quoted(one.source)}, unit: {one.unit}}}"
+    values = one.numbers
+    warm = float(np.nanmedian(values)) if np.isfinite(values).any() else 0.0
+    unit = "K" if spec.internal == "degC" and warm > _KELVIN else spec.internal
+    entry = f"  {name}: {{source: {_quoted(one.source)}, unit: {unit}}}"
+    return f"{entry}    {_MARK}which sensor, and is the unit right?"
+
+
+def _taken(left: list[_Field], is_one: Callable[[_Field], bool]) -> list[_Field]:
+    """The fields of which something is true, taken from those that are left."""
+    found = [f for f in left if is_one(f) and (np.isfinite(f.numbers).any() or not f.first)]
+    for one in found:
+        left.remove(one)
+    return found
+
+
+def _quoted(value: str | int) -> str:
+    """A value for YAML."""
+    is_plain = isinstance(value, int) or re.fullmatch(r"[A-Za-z_][\w./]*", value)
+    return str(value) if is_plain else json.dumps(value, ensure_ascii=False)
+
+
+def _is_float(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text

@@ -1,0 +1,96 @@
+"""A drafted profile reads the file that it was drafted for, and calls what it can't know a guess."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from scipy.io import savemat
+
+from fogml.cli.main import app
+from fogml.errors import InputError
+from fogml.runs.profile_draft import draft_profile
+from fogml.runs.profiles import import_recording
+from fogml.runs.reading import read_run
+from tests.readers import files
+
+COUNT = 60
+TIME = np.arange(COUNT) * 10
+XSENS = "// Start 0\nPacketCounter\tSampleTimeFine\tGyr_X\tGyr_Y\tTemperature\n" + "".join(
+    f"{i}\t{t}\t0.{i:03d}\t-0.{i:03d}\t{25 + i / 100}\n" for i, t in enumerate(TIME)
+)
+GERMAN = "Prüfstand 4;;;\nDatum;Zeit;Drehrate;Temperatur\n" + "".join(
+    f"05.01.2026;08:00:{i:02d},500;{i},25;2{i % 10},5\n" for i in range(COUNT)
+)
+BARE = "".join(f"{i * 0.1:.1f} {i} {300 + i / 10:.1f}\n" for i in range(COUNT))
+UNITS = "Logger 3\nt,omega,die\n[ms],[deg/s],[°C]\n" + "".join(
+    f"{t},{i}.5,{25}\n" for i, t in enumerate(TIME)
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "gyro", "told", "runs"),
+    [
+        (
+            XSENS,
+            206264.80624709636 * np.arange(COUNT) / 1000,
+            ["header_text", "axes: {x: Gyr_X, y: Gyr_Y}"],
+            2,
+        ),
+        (
+            GERMAN,
+            3600.0 * (np.arange(COUNT) + 0.25),
+            ["[Datum, Zeit], unit: stamp", "separator: semicolon"],
+            1,
+        ),
+        (BARE, np.arange(COUNT), ["header: false", "separator: whitespace", "unit: count"], 1),
+        (UNITS, 3600.0 * (np.arange(COUNT) + 0.5), ["source: t, unit: ms}\n", "unit: deg/s}\n"], 1),
+    ],
+    ids=["motion tracker", "german bench", "no header", "row of units"],
+)
+def test_text(tmp_path, text, gyro, told, runs):
+    path, profile = tmp_path / "log.txt", tmp_path / "p.yaml"
+    path.write_text(text, encoding="utf-8")
+    draft = draft_profile(path)
+    for part in told:
+        assert part in draft
+    # What the file can't tell is a guess; corrected, it gives what was written.
+    profile.write_text(draft.replace("gyro: {unit: deg/s}", "gyro: {unit: rad/s}"), encoding="utf-8")
+    found = import_recording(path, profile)
+    assert len(found) == runs
+    np.testing.assert_allclose(found[0].gyro, gyro, rtol=1e-9)
+
+
+def test_a_matrix_of_matlab(tmp_path):
+    path, profile = tmp_path / "log.mat", tmp_path / "p.yaml"
+    savemat(path, {"data": np.c_[TIME / 10.0, np.sin(TIME), 25.0 + TIME / 100.0]})
+    with pytest.raises(
+        InputError, match=r"log\.mat: no column 'time'.*data column 3.*import log\.mat --draft"
+    ):
+        read_run(path)
+    profile.write_text(draft_profile(path).replace("unit: deg/s", "unit: deg/h"))
+    (run,) = import_recording(path, profile)
+    np.testing.assert_array_equal(run.time, TIME / 10.0)
+    np.testing.assert_array_equal(run.gyro, np.sin(TIME))
+
+
+def test_the_command_writes_it_and_shows_the_first_rows(tmp_path):
+    files.npz(tmp_path / "log.npz")
+    profile = tmp_path / "profile.yaml"
+    arguments = ["import", str(tmp_path / "log.npz"), "--draft", "-o", str(profile), "--json"]
+    outcome = CliRunner().invoke(app, arguments)
+    assert outcome.exit_code == 0, outcome.output
+    told = json.loads(outcome.stdout)
+    assert told["profile"] == profile.read_text(encoding="utf-8")
+    assert told["runs"][0]["rows"] == files.COUNT
+    (run,) = import_recording(tmp_path / "log.npz", profile)
+    np.testing.assert_array_equal(run.gyro, files.GYRO)
+
+
+@pytest.mark.parametrize("text", ["only words\nand more\n", "\n\n"])
+def test_a_file_without_numbers(tmp_path, text):
+    (tmp_path / "log.txt").write_text(text)
+    with pytest.raises(InputError, match=r"log\.txt: no rows of numbers"):
+        draft_profile(tmp_path / "log.txt")
