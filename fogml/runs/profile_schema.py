@@ -248,7 +248,9 @@ def _first_fault(error: ValidationError) -> str:
         home: Any = ImportProfile
         for part in first["loc"][:-1]:
             home = _HOMES.get(str(part), home)
-        known = ", ".join(field.alias or name for name, field in home.model_fields.items())
+        # What a profile begins with comes first, whichever class states it.
+        fields = sorted(home.model_fields.items(), key=lambda item: item[0] not in ("schema_", "description"))
+        known = ", ".join(field.alias or name for name, field in fields)
         return f"unknown key {quoted(key)}; known keys are {known}"
     if first["type"] == "missing":
         return f"key '{key}' is missing"
