@@ -18,6 +18,7 @@ _SYNONYMS = {
 }  # fmt: skip
 _SPELLED = {re.sub(r"[\s_-]", "", name.lower()): name for name in KNOWN}
 _MEANT = {re.sub(r"[\s_-]", "", word): name for name, words in _SYNONYMS.items() for word in words}
+_OF_AN_AXIS = re.compile(r"(?:gyro?|gyroscope|omega|angular(?:rate|velocity)|[gw])([xyz])\Z")
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
 _FORMS = (
     re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\Z"),
@@ -95,6 +96,9 @@ def _parts(cell: str) -> tuple[str, str | None]:
 def _known(name: str, unit: str | None) -> str | None:
     """The column of the run format that a name spells, if it may have that unit."""
     plain = _plain(name)
+    # One of several gyros: a name of it with its axis, and a unit of a rate.
+    if (axis := _OF_AN_AXIS.match(plain)) and unit is not None and is_accepted("gyro", unit):
+        return f"gyro_{axis[1]}"
     if plain == "t":
         names = ["T" if unit is not None and is_accepted("T", unit) else "time"] if unit else []
     else:

@@ -124,6 +124,7 @@ def test_names_in_chinese(tmp_path):
         (["Time (min)", "Gyro (mdps)", "Temp [C]"], ("time [min]", "gyro [mdeg/s]", "T [degC]")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T1"], ("time [s]", "gyro [deg/h]", "Temp [degC]", "T1")),
         (["IMU (left)", "B_x (G)", "vibration [g]"], ("IMU (left)", "B_x [G]", "vibration [g]")),
+        (["time [s]", "GyrX (dps)", "w_y [rad/s]"], ("time [s]", "gyro_x [deg/s]", "gyro_y [rad/s]")),
         (["gyro [Hz]", "time", "T2 [℃]"], ("gyro [Hz]", "time", "T2 [degC]")),
     ],
 )  # fmt: skip
