@@ -76,7 +76,9 @@ class SettingsCommand(click.Command):
             raise InputError("CONFIG and --config are the same file; give one of them")
         stated = named if config is None else config
         settings = self.settings.gather(None if stated is None else Path(stated), _flags(values))
-        if not do_job(settings, self.name or "", Terminal(as_json, quiet)):
+        # Without the program's own name: "train", "lab acceptance".
+        command = click.get_current_context().command_path.partition(" ")[2]
+        if not do_job(settings, command, Terminal(as_json, quiet)):
             raise click.exceptions.Exit(1)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,8 +37,16 @@ class UnitWork:
 
     def __call__(self, unit: Unit, folder: Path) -> Mapping[str, Any]:
         """Do the job, and give what the fleet wants of it."""
+        from fogml.runs.three_axes import SeveralAxes
+
         do = {"train": self._train, "compare": self._compare, "diagnose": self._diagnose}
-        return do[unit.job](unit, folder)
+        try:
+            return do[unit.job](unit, folder)
+        except SeveralAxes:
+            if not unit.axis or "axis" in self.settings:
+                raise
+            # Files of three gyros: the manifest tells which of them is the unit's.
+            return replace(self, settings={**self.settings, "axis": unit.axis})(unit, folder)
 
     def _train(self, unit: Unit, folder: Path) -> dict[str, Any]:
         from fogml.cli.train_job import (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from fogml.report.acceptance_page import VERDICTS, limit_words
 from fogml.report.page import render
 from fogml.report.tables import Row, Table
 from fogml.report.verdict import GRADES
@@ -15,6 +16,7 @@ PAGES = {
     "compare": "compare.html",
     "inspect": "inspect.html",
     "noise": "noise.html",
+    "lab acceptance": "acceptance.html",
 }
 """Page of each command in an axis' folder."""
 
@@ -23,6 +25,7 @@ _KICKERS = {
     "compare": "Models compared, axis by axis",
     "inspect": "What is in the runs, axis by axis",
     "noise": "Noise, axis by axis",
+    "lab acceptance": "Acceptance reports, axis by axis",
 }
 Columns = tuple[tuple[str, str, str], ...]
 
@@ -57,6 +60,8 @@ def _name(axes: Mapping[str, Any]) -> str:
     """Unit and axes, as far as what was told names them."""
     first = next(iter(axes.values()))
     run = first
+    if first.get("serial_number"):
+        return f"{first['serial_number']}, axes {', '.join(axes)}"
     for key in ("test", "runs"):
         if first.get(key):
             run = first[key][0]
@@ -70,7 +75,7 @@ def _mark(told: Mapping[str, Any]) -> dict[str, str] | None:
     """The verdict on an axis' model, where there is one."""
     if "verdict" not in told:
         return None
-    kind, sign, words = GRADES[told["verdict"]]
+    kind, sign, words = {**GRADES, **VERDICTS}[told["verdict"]]
     return {"kind": kind, "sign": sign, "words": words}
 
 
@@ -119,6 +124,18 @@ def _noise(told: Mapping[str, Any]) -> tuple[str, ...]:
     return (*map(number, values), number(minimum["adev"]), number(minimum["tau_s"]))
 
 
+def _acceptance(told: Mapping[str, Any]) -> tuple[str, ...]:
+    tested = [row for row in told["rows"] if row["tested"]]
+    missed = [f"{row['name']} ({limit_words(row['limit'])})" for row in tested if row["met"] is False]
+    limited = [row for row in told["rows"] if row["limit"] is not None]
+    return (
+        f"{len(tested)} of {len(told['rows'])}",
+        f"{sum(row['met'] is True for row in limited)} of {len(limited)}",
+        "; ".join(missed) or MISSING,
+        "; ".join(told["reasons"]),
+    )
+
+
 _TABLES: dict[str, tuple[Columns, Callable[[Mapping[str, Any]], tuple[str, ...]]]] = {
     "train": (
         (
@@ -163,5 +180,14 @@ _TABLES: dict[str, tuple[Columns, Callable[[Mapping[str, Any]], tuple[str, ...]]
             ("at", "s", "figure"),
         ),
         _noise,
+    ),
+    "lab acceptance": (
+        (
+            ("Tested", "", "figure"),
+            ("Limits met", "", "figure"),
+            ("Missed", "", "text"),
+            ("Why", "", "text"),
+        ),
+        _acceptance,
     ),
 }

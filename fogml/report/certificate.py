@@ -16,8 +16,17 @@ from fogml.report.page import render
 from fogml.report.reduce import drawn
 from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table, reference_of
-from fogml.report.verdict import floor_told, model_card, own_noise, stated_limits, unseen, worst_run
+from fogml.report.verdict import (
+    advice_words,
+    floor_told,
+    model_card,
+    own_noise,
+    stated_limits,
+    unseen,
+    worst_run,
+)
 from fogml.report.words import averages, listed, number, percent, unit_of
+from fogml.validation.advice import advice_on
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
@@ -110,6 +119,7 @@ def _sheet(judgement: Judgement) -> Sheet:
     about = [
         ("Model", f"{card['kind']}" + (f" of {card['features']}" if "features" in card else "")),
         ("Size", ", ".join(card_line(card))),
+        ("Verdict", advice_words(advice_on(judgement))["words"]),
         *([("Trained within", card["trained within"])] if "trained within" in card else []),
         ("Trained on", listed([run.run for run in judgement.train], 6)),
         ("Attitude", _attitude(worst)),

@@ -12,8 +12,9 @@ from typing import TYPE_CHECKING, Any
 from fogml.escaping import cell_text, visible
 from fogml.outputs import whole_file
 from fogml.report.tables import coefficients_of, noticed, repeatability_table
-from fogml.report.verdict import model_card, stated_limits, subject, verdict
+from fogml.report.verdict import advice_words, model_card, stated_limits, subject, verdict
 from fogml.report.words import label, unit_of
+from fogml.validation.advice import advice_on
 from fogml.validation.results import AveragedSeries, Judgement, Metrics, RunJudgement
 
 if TYPE_CHECKING:
@@ -138,7 +139,8 @@ def _summary(writer: Writer, judgement: Judgement) -> None:
     sheet.set_column(1, 6, 16)
     sheet.write_string(0, 0, cell_text(subject(judgement)), writer.title)
     row = 1
-    for sentence in verdict(judgement):
+    told = advice_words(advice_on(judgement))
+    for sentence in (told["words"], *told["reasons"], told["next_step"], *verdict(judgement)):
         sheet.merge_range(row, 0, row, 6, "", writer.wrapped)
         sheet.write_string(row, 0, cell_text(sentence), writer.wrapped)
         sheet.set_row(row, 32)

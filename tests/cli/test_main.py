@@ -14,7 +14,7 @@ import pytest
 from click.testing import CliRunner
 
 import fogml
-from fogml.cli import command, main
+from fogml.cli import each_axis, main
 from fogml.cli.options_page import commands_of
 from fogml.cli.settings import given_settings
 from fogml.errors import InputError
@@ -25,7 +25,7 @@ runner = CliRunner()
 
 def use_command(monkeypatch, action):
     """Make every command do something else."""
-    monkeypatch.setattr(command, "load", lambda place: lambda settings, terminal: action())
+    monkeypatch.setattr(each_axis, "load", lambda place: lambda settings, terminal: action())
 
 
 def every_command():

@@ -12,7 +12,10 @@ import pytest
 import yaml
 from click.testing import CliRunner
 
+from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.main import app
+from fogml.fleet.constants import FORM
+from fogml.fleet.manifest import Unit
 from fogml.runs.reading import read_run
 from tests.cli.conftest import csv_text
 
@@ -75,6 +78,7 @@ def test_train_gives_an_axis_what_its_own_file_gives(home, trained, invoke_json,
         (("inspect", "a.csv"), "inspect"),
         (("noise", "a.csv"), "noise"),
         (("compare", "a.csv", "--test", "b.csv", "--models", "none,mean"), "compare"),
+        (("lab", "acceptance", "a.csv"), "acceptance"),
     ],
 )
 def test_other_commands_write_a_folder_an_axis(home, invoke, tmp_path, monkeypatch, words, page):
@@ -143,3 +147,10 @@ def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invo
         table = np.genfromtxt(tmp_path / f"comp-{axis}.csv", delimiter=",", names=True)
         np.testing.assert_array_equal(np.array(flags)[:, place], table["flag"])
         np.testing.assert_allclose(np.array(left)[:, place], table["gyro_compensated_degh"], atol=1e-5)
+
+
+def test_a_fleet_takes_the_axis_that_its_manifest_names(home, tmp_path):
+    unit = Unit("FOG-3", "train", (str(home / "a.csv"),), (str(home / "b.csv"),), "z", "z")
+    UnitWork({"model": "mean", "averaging": 100.0}, FORM)(unit, tmp_path / "z")
+    report = json.loads((tmp_path / "z" / "report.json").read_text())
+    assert [run["axis"] for run in (*report["train"], *report["test"])] == ["z", "z"]
