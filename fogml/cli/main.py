@@ -61,7 +61,7 @@ COMMANDS = {
     ),
     "monitor": (
         ".monitor:MonitorSettings",
-        "Watch units in service run by run, and say since when one has changed.",
+        "Watch units in service: what their model leaves on each run, and since when that is another.",
     ),
     "effects": (
         ".effects:EffectsSettings",
