@@ -25,7 +25,10 @@ COMMANDS = {
         ".demo:DemoSettings",
         "Train and judge on a real recording that ships, then say what to open.",
     ),
-    "import": (".import_:ImportSettings", "Bring a logger's file into the run format."),
+    "import": (
+        ".import_:ImportSettings",
+        "Bring a logger's file into the run format, or draft a profile for it.",
+    ),
     "inspect": (
         ".inspect:InspectSettings",
         "Say what is in a run: columns, span, gaps, soaks and ramps, faults.",
