@@ -10,7 +10,7 @@ from fogml.gap.families.frame import Columns
 from fogml.gap.families.inference import _setting
 from fogml.gap.families.making_rows import rows_of
 from fogml.gap.families.other_families import power_cycles
-from fogml.gap.families.places import Scene
+from fogml.gap.families.places import Scene, steps_are_coarse
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.reports import assumed
 from fogml.gap.twin_model import TwinModel
@@ -63,3 +63,20 @@ def test_what_each_run_draws_anew_has_columns_of_its_own():
     assert one.shape[1] == other.shape[1] == 2
     np.testing.assert_array_equal(one, np.column_stack([np.ones(len(one)), np.zeros(len(one))]))
     np.testing.assert_array_equal(other, np.column_stack([np.zeros(len(other)), np.ones(len(other))]))
+
+
+def test_steps_of_a_chambers_set_point_are_no_coarse_sensors():
+    twin, time = load_twin("nominal"), np.arange(0.0, 36000.0, 60.0)
+    x = 25.0 + 20.0 * np.sin(time / 5000.0)
+
+    def coarse(inner):
+        columns = {
+            "T_in": inner,
+            "T_out": x + 0.1 * np.cos(time / 900.0),
+            "T_chamber": np.rint(2.0 * x) / 2.0,
+        }
+        run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), **columns)
+        return steps_are_coarse(Scene((rows_of(run, twin, 600),), 1, "tactical"), twin)
+
+    assert not coarse(x)
+    assert coarse(np.rint(10.0 * x) / 10.0)
