@@ -90,11 +90,26 @@ def diagnose(
         If runs are of different units, a run is used twice, no temperature moves, an effect is
         unknown, or no run can be used.
     """
+    tell = progress or (lambda what: None)
+    found = inferred(model, fit, held_out, noise, without, priors, tell)
+    tell("judging on held-out runs")
+    return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, tell)
+
+
+def inferred(
+    model: Twin | AnyModel,
+    fit: Sequence[Run],
+    held_out: Sequence[Run],
+    noise: Run | None,
+    without: Iterable[str],
+    priors: Priors | None,
+    tell: Progress,
+) -> Inference:
+    """The posterior of causes behind the runs of one unit, once those are checked."""
     from threadpoolctl import threadpool_limits
 
     from fogml.twin.registry import effects
 
-    tell = progress or (lambda what: None)
     model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
     for id in without:
         if id not in candidates_of(model) and id not in effects():
@@ -102,19 +117,35 @@ def diagnose(
     check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
-    part = not held_out
-    if part:
+    if not held_out:
         fit, held_out = keep_back(fit)
     with threadpool_limits(1):
         found = infer(model, fit, held_out, noise, without, priors or Priors(), tell)
-        moved = max(float(np.ptp(r.temperature)) for r in found.setting.scene.runs[: len(fit)])
-        if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in found.setting.scene.runs):
-            names = ", ".join(r.run.name for r in found.setting.scene.runs[: len(fit)])
-            raise InputError(
-                f"{names}: temperature moves by {moved:.2g} degC in all; a diagnosis needs a run in which it "
-                f"moves by {LEAST_MOTION_DEGC:g} degC or more"
-            )
-        tell("judging on held-out runs")
+    runs = found.setting.scene.runs
+    moved = max(float(np.ptp(r.temperature)) for r in runs[: found.setting.scene.fitted])
+    if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in runs):
+        names = ", ".join(r.run.name for r in runs[: found.setting.scene.fitted])
+        raise InputError(
+            f"{names}: temperature moves by {moved:.2g} degC in all; a diagnosis needs a run in which it "
+            f"moves by {LEAST_MOTION_DEGC:g} degC or more"
+        )
+    return found
+
+
+def answered(
+    found: Inference,
+    noise: Run | None,
+    part: bool,
+    seed: int,
+    cost_of_false_name: float,
+    plan: bool = False,
+    rehearsed: bool = False,
+    tell: Progress = lambda what: None,
+) -> Diagnosis:
+    """What is said of a posterior; `part` where the last stretch of the last run was held out."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
         judged = judge(found)
         answer = _answer(found, judged, noise, part, seed, cost_of_false_name)
         if plan:

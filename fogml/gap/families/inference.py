@@ -67,6 +67,8 @@ class Inference:
         The likeliest first.
     unusable
         Runs that could not be used, with the reason.
+    shared
+        What other units of the kind say of a set of known causes [nats], where there are some.
     """
 
     model: AnyModel
@@ -77,6 +79,16 @@ class Inference:
     search: Search
     explanations: tuple[Explanation, ...]
     unusable: tuple[tuple[str, str], ...]
+    shared: Callable[[frozenset[str]], float] | None = None
+
+    def with_others(self, explanations: Iterable[Explanation]) -> list[Explanation]:
+        """Sets with what other units say of the causes that they name."""
+        if self.shared is None:
+            return list(explanations)
+        families, names = self.columns.families, self.search.names
+        return [
+            replace(e, shared=self.shared(frozenset(families[f].id for f in names(e)))) for e in explanations
+        ]
 
     @property
     def field(self) -> Field:

@@ -87,13 +87,15 @@ def judge(found: Inference) -> Judgement:
     doubted, since what is unknown has more forms than families of it.
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
-    best = _likeliest(found, found.explanations)
+    first = sorted(found.with_others(found.explanations), key=lambda e: -e.score)
+    best = _likeliest(found, first)
     exchanges = [e for f in search.names(best) for e in search.exchanged(best, f).values()]
-    explanations = _with_more(found.explanations, exchanges)
+    explanations = _with_more(first, found.with_others(exchanges))
     best = _likeliest(found, explanations)
     alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
     instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
-    explanations = _with_more(explanations, [e for sets in instead.values() for e in sets])
+    more = [e for sets in instead.values() for e in sets]
+    explanations = _with_more(explanations, found.with_others(more))
     likeliest = _likeliest(found, explanations)
     if likeliest.key != best.key and not search.names(likeliest) >= search.names(best):
         best = likeliest

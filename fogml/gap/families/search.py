@@ -45,6 +45,8 @@ class Explanation:
         What averaging adds to the evidence at the nodes and sizes that stand for the members.
     by_noise
         Log evidence, with the noise's prior, at each noise.
+    shared
+        What other units say of the causes that it names.
     """
 
     members: tuple[Member, ...]
@@ -52,6 +54,7 @@ class Explanation:
     log_evidence: float
     spread: float = 0.0
     by_noise: tuple[float, ...] = ()
+    shared: float = 0.0
 
     @property
     def key(self) -> tuple[int, ...]:
@@ -62,7 +65,7 @@ class Explanation:
     def score(self) -> float:
         """Logarithm of the posterior, up to a constant."""
         evidence = log_sum_exp(np.array(self.by_noise)) if self.by_noise else self.log_evidence
-        return self.log_prior + evidence
+        return self.log_prior + self.shared + evidence
 
     @property
     def nodes(self) -> list[tuple[int, float]]:
@@ -186,6 +189,12 @@ class Search:
         """The set with a known family exchanged for each of some others."""
         rest = self.without(explanation, {family})
         return {f: self._refined(e) for f, e in self._each_more(rest, others).items()} if others else {}
+
+    def grown(self, explanation: Explanation, families: Sequence[int]) -> Explanation:
+        """The set with some families more, one after the other, then chosen again beside each other."""
+        for f in families:
+            explanation = self._each_more(explanation, [f])[f]
+        return self._refined(explanation) if families else explanation
 
     def families_of(self, kind: str) -> list[int]:
         """Families of a kind that have blocks."""

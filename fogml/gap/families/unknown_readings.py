@@ -15,6 +15,7 @@ from fogml.signals.recursions import play_kernel
 
 GROUPS = (("T", "T_in"), ("T_out",))
 """Sensors that err apart."""
+ALL = ("T", "T_in", "T_out")
 SLACK_DEGC = (0.1, 0.3, 1.0)
 """What a sensor that sticks has to move by before it moves on: it errs by as much, and more would be seen."""
 LARGEST_DEGC = 0.3
@@ -26,9 +27,10 @@ Constants = Mapping[str, float]
 
 def reading_errors(rows: Rows, scene: Scene, constants: Constants) -> Iterator[Block]:
     """Errors that go with temperature, its direction or its past: the same on every run."""
-    for group in GROUPS:
-        of_each = {n: _of_temperature(rows, scene, n) for n in group if n in rows.readings}
-        for columns in _through(rows, constants, of_each, (10, 20, *(1 for _ in 2 * SLACK_DEGC))):
+    of_all = {n: _of_temperature(rows, scene, n) for n in ALL if n in rows.readings}
+    for group in (*GROUPS, ALL):
+        of_each = {n: kinds for n, kinds in of_all.items() if n in group}
+        for columns in _through(rows, constants, of_each, (10, 5, 15, *(1 for _ in 2 * SLACK_DEGC))):
             yield Block(columns)
 
 
@@ -60,7 +62,7 @@ def _of_temperature(rows: Rows, scene: Scene, name: str) -> list[FloatArray]:
         (play_kernel(np.ascontiguousarray(y), s, np.nan)[0] - y) / s for y in (x, other) for s in SLACK_DEGC
     ]
     stuck = [way[:, None] for way in ways_stuck]
-    return [np.column_stack([levels, ways * levels]), np.column_stack([spent, *healing]), *stuck]
+    return [np.column_stack([levels, ways * levels]), spent, np.column_stack(healing), *stuck]
 
 
 def _through(

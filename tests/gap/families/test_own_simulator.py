@@ -77,8 +77,8 @@ class Simulator:
         path.write_text("".join(f"{e.id} {e.amplitude}\n" for e in effects), encoding="utf-8")
 
 
-def _runs(effects=(), count=160, step=90.0, offsets=(1.5, 1.5, 1.5), noisier=1.0):
-    rng, made, time = np.random.default_rng(5), [], step * np.arange(count)
+def made_runs(effects=(), count=160, step=90.0, offsets=(1.5, 1.5, 1.5), noisier=1.0, seed=5):
+    rng, made, time = np.random.default_rng(seed), [], step * np.arange(count)
     root = np.linalg.cholesky(NOISE.covariance(time, step, NOISE.ladder(step, 30.0 * count * step)))
     for offset, (name, low, high) in zip(offsets, (("a", 0.0, 40.0), ("b", 5.0, 38.0), ("c", -2.0, 41.0))):
         corners = [20.0, high, high, low, low, 20.0, 20.0]
@@ -92,7 +92,7 @@ def _runs(effects=(), count=160, step=90.0, offsets=(1.5, 1.5, 1.5), noisier=1.0
 
 def test_an_own_candidate_is_named_with_its_numbers(tmp_path):
     truth = EffectValue("bend", 0.6, {"centre_temperature": 17.0, "width": 5.0})
-    runs, model = _runs((truth,)), Simulator()
+    runs, model = made_runs((truth,)), Simulator()
     found = diagnose(model, runs[:2], runs[2:], without=["bend_again"])
     assert [f.effect for f in found.named] == ["bend"]
     (cause,) = found.named
@@ -125,7 +125,7 @@ def _shares(found):
 
 
 def test_constants_that_changed_between_two_runs_and_a_noisier_held_out_run():
-    runs = _runs(offsets=(1.5, 2.6, 2.6), noisier=3.0)
+    runs = made_runs(offsets=(1.5, 2.6, 2.6), noisier=3.0)
     found = diagnose(Simulator(offered=("creep",)), runs[:2], runs[2:], plan=False)
     assert found.verdict == "unknown"
     assert found.unknown.looks_like == "comes of constants that changed between two runs, a and b"
@@ -136,7 +136,7 @@ def test_constants_that_changed_between_two_runs_and_a_noisier_held_out_run():
 
 def test_what_is_not_known_is_repeated_with_the_power_on_earlier():
     truth = EffectValue("bend", 0.6, {"centre_temperature": 17.0, "width": 5.0})
-    runs = _runs((truth,))
+    runs = made_runs((truth,))
     found = diagnose(Simulator(offered=("creep",)), runs[:2], runs[2:])
     assert found.verdict == "unknown"
     run = found.separating_run
@@ -148,7 +148,7 @@ def test_what_is_not_known_is_repeated_with_the_power_on_earlier():
 
 
 def test_nothing_missing_is_nothing_missing_and_a_model_without_candidates_has_the_catalogues():
-    runs = _runs()
+    runs = made_runs()
     found = diagnose(Simulator(offered=()), runs[:2], runs[2:], plan=False)
     assert found.verdict == "no_gap"
     assert "thermal_hysteresis" in {e.effect for e in found.evidence}
