@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.diagnose import DiagnoseSettings
+from fogml.cli.diagnose_units import diagnose_several, of_several_units, print_several, write_several
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import diagnose
+from fogml.gap.families.units import UnitsDiagnosis
 from fogml.gap.result import Diagnosis
 from fogml.gap.twin_model import TwinModel
 from fogml.json_files import write_json
@@ -22,8 +24,11 @@ NEXT_RUN = "next-run.yaml"
 """The programme of a run that would tell more, for ``fogml simulate``."""
 
 
-def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis:
-    """Diagnose, write ``gap.json``, ``gap.html`` and ``twin.yaml``, and print the verdict."""
+def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis | UnitsDiagnosis:
+    """Diagnose, write ``gap.json``, ``gap.html`` and ``twin.yaml``, and print the verdict.
+
+    Of runs of several units each has them in a folder of its own, beside ``units.json``.
+    """
     if not settings.runs:
         raise InputError("no run is given; name the runs to diagnose before --held-out")
     both = sorted(set(settings.runs) & set(settings.held_out))
@@ -34,6 +39,15 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
         runs = open_runs(settings.runs, terminal, repair=settings.repair)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
         noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
+        if of_several_units(runs):
+            with terminal.work("diagnosing") as work:
+                several = diagnose_several(settings, model, runs, held_out, noise, work.doing)
+                work.doing("writing")
+                write_several(folder, several, model, write_gap)
+                settings.write_into(folder, "diagnose")
+            print_several(several, terminal)
+            terminal.result(several.as_dict())
+            return several
         with terminal.work("diagnosing") as work:
             found = diagnose(
                 model,
@@ -47,7 +61,8 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 progress=work.doing,
             )
             work.doing("writing")
-            _write(folder, settings, found)
+            write_gap(folder, found)
+            settings.write_into(folder, "diagnose")
             found.write_model(model, folder / "twin.yaml")
     _print(found, terminal)
     terminal.result(found.as_dict())
@@ -55,12 +70,12 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     return found
 
 
-def _write(folder: Path, settings: DiagnoseSettings, found: Diagnosis) -> None:
+def write_gap(folder: Path, found: Diagnosis) -> None:
+    """``gap.json``, its page and the programme of a further run."""
     from fogml.report import gap_page
 
     write_json(folder / "gap.json", found.as_dict())
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
-    settings.write_into(folder, "diagnose")
     if found.separating_run is not None:
         (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 

@@ -118,10 +118,11 @@ class UnitWork:
         }
 
     def _diagnose(self, unit: Unit, folder: Path) -> dict[str, Any]:
-        from fogml.cli.diagnose_job import DiagnoseSettings, diagnose_and_write
+        from fogml.cli.diagnose_job import DiagnoseSettings, Diagnosis, diagnose_and_write
 
         settings = self._for(DiagnoseSettings, unit, folder, runs=list(unit.train), held_out=list(unit.test))
         found = diagnose_and_write(settings, Terminal(quiet=True))
+        assert isinstance(found, Diagnosis)
         far = [item for item in found.how_far if item.after is not None]
         worst = max(far, key=lambda item: item.after) if far else None
         return {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -203,16 +203,22 @@ def _with_folders(units: list[Unit], path: Path) -> list[Unit]:
                 f"{count} times; once was expected"
             )
     jobs = len({unit.job for unit in units}) > 1
-    placed, taken = [], set()
+    parts = [[unit.name, unit.axis, unit.job if jobs else ""] for unit in units]
+    folders = folder_names(["-".join(part for part in held if part) for held in parts])
+    return [replace(unit, folder=folder) for unit, folder in zip(units, folders)]
+
+
+def folder_names(units: Sequence[str]) -> list[str]:
+    """A folder for each unit's name, none the same as another's on any system."""
+    placed: list[str] = []
+    taken: set[str] = set()
     for unit in units:
-        parts = [unit.name, unit.axis, unit.job if jobs else ""]
-        wanted = _UNSAFE.sub("_", "-".join(part for part in parts if part)).strip(".") or "unit"
-        wanted = wanted[:_LONGEST_FOLDER]
+        wanted = (_UNSAFE.sub("_", unit).strip(".") or "unit")[:_LONGEST_FOLDER]
         folder, number = wanted, 1
         # Names that differ only in case are one folder on some systems.
         while folder.lower() in taken:
             number += 1
             folder = f"{wanted}-{number}"
         taken.add(folder.lower())
-        placed.append(replace(unit, folder=folder))
+        placed.append(folder)
     return placed

@@ -16,6 +16,8 @@ from click.testing import CliRunner
 from fogml.cli.diagnose_job import _print
 from fogml.cli.main import app
 from fogml.cli.terminal import Terminal
+from fogml.gap.families.units import SharedCause, UnitsDiagnosis
+from fogml.gap.result import Estimate
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
@@ -236,10 +238,37 @@ def test_a_held_out_run_that_is_a_fit_run(runs, tmp_path, invoke):
     assert "copy.csv" in told and "c.csv" in told
 
 
-def test_runs_of_different_units(runs, tmp_path, invoke):
+def test_runs_of_different_units(runs, tmp_path, invoke, monkeypatch):
+    one = rewritten(runs["a"], tmp_path, "one.csv", facts={"unit": "FOG/1"})
     other = rewritten(runs["b"], tmp_path, "other.csv", facts={"unit": "FOG-2"})
-    told = refused(invoke, tmp_path, runs["a"], other, "--held-out", runs["c"])
+    told = refused(invoke, tmp_path, one, "--held-out", other)
     assert "different units" in told and "FOG-2" in told and "other.csv" in told
+    told = refused(invoke, tmp_path, one, other, "--rehearse")
+    assert "of one unit at a time" in told
+    asked = {}
+
+    def together(model, fit, held_out, *, noise, **rest):
+        """Each unit's own answer, and a cause of both."""
+        asked.update(fit=[(r.name, r.facts.unit) for r in fit], held_out=held_out, noise=noise)
+        own = replace(next(iter(every_diagnosis().values())), effects=(), constants=(), separating_run=None)
+        sizes = {"FOG/1": Estimate(0.3, 0.01, "deg/h"), "FOG-2": Estimate(0.4, 0.01, "deg/h")}
+        mean = Estimate(0.35, 0.05, "deg/h")
+        cause = SharedCause("thermal_hysteresis", 0.97, sizes, mean, 0.07, (-0.2, 0.9), "deg/h")
+        return UnitsDiagnosis({"FOG/1": own, "FOG-2": own}, (cause,))
+
+    monkeypatch.setattr("fogml.cli.diagnose_units.diagnose_units", together)
+    monkeypatch.setattr(
+        "fogml.gap.result.Diagnosis.write_model", lambda self, model, path: path.write_text("")
+    )
+    out = tmp_path / "both"
+    said = invoke("diagnose", one, other, "--out", out).stdout
+    assert asked == {"fit": [("one.csv", "FOG/1"), ("other.csv", "FOG-2")], "held_out": [], "noise": []}
+    told = json.loads((out / "units.json").read_text(encoding="utf-8"))
+    assert told["folders"] == {"FOG/1": "FOG_1", "FOG-2": "FOG-2"}
+    for folder in told["folders"].values():
+        assert {p.name for p in (out / folder).iterdir()} == {"gap.json", "gap.html", "twin.yaml"}
+    assert told["shared"][0]["sizes"]["FOG-2"]["value"] == 0.4
+    assert "the next unit's lies between -0.2 and 0.9 deg/h" in " ".join(said.split())
 
 
 def test_no_temperature_that_moves(runs, tmp_path, invoke):
