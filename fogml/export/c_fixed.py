@@ -34,9 +34,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 EXP_ERROR = 3e-8
 """Greatest absolute error of the generated exponential, its argument's rounding included."""
-_HELD_BITS = 20
-_SIGNAL_SHIFT = 24
-_LAG_BITS = _HELD_BITS + 2
+HELD_BITS = 20
+SIGNAL_SHIFT = 24
+LAG_BITS = HELD_BITS + 2
 # A lag's distance from its signal: up to 2**9 degC times a decay of 30 bits fits.
 
 
@@ -63,7 +63,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "atom_bits": scales.atoms.tolist(),
         "column_bits": scales.columns.tolist(),
         "drift_bits": scales.drift,
-        "signal_note": f", steps of 2^-{_HELD_BITS}",
+        "signal_note": f", steps of 2^-{HELD_BITS}",
         "output_note": f", steps of 2^-{OUTPUT_BITS}",
     }
     gyro = (
@@ -104,7 +104,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             for i, operator in windows.of_method("lag")
         },
         "rule": _thermometer(plan, bits, fixed["temperature_most"]),
-        "half_widths": [f"INT64_C({round(atom.memory * 2.0**_HELD_BITS)})" for atom in windows.plays],
+        "half_widths": [f"INT64_C({round(atom.memory * 2.0**HELD_BITS)})" for atom in windows.plays],
         "columns": _columns(plan, scales),
     }
 
@@ -117,28 +117,30 @@ def _thermometer(plan: Plan, bits: int, most: float) -> dict[str, str]:
         "high": f"INT32_C({round(min(rule.high_degC / step, most - 1.0))})",
         "jump": f"INT64_C({round(rule.jump_degC / step)})",
         "rate": f"INT64_C({round(rule.rate_degC_s / step)})",
+        "continuing": f"INT64_C({round(rule.continuing_degC / step)})",
+        "spell_us": str(round(1e6 * rule.spell_s)),
         "note": f", steps of 2^-{bits}",
     }
 
 
 def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
-    shift = _HELD_BITS - bits + _SIGNAL_SHIFT
+    shift = HELD_BITS - bits + SIGNAL_SHIFT
     factors = [
         f"temperatures[{sensor_identifier(name)}] * INT64_C({round(coefficient * 2.0**shift)})"
         for name, coefficient in parts
     ]
-    return f"(int32_t)clipped(scaled({' + '.join(factors)}, {_SIGNAL_SHIFT}), INT64_C(1) << 29)"
+    return f"(int32_t)clipped(scaled({' + '.join(factors)}, {SIGNAL_SHIFT}), INT64_C(1) << 29)"
 
 
-def _divide_bits(unit_ticks: float) -> int:
+def divide_bits(unit_ticks: float) -> int:
     """Bits of a quotient with which rates up to 1024 degC per unit fit, and their product with the unit."""
     unit_bits = log2(unit_ticks)
-    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - _HELD_BITS)
+    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - HELD_BITS)
 
 
 def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:
     """Bits behind the point of each operator's value: those of the atom that it makes."""
-    bits = [_HELD_BITS] * len(windows.operators)
+    bits = [HELD_BITS] * len(windows.operators)
     for i, place in enumerate(windows.of_atom):
         if place >= 0 and plan.atoms[i].operator != "sign":
             bits[place] = int(scales.atoms[i])
@@ -151,33 +153,33 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
     for i, operator in windows.of_method("block"):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = round(unit_s / windows.tick_s)
-        divide = _divide_bits(unit)
-        value = f"block_value(&newest, &before, INT64_C({unit}), {divide}, {_HELD_BITS + divide - bits[i]})"
+        divide = divide_bits(unit)
+        value = f"block_value(&newest, &before, INT64_C({unit}), {divide}, {HELD_BITS + divide - bits[i]})"
         if operator.unit_s is None:
-            whole = f"block_value(&newest, &before, 0, 0, {_HELD_BITS - bits[i]})"
+            whole = f"block_value(&newest, &before, 0, 0, {HELD_BITS - bits[i]})"
             value = f"known < INT64_C({operator.needed_ticks}) ? {value} : {whole}"
         found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, operator) in enumerate(windows.of_method("slope")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
-        divide = _divide_bits(unit)
+        divide = divide_bits(unit)
         arguments = f"state, &SLOPE[{place}], &sums, bins, INT64_C({unit}), {divide}"
-        value = f"slope_value({arguments}, {_HELD_BITS + divide - bits[i]})"
+        value = f"slope_value({arguments}, {HELD_BITS + divide - bits[i]})"
         found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("lag")):
         behind = f"(int64_t)signal[{operator.signal}] * 4 - state->lag[{place}].behind"
-        found[i] = f"scaled({behind}, {_LAG_BITS - bits[i]})"
+        found[i] = f"scaled({behind}, {LAG_BITS - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("first")):
         difference = f"(int64_t)signal[{operator.signal}] - state->first[{place}]"
         if operator.unit_s is None:
-            found[i] = f"scaled({difference}, {_HELD_BITS - bits[i]})"
+            found[i] = f"scaled({difference}, {HELD_BITS - bits[i]})"
         else:
             unit = round(operator.unit_s * 1e6)
-            divide = _divide_bits(unit)
+            divide = divide_bits(unit)
             rate = f"rate_of({difference}, interval_us, {divide}, INT64_C({unit}))"
-            found[i] = f"scaled({rate}, {_HELD_BITS + divide - bits[i]})"
+            found[i] = f"scaled({rate}, {HELD_BITS + divide - bits[i]})"
     return found
 
 
@@ -186,7 +188,7 @@ def _exponential_arguments(windows: Layout) -> dict[int, str]:
     for i, operator in windows.of_method("exp"):
         tau = round(operator.window.length_s * 1e6)
         unit = round((operator.window.length_s if operator.unit_s is None else operator.unit_s) * 1e6)
-        found[i] = f"INT64_C({tau}), INT64_C({unit}), {_divide_bits(unit)}, INT64_C({operator.needed_ticks})"
+        found[i] = f"INT64_C({tau}), INT64_C({unit}), {divide_bits(unit)}, INT64_C({operator.needed_ticks})"
     return found
 
 
@@ -194,13 +196,13 @@ def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     place, bits = windows.of_atom[i], int(scales.atoms[i])
     if plan.atoms[i].operator == "play":
         value = f"state->play[{windows.plays.index(plan.atoms[i])}].state"
-        return f"(int32_t)clipped(scaled({value}, {_HELD_BITS - bits}), INT32_MAX)"
+        return f"(int32_t)clipped(scaled({value}, {HELD_BITS - bits}), INT32_MAX)"
     if plan.atoms[i].bounds is not None:
-        low, high = (round(end * 2.0**_HELD_BITS) for end in plan.atoms[i].bounds or ())
+        low, high = (round(end * 2.0**HELD_BITS) for end in plan.atoms[i].bounds or ())
         value = f"beyond(signal[{windows.signal_of_atom[i]}], INT64_C({low}), INT64_C({high}))"
-        return f"(int32_t)scaled({value}, {_HELD_BITS - bits})"
+        return f"(int32_t)scaled({value}, {HELD_BITS - bits})"
     if place < 0:
-        value = f"scaled(signal[{windows.signal_of_atom[i]}], {_HELD_BITS - bits})"
+        value = f"scaled(signal[{windows.signal_of_atom[i]}], {HELD_BITS - bits})"
         return f"(int32_t)clipped({value}, INT32_MAX)"
     value = f"value[{place}]"
     if plan.atoms[i].operator == "sign":

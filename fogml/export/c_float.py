@@ -107,6 +107,8 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             "high": number(min(plan.thermometer.high_degC, 2.0**RANGE_BITS)),
             "jump": number(plan.thermometer.jump_degC),
             "rate": number(plan.thermometer.rate_degC_s),
+            "continuing": number(plan.thermometer.continuing_degC),
+            "spell_us": round(1e6 * plan.thermometer.spell_s),
             "note": "",
         },
         "half_widths": [number(atom.memory) for atom in windows.plays],

@@ -23,6 +23,8 @@ from fogml.export.check import (
     value_difference,
 )
 from fogml.export.documentation import DOCUMENTATION_FILE, documentation
+from fogml.export.false_readings import false_reading_lines, false_readings
+from fogml.export.fixed_bound import fixed_point_error
 from fogml.export.instructions import instructions_per_sample
 from fogml.export.layout import layout
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
@@ -150,7 +152,8 @@ def _pruned(
 def _write_c(
     plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
 ) -> tuple[dict[str, Any], Plan]:
-    source = c_source(plan, dtype, card_lines(card, plan, dtype))
+    false = false_readings(plan, seed)
+    source = c_source(plan, dtype, [*card_lines(card, plan, dtype), *false_reading_lines(false)])
     with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
         source = source.with_expected(*expected_outputs(source, Path(scratch)))
         program = CProgram(source, Path(scratch))
@@ -168,6 +171,7 @@ def _write_c(
     write_files(files, folder)
     fixed = source.numbers["fixed"]
     report: dict[str, Any] = {"difference": difference, "cortex_m4": size, "clock": CLOCK}
+    report |= {} if false is None else {"false_readings": false}
     windows = source.layout
     if windows.binned:
         report["bins"] = {"held": windows.ring, "seconds": windows.bin_samples * plan.sample_s}
@@ -178,6 +182,7 @@ def _write_c(
             "temperature_unit_degc": fixed["temperature_value"],
             "gyro_unit": fixed["gyro_value"],
             "compensated_unit_deg_h": fixed["compensated_value"],
+            "largest_difference_proven": fixed_point_error(plan, windows, dtype),
         }
     return report, plan
 

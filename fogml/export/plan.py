@@ -170,6 +170,7 @@ class Plan:
             tuple(features.names()),
             Limits.of(features, compact.linear_beyond),
             sample_s,
+            thermometer=features.thermometer,
         )
 
     @property

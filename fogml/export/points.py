@@ -74,7 +74,9 @@ class History:
         if not plan.atoms:
             everywhere = np.ones(len(self.time), dtype=np.bool_)
             return AtomValues(np.empty((len(self.time), 0)), everywhere, everywhere)
-        return Features(", ".join(plan.names)).atom_values(self.run(plan), plan.sample_s)
+        features = Features(", ".join(plan.names))
+        features.thermometer = plan.thermometer
+        return features.atom_values(self.run(plan), plan.sample_s)
 
 
 def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:

@@ -39,7 +39,7 @@ class FeatureBlocks:
         InputError
             If the block does not begin after the last one's end, or lacks a column.
         """
-        history = self._history
+        block, history = block.read_by(self._features.thermometer), self._history
         if history is not None and len(block) and len(history) and not block.time[0] > history.time[-1]:
             raise InputError(
                 f"{block.name}: a block begins at {block.time[0]} s, not after the last one's end at "

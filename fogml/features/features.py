@@ -19,7 +19,9 @@ from fogml.features.slices import Slices
 from fogml.features.terms import Term, atom_columns, atom_matrix, compose, composition_plan, unique_terms
 from fogml.features.transformer import Transformer
 from fogml.features.unmeasured import evaluate_measured, heeded_rows
+from fogml.runs.dropouts import RULE, DropoutRule
 from fogml.runs.run import Run
+from fogml.runs.thermometer_limits import limits_from_dict
 
 if TYPE_CHECKING:
     from fogml.features.blocks import FeatureBlocks
@@ -35,7 +37,7 @@ class Features(Transformer):
     ``Features("T, dT, T*dT")`` builds them from feature text; ``a + b`` puts two beside each other
     (repeats dropped), ``a * b`` makes all products of a term of one and a term of the other.
     Every feature is causal. Two are equal where their terms are, in the same order, whatever box
-    they have learned.
+    they have learned. ``thermometer`` is what thermometers can show: readings beyond are none.
 
     Parameters
     ----------
@@ -75,6 +77,7 @@ class Features(Transformer):
         self._plan = composition_plan(self._terms, self._atoms)
         self._box: Box | None = None
         self._slices: Slices | None = None
+        self.thermometer: DropoutRule = RULE
 
     def __repr__(self) -> str:
         return f"Features({self.text!r})"
@@ -177,9 +180,12 @@ class Features(Transformer):
         return self._slices
 
     def set_box(
-        self, box: Mapping[str, tuple[float, float]], slices: Mapping[str, Any] | None = None
+        self,
+        box: Mapping[str, tuple[float, float]],
+        slices: Mapping[str, Any] | None = None,
+        thermometer: Mapping[str, float] | None = None,
     ) -> Self:
-        """Take over a box as `box` gives it, and `Slices.as_dict`, for example from a saved model.
+        """Take over a box as `box` gives it, `Slices.as_dict` and `limits_as_dict`, as of a saved model.
 
         Raises
         ------
@@ -192,6 +198,7 @@ class Features(Transformer):
         low, high = zip(*(box[atom.text] for atom in self._atoms))
         self._box = Box(np.array(low), np.array(high))
         self._slices = None if slices is None else Slices.from_dict(slices, self._atoms)
+        self.thermometer = self.thermometer if thermometer is None else limits_from_dict(thermometer)
         return self
 
     def _learned_box(self) -> Box:
@@ -222,6 +229,7 @@ class Features(Transformer):
             If a column is missing, or a window or time constant is shorter than the sample interval.
         """
         check_holds(run, self.sensors, self._text)
+        run = run.read_by(self.thermometer)
         values = np.empty((len(run), len(self._atoms)), order="F")
         return AtomValues(values, *evaluate_measured(self._atoms, run, sample_s, values, memories, skip))
 

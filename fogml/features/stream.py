@@ -170,8 +170,9 @@ class FeatureStream:
         """Whether all temperatures in use are readings; where a first one was none, begin anew."""
         assert self._weights is not None
         used = dict.fromkeys(name for weights in self._weights.values() for name in weights)
+        rule = self._features.thermometer
         told = [
-            self._thermometers.setdefault(name, ThermometerStream()).read(time_s, temperatures[name])
+            self._thermometers.setdefault(name, ThermometerStream(rule)).read(time_s, temperatures[name])
             for name in used
             if is_temperature(name)
         ]

@@ -17,6 +17,7 @@ from fogml.features.features import Features
 from fogml.features.slices import SavedSlices
 from fogml.models.box import slices_of
 from fogml.runs.run import Run
+from fogml.runs.thermometer_limits import SavedLimits, limits_as_dict, trained_limits
 from fogml.strict import Strict, strictly
 
 
@@ -52,6 +53,9 @@ class TrainingCard:
         Atom of the features to its [low, high] in the training rows, in the atom's unit.
     slices
         Trained ranges at each temperature, as `fogml.features.slices.Slices.as_dict` gives them.
+    thermometer
+        Limits of what a thermometer can show, as `fogml.runs.thermometer_limits.limits_as_dict` gives them;
+        None for those of any thermometer.
     notes
         What a user of the model should know.
     """
@@ -67,6 +71,7 @@ class TrainingCard:
     box: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
     slices: Mapping[str, Any] | None = None
+    thermometer: Mapping[str, float] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """The card as JSON-ready values."""
@@ -82,6 +87,7 @@ class TrainingCard:
             "box": {name: [low, high] for name, (low, high) in self.box.items()},
             "notes": list(self.notes),
             "slices": None if self.slices is None else dict(self.slices),
+            "thermometer": None if self.thermometer is None else dict(self.thermometer),
         }
 
     @classmethod
@@ -106,6 +112,7 @@ class TrainingCard:
             box={name: (low, high) for name, (low, high) in saved.box.items()},
             notes=tuple(saved.notes),
             slices=None if saved.slices is None else saved.slices.model_dump(),
+            thermometer=None if saved.thermometer is None else saved.thermometer.model_dump(),
         )
 
 
@@ -128,6 +135,7 @@ class _Saved(Strict):
     box: dict[str, Annotated[list[float], Len(2, 2)]]
     notes: list[str]
     slices: SavedSlices | None = None
+    thermometer: SavedLimits | None = None
 
 
 def training_card(
@@ -149,10 +157,12 @@ def training_card(
     rows
         Training rows used.
     features
-        Features whose box is learned; None of a model without.
+        Features whose box is learned; None of a model without. Here they learn what thermometers show.
     notes
         What a user of the model should know.
     """
+    if features is not None:
+        features.thermometer = trained_limits(runs, features.sensors)
     return TrainingCard(
         unit=_common(run.facts.unit for run in runs),
         axis=_common(run.facts.axis for run in runs),
@@ -165,6 +175,7 @@ def training_card(
         box=dict(features.box) if features is not None else {},
         notes=tuple(notes),
         slices=slices_of(features) if features is not None else None,
+        thermometer=limits_as_dict(features.thermometer) if features is not None else None,
     )
 
 

@@ -267,7 +267,7 @@ class FeatureModel(DriftModel):
         """Set what a fit learned."""
         check_feature_text(saved.asked_features)
         self.features_ = parse_features(saved.features)
-        self.features_.set_box(card.box, card.slices)
+        self.features_.set_box(card.box, card.slices, card.thermometer)
         self.regressor_ = regressor_from_saved(saved.regressor, arrays)
         columns = getattr(self.regressor_, "n_features_in_", None)
         if columns != len(self.features_):

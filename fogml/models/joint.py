@@ -233,7 +233,7 @@ class JointModel(DriftModel):
         model = cls(saved.patent, saved.product, saved.rate_window_s, saved.features)
         model.gradient_ = saved.gradient
         model.features_ = model._own_features()
-        model.features_.set_box(card.box, card.slices)
+        model.features_.set_box(card.box, card.slices, card.thermometer)
         model.regressor_ = LinearRegressor.from_saved(saved.regressor, arrays)
         if model.regressor_.n_features_in_ != 3 + len(model.features_.names()):
             raise InputError("coefficients and columns differ in number")

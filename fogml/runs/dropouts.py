@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,9 +19,13 @@ class DropoutRule:
     """What a thermometer at a gyro can show, stated sample by sample.
 
     A reading is none if it is below `low_degC` or above `high_degC`; if it is further from the last
-    good one than `jump_degC` and `rate_degC_s` times the time since; or if it is the very value that
-    was rejected just before, as a sentinel stays the same however long it lasts. In its place the last
-    good reading is held.
+    good one than `jump_degC` and `rate_degC_s` times the time since; or if it goes on with a reading that
+    was rejected just before: the very value, as a sentinel stays the same however long it lasts, or one that
+    is within half of `jump_degC` and `rate_degC_s` of it, for up to `spell_s`. In its place the last good
+    reading is held.
+
+    So, in a spell that began with a step that no heat makes, the time that passes lends it no likelihood;
+    half of the jump, as a sound reading right after a false one is further than that from it.
 
     Attributes
     ----------
@@ -32,6 +36,9 @@ class DropoutRule:
         Largest step between neighbouring readings [degC]: beyond steps and noise of any sensor in use.
     rate_degC_s
         Fastest change [degC/s]: 30 degC/min, twice what a fast chamber makes of its air.
+    spell_s
+        How long a spell of readings that go on with a false one is false [s]: a thermometer whose readings
+        have stepped for longer, as one that was moved, is believed within the fastest change since.
     noise_sigma
         A thermometer noisier than `jump_degC` allows may step this many of its own robust standard
         deviations.
@@ -41,7 +48,20 @@ class DropoutRule:
     high_degC: float = 200.0
     jump_degC: float = 5.0
     rate_degC_s: float = 0.5
+    spell_s: float = 300.0
     noise_sigma: float = 8.0
+
+    @property
+    def continuing_degC(self) -> float:
+        """How near to a false reading the next one goes on with it [degC], and `rate_degC_s` further."""
+        return 0.5 * self.jump_degC
+
+    def off_degC(self, missing_s: float) -> float:
+        """How far a false reading can be off that passes as heat [degC], `missing_s` after a good one.
+
+        It is within the rule of the last good reading, and true heat has gone as far the other way at most.
+        """
+        return self.jump_degC + 2.0 * self.rate_degC_s * missing_s
 
 
 RULE = DropoutRule()
@@ -65,11 +85,13 @@ class Reading:
 
 @dataclass(frozen=True)
 class LastReading:
-    """What a thermometer showed: the last good reading [degC], its time [s], what was rejected since."""
+    """What a thermometer showed: the last good reading [degC] and its time [s]; what was rejected last since
+    then, and when."""
 
     good: float
     time: float
     rejected: float | None
+    rejected_s: float
 
 
 def read_thermometer(
@@ -102,9 +124,8 @@ def last_reading(time: FloatArray, values: FloatArray, found: Reading) -> LastRe
     """The state after readings, to go on from."""
     good = np.flatnonzero(~found.bad) if found.bad is not None else np.array([len(values) - 1])
     at = int(good[-1]) if len(good) else 0
-    return LastReading(
-        float(found.values[-1]), float(time[at]), float(values[-1]) if at < len(values) - 1 else None
-    )
+    rejected = float(values[-1]) if at < len(values) - 1 else None
+    return LastReading(float(found.values[-1]), float(time[at]), rejected, float(time[-1]))
 
 
 def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastReading | None) -> Reading:
@@ -124,28 +145,30 @@ def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastR
     suspects = np.flatnonzero(~ranged[1:] | (steps > jump + rule.rate_degC_s * apart)) + 1
     bad = np.zeros(len(values), dtype=bool)
     cleaned = values.copy()
-    first = _first_good(values, ranged, jump) if before is None else 0
+    used = replace(rule, jump_degC=jump)
+    first = _first_good(time, values, ranged, used) if before is None else 0
     bad[:first] = True
     cleaned[:first] = values[first]
     at, rejected = first, None
     if before is not None and before.rejected is not None:
         # The spell may go on.
-        suspects, rejected = np.append(1, suspects), before.rejected
+        suspects, rejected = np.append(1, suspects), before
     for suspect in suspects.tolist():
         if suspect <= at:
             continue
-        at = _hold(time, values, ranged, cleaned, bad, suspect, jump, rule.rate_degC_s, rejected)
+        at = _hold(time, values, ranged, cleaned, bad, suspect, used, rejected)
         rejected = None
     if not bad.any() or (before is None and np.count_nonzero(bad) > (1.0 - _LEAST_GOOD) * len(values)):
         return Reading(values)
     return Reading(cleaned, bad)
 
 
-def _first_good(values: FloatArray, ranged: BoolArray, jump: float) -> int:
-    """The first reading in range that is near to what most of the first ones are."""
+def _first_good(time: FloatArray, values: FloatArray, ranged: BoolArray, rule: DropoutRule) -> int:
+    """The first reading in range that is as near to what most of the first ones are as heat allows."""
     places = np.flatnonzero(ranged)[:_STARTING]
-    usual = float(np.median(values[places]))
-    near = places[np.abs(values[places] - usual) <= jump]
+    usual, middle = float(np.median(values[places])), float(np.median(time[places]))
+    limit = rule.jump_degC + rule.rate_degC_s * np.abs(time[places] - middle)
+    near = places[np.abs(values[places] - usual) <= limit]
     return int(near[0]) if len(near) else int(places[0])
 
 
@@ -156,15 +179,33 @@ def _hold(
     cleaned: FloatArray,
     bad: BoolArray,
     start: int,
-    jump: float,
-    rate: float,
-    rejected: float | None,
+    rule: DropoutRule,
+    before: LastReading | None,
 ) -> int:
     """Hold the reading before `start` until one is good again; the place of that one."""
     good, since = float(cleaned[start - 1]), float(time[start - 1])
+    rejected, rejected_s = (None, since) if before is None else (before.rejected, before.rejected_s)
     for i in range(start, len(values)):
-        value = float(values[i])
-        if ranged[i] and value != rejected and abs(value - good) <= jump + rate * (time[i] - since):
+        value, now = float(values[i]), float(time[i])
+        if ranged[i] and believed(rule, value, now, good, since, rejected, rejected_s):
             return i
-        bad[i], cleaned[i], rejected = True, good, value
+        bad[i], cleaned[i], rejected, rejected_s = True, good, value, now
     return len(values)
+
+
+def believed(
+    rule: DropoutRule,
+    value: float,
+    now_s: float,
+    good: float,
+    good_s: float,
+    rejected: float | None,
+    rejected_s: float,
+) -> bool:
+    """Whether a reading in range [degC] is one, after a good one and what was rejected since, if anything."""
+    passed = now_s - good_s
+    if not abs(value - good) <= rule.jump_degC + rule.rate_degC_s * passed:
+        return False
+    if rejected is None or (passed > rule.spell_s and value != rejected):
+        return True
+    return not abs(value - rejected) <= rule.continuing_degC + rule.rate_degC_s * (now_s - rejected_s)

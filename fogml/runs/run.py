@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
 from types import MappingProxyType
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from fogml.errors import InputError
 from fogml.runs.arrival_times import sampling_times
 from fogml.runs.columns import coil_sensor_number, is_temperature
-from fogml.runs.dropouts import Reading, last_reading, read_thermometer
+from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_thermometer
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns
@@ -52,6 +52,7 @@ class Run:
     facts: Facts = field(default_factory=Facts)
     gyro_unit: Literal["deg/h", "count"] = "deg/h"
     findings: tuple[Finding, ...] = ()
+    _rule: ClassVar[DropoutRule] = RULE
 
     def __post_init__(self) -> None:
         """Check the columns as a file's reader does.
@@ -212,7 +213,18 @@ class Run:
 
     @cached_property
     def _readings(self) -> dict[str, Reading]:
-        return {name: read_thermometer(self.time, self.columns[name]) for name in self.temperature_columns}
+        time, names = self.time, self.temperature_columns
+        return {name: read_thermometer(time, self.columns[name], self._rule) for name in names}
+
+    def read_by(self, rule: DropoutRule) -> Run:
+        """The run, its thermometers read by a rule of one's own: what is no reading by that is held."""
+        if rule == self._rule:
+            return self
+        known: dict[DropoutRule, Run] = self.__dict__.setdefault("_read_by", {})
+        if rule not in known:
+            (run := self._with(self.columns)).__dict__.update(_rule=rule, clock=self.clock)
+            known[rule] = run
+        return known[rule]
 
     def after(self, before: Run) -> Run:
         """The run behind the one before it as one, with the columns of that.
@@ -225,23 +237,24 @@ class Run:
         for name in before.temperature_columns:
             first = before._readings[name]
             state = last_reading(before.time, before.columns[name], first)
-            second = read_thermometer(self.time, self.columns[name], before=state)
+            second = read_thermometer(self.time, self.columns[name], before._rule, state)
             bad = None
             if first.bad is not None or second.bad is not None:
                 parts = ((first, len(before)), (second, len(self)))
                 bad = np.concatenate([np.zeros(n, bool) if r.bad is None else r.bad for r, n in parts])
             readings[name] = Reading(np.concatenate([first.values, second.values]), bad)
-        joined.__dict__["_readings"] = readings
+        joined.__dict__.update(_rule=before._rule, _readings=readings)
         return joined
 
     def end(self, start: int, names: Iterable[str]) -> Run:
         """A copy of some columns from a sample on, which keeps nothing else in memory."""
         columns = {name: self.columns[name][start:].copy() for name in names}
         part = Run.derived(self.name, columns, self.facts, self.gyro_unit)
-        part.__dict__["_readings"] = {
+        readings = {
             name: Reading(r.values[start:].copy(), None if r.bad is None else r.bad[start:].copy())
             for name, r in self._readings.items()
         }
+        part.__dict__.update(_rule=self._rule, _readings=readings)
         return part
 
     def dropouts(self, name: str) -> BoolArray | None:
@@ -309,7 +322,9 @@ class Run:
         return Run.derived(self.name, self.columns, facts, self.gyro_unit, self.findings)
 
     def _with(self, columns: Mapping[str, FloatArray]) -> Run:
-        return Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
+        run = Run.derived(self.name, columns, self.facts, self.gyro_unit, self.findings)
+        run.__dict__["_rule"] = self._rule
+        return run
 
     def with_findings(self, findings: Iterable[Finding]) -> Run:
         """The run with more findings; those come first that make every figure wrong."""

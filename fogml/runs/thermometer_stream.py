@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from fogml.runs.dropouts import RULE, DropoutRule
+from fogml.runs.dropouts import RULE, DropoutRule, believed
 
 
 class Told(Enum):
@@ -33,25 +33,20 @@ class ThermometerStream:
 
     def __init__(self, rule: DropoutRule = RULE) -> None:
         self._rule = rule
-        self._good = self._good_s = float("nan")
+        self._good = self._good_s = self._rejected_s = float("nan")
         self._readings = 0
         self._rejected: float | None = None
 
     def read(self, time_s: float, value: float) -> Told:
         """What a reading [degC] at a time [s] is."""
-        rule = self._rule
-        repeated = value == self._rejected
-        if not rule.low_degC <= value <= rule.high_degC or (self._readings and repeated):
-            self._rejected = value
+        rule, known = self._rule, self._readings > 0
+        held = self._good, self._good_s, self._rejected, self._rejected_s
+        near = known and believed(rule, value, time_s, *held)
+        repeated = known and value == self._rejected
+        ranged = rule.low_degC <= value <= rule.high_degC
+        if not ranged or repeated or (self._readings > 1 and not near):
+            self._rejected, self._rejected_s = value, time_s
             return Told.MISSING
-        if self._readings:
-            limit = rule.jump_degC + rule.rate_degC_s * (time_s - self._good_s)
-            if abs(value - self._good) > limit and self._readings > 1:
-                self._rejected = value
-                return Told.MISSING
-            near = abs(value - self._good) <= limit
-        else:
-            near = False
         self._good, self._good_s, self._rejected = value, time_s, None
         self._readings = 2 if near else 1
         return Told.GOOD if near else Told.FIRST

@@ -29,12 +29,14 @@ def cycle(seed=0, interval=1.0):
 
 def by_the_rule(time, values):
     """The rule as its docstring states it, sample by sample, from a good first reading on."""
-    good, since, rejected, held, bad = values[0], time[0], None, [values[0]], [False]
+    good, since, rejected, at, held, bad = values[0], time[0], None, 0.0, [values[0]], [False]
     for t, x in zip(time[1:], values[1:], strict=True):
         is_bad = not RULE.low_degC <= x <= RULE.high_degC or x == rejected
         is_bad |= abs(x - good) > RULE.jump_degC + RULE.rate_degC_s * (t - since)
+        if rejected is not None and t - since <= RULE.spell_s:
+            is_bad |= abs(x - rejected) <= 0.5 * RULE.jump_degC + RULE.rate_degC_s * (t - at)
         if is_bad:
-            rejected = x
+            rejected, at = x, t
         else:
             good, since, rejected = x, t, None
         held.append(good)

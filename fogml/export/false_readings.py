@@ -1,0 +1,125 @@
+"""What false readings of a thermometer can do that pass as heat: the largest error at flag 0."""
+
+from __future__ import annotations
+
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.export.plan import Plan
+from fogml.export.points import box_points
+from fogml.features.atoms import RATE_UNIT_S, Atom
+from fogml.runs.columns import is_temperature
+
+FloatArray = NDArray[np.float64]
+SECONDS = (0.0, 60.0, 300.0)
+"""Times without a good reading [s] that the error is stated after."""
+_POINTS, _MOST_SIGNS = 256, 32
+_ALL = {"block": 2.0, "slope": 3.0, "exp": 2.0}
+# Sum of the sizes of a window's weights, times its length: no false readings can move it further.
+_ONE = {"block": 1.0, "slope": 6.0}
+# Largest of those weights, times the square of its length and over the sample interval.
+
+
+def false_reading_error(plan: Plan, seconds: float = 0.0, *, spell: bool, seed: int = 0) -> float:
+    """Largest error of the drift at flag 0 that false readings make which pass as heat [deg/h].
+
+    Each may be off by what the rule of readings allows (`DropoutRule.off_degC`), in any sense. How far an
+    atom then is off follows from its weights; what the model makes of that is the largest over points and
+    corners of the trained box, both the true and the false value being within, as flag 0 holds.
+
+    Parameters
+    ----------
+    plan
+        What is exported.
+    seconds
+        Time without a good reading before the false one [s], beside one sample interval.
+    spell
+        Whether all that windows hold and memories took in may be false, or one reading alone.
+    seed
+        Seed of the points.
+    """
+    off = plan.thermometer.off_degC(plan.sample_s + seconds)
+    shift = np.array([off * atom_gain(atom, plan.sample_s, spell) for atom in plan.atoms])
+    moved = np.flatnonzero(shift > 0.0)
+    if not len(moved):
+        return 0.0
+    low, high = plan.limits.box_low, plan.limits.box_high
+    rng = np.random.default_rng([seed, 3])
+    points = np.concatenate([box_points(plan, seed, count=_POINTS), _corners(low, high, rng)])
+    none, worst = np.zeros(len(points)), 0.0
+    before = plan.value(plan.full_columns(points), none)
+    for signs in _signs(len(moved), rng):
+        false = points.copy()
+        false[:, moved] += signs * shift[moved]
+        after = plan.value(plan.full_columns(np.clip(false, low, high)), none)
+        worst = max(worst, float(np.abs(after - before).max()))
+    return worst
+
+
+def false_readings(plan: Plan, seed: int = 0) -> dict[str, Any] | None:
+    """What ``export.json`` says of it; None where no thermometer is read."""
+    if not any(is_temperature(name) for name in plan.sensors):
+        return None
+    rule = plan.thermometer
+    return {
+        "step_degC": rule.jump_degC,
+        "rate_degC_s": rule.rate_degC_s,
+        "spell_s": rule.spell_s,
+        "largest_error": [
+            {
+                "missing_s": seconds,
+                "off_degC": rule.off_degC(plan.sample_s + seconds),
+                "one_deg_h": false_reading_error(plan, seconds, spell=False, seed=seed),
+                "spell_deg_h": false_reading_error(plan, seconds, spell=True, seed=seed),
+            }
+            for seconds in SECONDS
+        ],
+    }
+
+
+def false_reading_lines(told: dict[str, Any] | None) -> list[str]:
+    """The same as lines of text."""
+    if told is None:
+        return []
+    first, *_, last = told["largest_error"]
+    return [
+        f"readings      believed within {told['step_degC']:.3g} degC and {told['rate_degC_s']:.3g} degC/s of "
+        "the last good one;",
+        f"              a false one that passes is off by up to {first['off_degC']:.3g} degC and makes, at",
+        f"              flag 0, an error of up to {first['one_deg_h']:.3g} deg/h, a spell of such "
+        f"{first['spell_deg_h']:.3g} deg/h;",
+        f"              after {last['missing_s']:g} s without a good one {last['off_degC']:.3g} degC, "
+        f"{last['one_deg_h']:.3g} and {last['spell_deg_h']:.3g} deg/h",
+    ]
+
+
+def atom_gain(atom: Atom, sample_s: float, spell: bool) -> float:
+    """How far an atom moves at most where readings are off by 1 degC: all that it holds, or one of them."""
+    moved = sum(abs(weight) for name, weight in atom.signal.parts if is_temperature(name))
+    if atom.operator == "sign":
+        return 2.0 * float(np.sign(moved))
+    if atom.operator == "lag" and not spell:
+        return moved * min(1.0, sample_s / atom.memory)
+    if atom.window is None:
+        return moved
+    method, length = atom.window.method, atom.window.length_s or sample_s
+    unit = length if atom.operator == "diff" else RATE_UNIT_S
+    if spell:
+        return moved * _ALL.get(method, 2.0) * unit / length
+    share = _ONE[method] * min(1.0, sample_s / length) if method in _ONE else 1.0
+    return moved * share * unit / length
+
+
+def _corners(low: FloatArray, high: FloatArray, rng: np.random.Generator) -> FloatArray:
+    return np.asarray(np.where(_signs(len(low), rng) > 0.0, high, low))
+
+
+def _signs(count: int, rng: np.random.Generator) -> FloatArray:
+    """All combinations of -1 and 1, or some of them where there are many; shape (s, count)."""
+    if 2**count <= _MOST_SIGNS:
+        return np.array(list(product((-1.0, 1.0), repeat=count)))
+    drawn = rng.choice([-1.0, 1.0], (_MOST_SIGNS - 2, count))
+    return np.concatenate([np.ones((1, count)), -np.ones((1, count)), drawn])

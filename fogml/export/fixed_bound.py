@@ -1,0 +1,186 @@
+"""The worst case of fixed point, proven: how far whole numbers can be from the model over the trained box.
+
+Every value is followed with the largest size that it takes there and a bound of its error: temperatures as
+whole steps, windows and memories, coefficients as they are stored, and the rounding after every operation.
+What windows make of bins of samples is no matter of fixed point, and not in it.
+"""
+
+from __future__ import annotations
+
+from math import exp
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.export.c_fixed import EXP_ERROR, HELD_BITS, LAG_BITS, SIGNAL_SHIFT, divide_bits
+from fogml.export.false_readings import atom_gain
+from fogml.export.fixed_scales import (
+    OUTPUT_BITS,
+    VALUE_BITS,
+    Scales,
+    common_bits,
+    fitting_bits,
+    product_range,
+)
+from fogml.export.layout import RANGE_BITS, Layout, Operator
+from fogml.export.plan import Plan
+from fogml.features.atoms import Atom
+
+FloatArray = NDArray[np.float64]
+_GYRO_DEG_H = 20.0
+_HELD = 2.0**-HELD_BITS
+_STEEPEST, _LARGEST, _TWICE = (2.0 / exp(1.0)) ** 0.5, (0.5 / exp(1.0)) ** 0.5, 2.0 / exp(1.0)
+# Of exp(-z^2): its steepest slope, and the largest of z and of 2 z^2 times it.
+
+
+def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
+    """Largest difference of C in ``q31`` or ``q15`` from the plan in the trained box [deg/h], or None.
+
+    For outputs up to 20 deg/h of a model with a scale factor. A direction within a rounding of its dead band
+    is not in it, and slopes over bins are not followed.
+    """
+    scales = Scales(plan, dtype)
+    if any(o.method == "slope" for o in windows.operators) and windows.binned:
+        return None
+    atoms = np.array([_atom_error(i, plan, windows, scales) for i in range(len(plan.atoms))])
+    columns = _column_errors(plan, scales, atoms)
+    unit, arrays = 0.5 * 2.0**-scales.drift, plan.arrays
+    total = unit + 0.5 * 2.0**-OUTPUT_BITS
+    if "linear" in arrays:
+        linear = np.abs(arrays["linear"])
+        stored = np.abs(scales.linear * 2.0**-scales.linear_bits - arrays["linear"])
+        total += float(np.sum(linear * columns + stored * (scales.most + columns) + unit))
+    if plan.centres:
+        total += _gaussians_error(plan, scales, columns, 1 << (VALUE_BITS - scales.stored_bits))
+    if plan.gives_rate:
+        most, gyro = float(scales.most[0]), _GYRO_DEG_H / abs(float(arrays["scale"][0]))
+        step, (_, s1, s2) = 2.0**-scales.scale_bits, np.abs(arrays["scale"])
+        off = step * (2.0 + most + most**2) + float(columns[0]) * (s1 + 2.0 * most * s2)
+        total += gyro * off + unit
+    return float(total) if np.isfinite(total) else None
+
+
+def _atom_error(i: int, plan: Plan, windows: Layout, scales: Scales) -> float:
+    """Bound of an atom's error, its rounding to its own steps included."""
+    atom, place = plan.atoms[i], windows.of_atom[i]
+    own = 0.5 * 2.0 ** -int(scales.atoms[i])
+    if atom.operator == "sign":
+        return 0.0
+    shift = HELD_BITS - scales.temperature_bits + SIGNAL_SHIFT
+    given = np.array([coefficient for _, coefficient in atom.signal.parts])
+    coefficients = np.abs(given)
+    stored = np.abs(np.round(given * 2.0**shift) * 2.0**-shift - given)
+    read = 0.5 * 2.0**-scales.temperature_bits * float(coefficients.sum())
+    signal = read + float(stored.sum()) * 2.0**RANGE_BITS + 0.5 * _HELD
+    # The box's ends and what levels off beyond are rounded, too.
+    own *= 3.0
+    if place < 0:
+        return signal + own + {"play": _HELD, "beyond": 4.0 * _HELD}.get(atom.operator, 0.0)
+    operator = windows.operators[place]
+    return own + _operator_error(atom, operator, signal / float(coefficients.sum()), plan, windows)
+
+
+def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, windows: Layout) -> float:
+    """Bound of a window's or a lag's error, its signal being off by `read` for each unit of its weights."""
+    length, step = operator.window.length_s, plan.sample_s
+    span = _span(atom, plan)
+    if operator.lag:
+        steps = max(1.0, length / step)
+        per_step = 2.0**-LAG_BITS + (EXP_ERROR + 2.0**-28) * span
+        return float(read * 2.0 * sum(abs(w) for _, w in atom.signal.parts) + steps * per_step)
+    gain = atom_gain(atom, step, spell=True)
+    unit_s = length if operator.unit_s is None else operator.unit_s
+    held = 2.0 * _HELD if windows.binned else 0.0
+    if operator.method == "block":
+        means = gain * (read + held + 2.0 ** -(HELD_BITS + 8))
+        if operator.unit_s is None:
+            return means
+        unit = round(operator.unit_s / windows.tick_s)
+        age = span * gain * 2.0**-3 / operator.window_ticks
+        return means + age + unit * 2.0 ** -(HELD_BITS + divide_bits(unit))
+    if operator.method == "slope":
+        unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
+        rounding = unit * 2.0 ** -(HELD_BITS + divide_bits(unit))
+        return gain * (read + 3.0 * _HELD) + 24.0 * 2.0**-17 * span * unit_s / length + rounding
+    if operator.method == "first":
+        if operator.unit_s is None:
+            return gain * read
+        unit = round(operator.unit_s * 1e6)
+        return gain * read + unit * 2.0 ** -(HELD_BITS + divide_bits(unit))
+    unit, steps = round(unit_s * 1e6), max(1.0, length / step)
+    rounding = unit * 2.0 ** -(HELD_BITS + divide_bits(unit)) + 2.0**-24 + steps * 2.0**-25
+    return gain * read + rounding + 3.0 * span * steps * (EXP_ERROR + 2.0**-30) * unit_s / length
+
+
+def _span(atom: Atom, plan: Plan) -> float:
+    """How far an atom's signal is from itself at most [degC]: as trained, where its value is an input."""
+    for i, other in enumerate(plan.atoms):
+        if other.operator == "value" and other.signal == atom.signal:
+            return float(plan.limits.box_high[i] - plan.limits.box_low[i])
+    return 2.0**RANGE_BITS
+
+
+def _column_errors(plan: Plan, scales: Scales, atoms: FloatArray) -> FloatArray:
+    """Bounds of the columns' errors, products being taken as `c_fixed` takes them."""
+    limits = plan.limits
+    low, high = limits.low - limits.margin, limits.high + limits.margin
+    size = np.maximum(np.abs(low), np.abs(high))
+    found: list[float] = []
+    for place, step in enumerate(plan.steps):
+        factors = list(step.atoms)
+        if step.column is None:
+            first = factors.pop(0)
+            most, off, span = float(size[first]), float(atoms[first]), (float(low[first]), float(high[first]))
+        else:
+            most, off, span = float(scales.most[step.column]), found[step.column], (0.0, 0.0)
+        for atom in factors:
+            into = int(scales.columns[place])
+            if step.column is None:
+                span = product_range(span, (float(low[atom]), float(high[atom])))
+                into = fitting_bits(max(abs(span[0]), abs(span[1])))
+            off = off * (size[atom] + atoms[atom]) + most * atoms[atom] + 0.5 * 2.0**-into
+            most *= float(size[atom])
+        found.append(float(off + 0.5 * 2.0 ** -int(scales.columns[place])))
+    return np.array(found)
+
+
+def _gaussians_error(plan: Plan, scales: Scales, columns: FloatArray, step: int) -> float:
+    arrays, seen = plan.arrays, list(plan.columns)
+    inverse, unit = 1.0 / arrays["widths"], 2.0 ** -scales.columns[seen]
+    off, moved = columns[seen], np.zeros(len(seen))
+    if plan.edge_columns:
+        off, moved = _drawn(plan, scales, columns)
+    centres = np.round(arrays["centres"] / unit / step) * unit * step
+    stored = np.array([common_bits(inverse[:, d], scales.stored_bits) for d in range(len(seen))])
+    relative = np.abs(np.round(inverse * 2.0**stored) * 2.0**-stored / inverse - 1.0)
+    placed = (off + np.abs(centres - arrays["centres"])) * inverse * (1.0 + relative) + 0.5 * 2.0**-27
+    basis = np.sum(_STEEPEST * placed + placed**2 + _TWICE * relative + 0.5 * 2.0**-26, axis=1) + EXP_ERROR
+    if plan.edge_columns:
+        # basis * (1 - 2 along), along = z step / width
+        along = moved * inverse
+        slipped = _LARGEST * (off + columns[seen]) * inverse + along * (placed + relative) + 2.0**-19
+        basis += 2.0 * np.sum(slipped + 8.0 * along * basis[:, None], axis=1)
+    weights = np.abs(arrays["weights"])
+    kept = np.abs(np.round(arrays["weights"] * 2.0**scales.weight_bits) * 2.0**-scales.weight_bits)
+    reach = 1.0 + 2.0 * _LARGEST * float(np.max(np.sum(moved * inverse, axis=1)))
+    own = (
+        0.5
+        * 2.0 ** -(scales.weight_bits + VALUE_BITS - scales.stored_bits)
+        * (1.0 + 2048.0 * bool(moved.any()))
+    )
+    return float(np.sum(weights * basis + np.abs(kept - weights) * reach + own + 2.0**-scales.drift))
+
+
+def _drawn(plan: Plan, scales: Scales, columns: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Errors of the Gaussians' columns drawn in to the trained rates, and how far each is drawn at most."""
+    edges, seen = list(plan.edge_columns), list(plan.columns)
+    bound = np.abs(plan.edge)
+    with np.errstate(divide="ignore"):
+        share = float(np.max(columns[edges] / bound)) + 2.0**-30
+    least = float(np.min(np.minimum(1.0, bound / scales.most[edges])))
+    off, moved = columns[seen].copy(), np.zeros(len(seen))
+    for d, k in enumerate(seen):
+        if k in edges and least < 1.0:
+            off[d] += scales.most[k] * share + 0.5 * 2.0 ** -int(scales.columns[k])
+            moved[d] = scales.most[k] * (1.0 - least)
+    return off, moved

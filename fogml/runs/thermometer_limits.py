@@ -1,0 +1,108 @@
+"""What the thermometers of training runs showed, as limits of what the same ones can show later on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from fogml.runs.columns import is_temperature
+from fogml.runs.dropouts import RULE, DropoutRule
+from fogml.runs.run import Run
+from fogml.strict import Strict, strictly
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LimitSettings:
+    """How far beyond training runs a thermometer is believed.
+
+    Attributes
+    ----------
+    rate_margin
+        Times the fastest trained rate of temperature: chambers' fast ramps are up to three times those that
+        models are trained on.
+    least_rate_degC_s
+        Fastest rate at least [degC/s]: 5 degC/min, what usual chambers do; training runs may be slower.
+    averaging_s
+        Rates are of averages so long [s]: a thermometer's noise makes none.
+    step_margin
+        Times the largest trained step between neighbours beyond what that rate does: the noise of months is
+        larger than that of hours.
+    least_step_degC
+        Step at least [degC]: that of the coarsest thermometers in use, such as an LM75.
+    """
+
+    rate_margin: float = 3.0
+    least_rate_degC_s: float = 5.0 / 60.0
+    averaging_s: float = 60.0
+    step_margin: float = 2.0
+    least_step_degC: float = 0.5
+
+
+LIMITS = LimitSettings()
+
+
+class SavedLimits(Strict):
+    """Limits as `limits_as_dict` writes them."""
+
+    jump_degC: float = Field(gt=0.0)
+    rate_degC_s: float = Field(gt=0.0)
+
+
+def limits_as_dict(rule: DropoutRule) -> dict[str, float]:
+    """The limits that training sets, JSON-ready."""
+    return {"jump_degC": rule.jump_degC, "rate_degC_s": rule.rate_degC_s}
+
+
+def limits_from_dict(values: Mapping[str, float] | None) -> DropoutRule:
+    """The rule that `limits_as_dict` wrote; that of any thermometer for None."""
+    if values is None:
+        return RULE
+    saved = strictly(SavedLimits, dict(values), "thermometer")
+    return DropoutRule(jump_degC=saved.jump_degC, rate_degC_s=saved.rate_degC_s, noise_sigma=0.0)
+
+
+def trained_limits(
+    runs: Sequence[Run], names: Iterable[str], settings: LimitSettings = LIMITS
+) -> DropoutRule:
+    """What a thermometer can show, from training runs; never more than `RULE` allows.
+
+    Parameters
+    ----------
+    runs
+        Training runs.
+    names
+        What features take, by names in formulas; those that are no temperatures don't count.
+    settings
+        Margins.
+    """
+    step = rate = 0.0
+    for run in runs:
+        sensors = dict.fromkeys(s for name in names if is_temperature(name) for s in run.sensors(name))
+        for sensor in sensors:
+            values, bad = run.temperature(sensor), run.dropouts(sensor)
+            good = slice(None) if bad is None else ~bad
+            fastest = _fastest(run.time[good], values[good], settings.averaging_s)
+            apart, moved = np.diff(run.time[good]), np.abs(np.diff(values[good]))
+            rate = max(rate, fastest)
+            step = max(step, float((moved - fastest * apart).max(initial=0.0)))
+    return DropoutRule(
+        jump_degC=min(max(settings.step_margin * step, settings.least_step_degC), RULE.jump_degC),
+        rate_degC_s=min(max(settings.rate_margin * rate, settings.least_rate_degC_s), RULE.rate_degC_s),
+        noise_sigma=0.0,
+    )
+
+
+def _fastest(time: FloatArray, values: FloatArray, averaging_s: float) -> float:
+    """Fastest rate of averages that follow each other [degC/s]."""
+    if len(time) < 2:
+        return 0.0
+    starts = np.flatnonzero(np.diff((time - time[0]) // averaging_s, prepend=-1.0))
+    counts = np.diff(np.append(starts, len(time)))
+    middle, mean = np.add.reduceat(time, starts) / counts, np.add.reduceat(values, starts) / counts
+    return float(np.max(np.abs(np.diff(mean)) / np.diff(middle), initial=0.0))

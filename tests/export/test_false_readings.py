@@ -1,0 +1,119 @@
+"""False readings within what training showed of heat can do no more than is stated, in C as in batch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.export.c_program import CProgram
+from fogml.export.c_source import c_source
+from fogml.export.check import c_difference
+from fogml.export.false_readings import false_reading_error, false_readings
+from fogml.export.fixed_bound import fixed_point_error
+from fogml.export.plan import Plan
+from fogml.models.compensation import compensate_blocks
+from fogml.models.names import make_model
+from fogml.models.saved import load_model, save_model
+from fogml.runs.dropouts import RULE, read_thermometer
+from fogml.runs.run import Run
+from fogml.runs.thermometer_limits import LIMITS, trained_limits
+from tests.export.test_c_code import disturbed, needs_cc, outputs
+
+RATE = 4.0 / 60.0
+
+
+def ramps(noise=0.0):
+    """Two hours of ramps at 4 degC/min between -20 and 60 degC, 0.01 deg/h/degC and 0.3 deg/h/(degC/min)."""
+    time = np.arange(7200.0)
+    T = -20.0 + np.abs((RATE * time) % 160.0 - 80.0)
+    T += noise * np.random.default_rng(1).choice([-1.0, 1.0], len(time))
+    return Run("ramps", {"time": time, "gyro": 0.01 * T + 0.3 * 60.0 * np.gradient(T, time), "T": T})
+
+
+def test_limits_are_those_of_training():
+    rule = trained_limits([ramps()], ["T"])
+    np.testing.assert_allclose(rule.rate_degC_s, LIMITS.rate_margin * RATE, rtol=1e-6)
+    assert rule.jump_degC == LIMITS.least_step_degC
+    noisy = trained_limits([ramps(0.5)], ["T"])
+    np.testing.assert_allclose(noisy.jump_degC, LIMITS.step_margin * 1.0, rtol=0.05)
+    slow = Run("slow", {"time": np.arange(99.0), "gyro": np.zeros(99), "T": np.full(99, 20.0)})
+    assert trained_limits([slow], ["T"]).rate_degC_s == LIMITS.least_rate_degC_s
+    assert read_thermometer(ramps(0.5).time, ramps(0.5).columns["T"], noisy).bad is None
+
+
+def test_the_stated_error_against_closed_forms():
+    model = make_model("polynomial", features="T, dT").fit(ramps())
+    plan = Plan.of(model)
+    off = plan.thermometer.off_degC(1.0)
+    slope, per_rate = (abs(float(value)) for value in plan.arrays["linear"])
+    one = false_reading_error(plan, spell=False)
+    np.testing.assert_allclose(one, off * (slope + per_rate * 60.0 / 64.0 / 64.0), rtol=1e-9)
+    spell = false_reading_error(plan, spell=True)
+    np.testing.assert_allclose(spell, off * (slope + per_rate * 2.0 * 60.0 / 64.0), rtol=1e-9)
+    told = false_readings(plan)
+    assert told["largest_error"][0]["one_deg_h"] == one and abs(told["rate_degC_s"] - 3.0 * RATE) < 1e-9
+    assert false_readings(Plan.of(make_model("mean").fit(ramps()))) is None
+
+
+def with_offsets(run: Run, seed: int, most: float) -> tuple[Run, np.ndarray]:
+    """The run with spells in which a thermometer is off by up to `most` degC, and where."""
+    rng = np.random.default_rng(seed)
+    columns, fault = dict(run.columns), np.zeros(len(run), dtype=bool)
+    names = [name for name in columns if name.startswith("T")]
+    for place in range(200, len(run) - 100, 150):
+        spell = slice(place, place + int(rng.choice([1, 3, 30])))
+        name = str(rng.choice(names))
+        columns[name] = columns[name].copy()
+        columns[name][spell] += rng.uniform(-most, most)
+        fault[spell] = True
+    return Run("faulty", columns), fault
+
+
+@needs_cc
+@pytest.mark.parametrize(("name", "dtype"), [("memory", "float64"), ("polynomial", "q31")])
+def test_c_takes_offsets_as_batch_does(model_of, tmp_path, name, dtype):
+    model = model_of(name)
+    run, _ = with_offsets(disturbed(5), 3, 4.0)
+    source = c_source(Plan.of(model), dtype, [])
+    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    expected = model.compensate(run)
+    assert np.mean(flag != expected.flag) < (1e-9 if dtype == "float64" else 2e-3)
+    same = flag == expected.flag
+    np.testing.assert_allclose(
+        out[same], expected.compensated[same], atol=2e-6 if dtype == "float64" else 5e-3
+    )
+    blocks = [run[low : low + 90] for low in range(0, len(run), 90)]
+    parts = [part for _, part in compensate_blocks(model, blocks)]
+    np.testing.assert_array_equal(np.concatenate([part.flag for part in parts]), expected.flag)
+
+
+def test_no_error_at_flag_0_exceeds_what_is_stated(tmp_path):
+    model = make_model("polynomial", features="T, dT").fit(ramps())
+    save_model(model, tmp_path / "model")
+    model = load_model(tmp_path / "model")
+    clean = ramps()
+    run, fault = with_offsets(clean, 4, 4.0)
+    stated = false_reading_error(Plan.of(model), spell=True)
+    found, expected = model.compensate(run), model.compensate(clean)
+    good = found.flag == 0
+    assert np.count_nonzero(good & fault) > 3  # what is within a step of training passes
+    largest = np.abs(found.drift - expected.drift)[good].max()
+    assert largest < stated
+    # Any thermometer's rule lets more through than that.
+    model.features_.thermometer = RULE
+    loose = model.compensate(run)
+    assert np.abs(loose.drift - expected.drift)[loose.flag == 0].max() > 2.0 * largest
+
+
+@needs_cc
+@pytest.mark.parametrize(
+    ("name", "dtype", "factor"),
+    [("polynomial", "q31", 10), ("polynomial", "q15", 10), ("memory", "q31", 10), ("joint", "q15", 10)],
+)
+def test_fixed_point_stays_within_its_proven_bound(model_of, tmp_path, name, dtype, factor):
+    plan = Plan.of(model_of(name))
+    source = c_source(plan, dtype, [])
+    proven = fixed_point_error(plan, source.layout, dtype)
+    program = CProgram(source, tmp_path)
+    measured = [c_difference(plan, source, program, seed).inside for seed in (0, 1)]
+    assert max(measured) <= proven < factor * max(measured)
