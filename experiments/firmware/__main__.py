@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-from experiments.firmware.units import FEATURES, NOISE_DEGC, Unit, blocks, temperatures, trained_model
+from experiments.firmware.units import (
+    FEATURES,
+    NOISE_DEGC,
+    Unit,
+    blocks,
+    code_of,
+    temperatures,
+    trained_model,
+)
 from experiments.results import write_results
 from fogml import __version__
 from fogml.export.c_program import cortex_m4_size
@@ -44,7 +52,13 @@ def beside_the_model(
     """Of each unit the largest difference at flag 0, flags that differ, and counts of flags."""
     step_us = round(sample_s * 1e6)
     found: list[dict[str, Any]] = [
-        {"dtype": unit.dtype, "seconds": seconds, "largest_difference": 0.0, "flags_differ": 0}
+        {
+            "dtype": unit.dtype,
+            "code": unit.code,
+            "seconds": seconds,
+            "largest_difference": 0.0,
+            "flags_differ": 0,
+        }
         for unit in units
     ]
     flags = np.zeros(3, dtype=np.int64)
@@ -175,11 +189,12 @@ def main() -> int:
 
 
 def sizes(source: CSource) -> dict[str, Any] | None:
-    """Bytes and instructions of a sample on a Cortex-M4; None without its compiler."""
+    """Bytes and instructions of a sample on a Cortex-M4, and of which code; None without its compiler."""
     with tempfile.TemporaryDirectory() as name:
         size = cortex_m4_size(source, Path(name))
         if size is not None:
             size["instructions_per_sample"] = instructions_per_sample(source, Path(name))
+            size["code"] = code_of(source)
         return size
 
 
@@ -191,22 +206,24 @@ def _page(result: dict[str, Any]) -> str:
         f"1/256 °C with {NOISE_DEGC * 1e3:g} m°C of noise; its 90 % half-width is "
         f"{result['half_width_90_deg_h']:.3g} deg/h. Clocks begin at Unix time in microseconds; at 1 Hz they "
         "are 32-bit and wrap every 71.6 minutes. Sizes are bytes on a Cortex-M4 (arm-none-eabi-gcc -Os), "
-        "instructions those of its code for one sample (-O2), counted in an emulator.",
+        "instructions those of its code for one sample (-O2), counted in an emulator. Code is a hash of the "
+        "C without its comments and numbers: of what ran, and of what was measured where that is another.",
         "",
         "| rate | length | format | largest difference at flag 0 [deg/h] | flags that differ | "
-        "samples with flag 0, 1, 2 | RAM | flash | instructions |",
-        "|---|---|---|---|---|---|---|---|---|",
+        "samples with flag 0, 1, 2 | RAM | flash | instructions | code |",
+        "|---|---|---|---|---|---|---|---|---|---|",
     ]
     for name, case in result["cases"].items():
         for row in case:
             hours = row["seconds"] / 3600.0
             length = f"{hours:g} h" if hours < 1000.0 else f"{hours / 24.0:g} days"
-            size = result["sizes"][name][row["dtype"]] or dict.fromkeys(_SIZES, "–")
+            size = result["sizes"][name][row["dtype"]] or dict.fromkeys((*_SIZES, "code"), "–")
+            codes = dict.fromkeys((row["code"], size["code"]))
             counts = ", ".join(str(count) for count in row["flags"])
             lines.append(
                 f"| {name} | {length} | {row['dtype']} | {row['largest_difference']:.2g} "
                 f"| {row['flags_differ']} | {counts} | {size['ram_bytes']} | {size['flash_bytes']} "
-                f"| {size['instructions_per_sample']} |"
+                f"| {size['instructions_per_sample']} | {', '.join(codes)} |"
             )
     faults = result["faults"]
     told = faults["stated"]

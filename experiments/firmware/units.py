@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import subprocess
 import tempfile
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +16,7 @@ from numpy.typing import NDArray
 
 from experiments.synthetic_world import World, cycle
 from fogml.export.c_program import FLAGS, host_compiler
-from fogml.export.c_source import CSource
+from fogml.export.c_source import SOURCE, CSource
 from fogml.export.check import expected_outputs
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
@@ -53,7 +55,7 @@ class Unit:
     """Compiled C with a state of its own."""
 
     def __init__(self, source: CSource, *flags: str) -> None:
-        self._numbers, self.dtype = source.numbers, source.dtype
+        self._numbers, self.dtype, self.code = source.numbers, source.dtype, code_of(source)
         kinds = {"T": source.numbers["temperature_type"], "G": source.numbers["gyro_type"]}
         self._kinds = {name: np.dtype(_NUMPY[kind]) for name, kind in kinds.items()}
         self._folder = tempfile.TemporaryDirectory()
@@ -84,6 +86,12 @@ class Unit:
         start = ctypes.c_uint64(start_us % (1 << 64))
         self._library.feed(self._state, ctypes.c_int64(len(T)), start, ctypes.c_uint64(step_us), *places)
         return out.astype(np.float64) * unit, flag
+
+
+def code_of(source: CSource) -> str:
+    """What tells generated C apart: a hash of its text without comments and numbers."""
+    text = re.sub(r"/\*.*?\*/", "", source.files[SOURCE], flags=re.DOTALL)
+    return sha256(re.sub(r"-?\d[\w.]*(e-?\d+f?)?", "0", text).encode()).hexdigest()[:8]
 
 
 def temperatures(time: FloatArray, seed: int) -> FloatArray:

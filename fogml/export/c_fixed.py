@@ -77,6 +77,9 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     rates = any(o.method not in ("first", "lag") or (not o.lag and o.unit_s) for o in windows.operators)
     return {
         "fixed": fixed,
+        "kernels": [],
+        "curves": [],
+        "recursions": [],
         "rates": rates,
         "ratios": rates or bool(windows.of_method("lag")) or bool(plan.centres and plan.edge_columns),
         "slice_inputs": slice_inputs(plan, scales.atoms),

@@ -10,10 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
+from fogml.export.c_own import curve_expression, own_constants, own_context
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Limits, Plan
 from fogml.features.atoms import DEAD_BAND
+from fogml.features.own import Function
 from fogml.features.signal import Signal, unit_of
 from fogml.runs.columns import is_temperature
 
@@ -113,6 +115,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         },
         "half_widths": [number(atom.memory) for atom in windows.plays],
         "columns": column_expressions(plan),
+        **own_context(plan, windows, number, real),
     }
 
 
@@ -133,6 +136,8 @@ def _atom(i: int, plan: Plan, windows: Layout, zero: str, number: Any) -> str:
         return f"state->play[{windows.plays.index(atom)}].state"
     if atom.operator == "since_on":
         return f"exp_of_minus({signal} > {zero} ? {signal} / {number(atom.memory)} : {zero})"
+    if isinstance(atom.own, Function):
+        return curve_expression(plan, atom, signal, number)
     if atom.bounds is not None:
         return f"beyond({signal}, {', '.join(number(end) for end in atom.bounds)})"
     if operator < 0:
@@ -184,11 +189,15 @@ def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
         if operator.unit_s is not None:
             unit = number(operator.unit_s / windows.tick_s)
         found[i] = f"told_part(block_value(&newest, &before, {unit}), {operator.filling})"
-    for place, (i, operator) in enumerate(windows.of_method("slope")):
+    for place, (i, operator) in enumerate(windows.lines):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = number(unit_s / (windows.tick_s * operator.window_ticks))
-        value = f"slope_value(state, &SLOPE[{place}], &sums, bins, {unit})"
+        own = operator.window.own
+        name, weights = ("slope", "") if own is None else ("kernel", f"KERNEL_{place}, {len(own.weights)}, ")
+        value = f"{name}_value(state, &SLOPE[{place}], &sums, bins, {weights}{unit})"
         found[i] = f"told_part({value}, {operator.filling})"
+    for place, (i, operator) in enumerate(windows.of_method("own")):
+        found[i] = f"value_own_{place}(&state->own_{place}, signal[{operator.signal}])"
     for place, (i, operator) in enumerate(windows.of_method("exp")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"
@@ -233,6 +242,7 @@ def _constants(plan: Plan, windows: Layout, dtype: str, real: str) -> list[str]:
             lines += [f"#define SLICE_{name.upper()} {number(numbers[name])}" for name in ("first", "width")]
             for name in ("low", "high"):
                 lines += array(f"SLICE_{name.upper()}", numbers[name], dtype, "[SLICED][SLICES]", real)
+    lines += own_constants(plan, windows, number, real)
     return [CCode(line) for line in (*lines, "", *_model_constants(plan, dtype, real))]
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from fogml.export.plan import Plan
 from fogml.export.points import box_points
 from fogml.features.atoms import RATE_UNIT_S, Atom
+from fogml.features.own import Recursion
 from fogml.runs.columns import is_temperature
 
 FloatArray = NDArray[np.float64]
@@ -103,12 +104,17 @@ def atom_gain(atom: Atom, sample_s: float, spell: bool) -> float:
         return 2.0 * float(np.sign(moved))
     if atom.operator == "lag" and not spell:
         return moved * min(1.0, sample_s / atom.memory)
+    if (own := atom.own) is not None:
+        # Of a curve it is not asked: what flag 0 lets through is its bound.
+        most = own.gain if isinstance(own, Recursion) else float("inf")
+        return most * moved if moved else 0.0
     if atom.window is None:
         return moved
     method, length = atom.window.method, atom.window.length_s or sample_s
     unit = length if atom.operator == "diff" else RATE_UNIT_S
-    if spell:
-        return moved * _ALL.get(method, 2.0) * unit / length
+    if spell or atom.window.own is not None:
+        weights = _ALL.get(method, 2.0) if atom.window.own is None else atom.window.own.gain
+        return moved * weights * unit / length
     share = _ONE[method] * min(1.0, sample_s / length) if method in _ONE else 1.0
     return moved * share * unit / length
 

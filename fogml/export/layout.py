@@ -12,12 +12,13 @@ from typing import Literal
 
 from fogml.errors import InputError
 from fogml.export.plan import Plan
-from fogml.features.atoms import RATE_UNIT_S, Atom, Window
-from fogml.features.bins import HELD_METHODS, ring_of
+from fogml.features.atoms import RATE_UNIT_S, Atom
+from fogml.features.bins import ring_of
+from fogml.features.own import Recursion
 from fogml.features.signal import Signal
+from fogml.features.windows import Window
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import (
-    EXPONENTIAL_SPAN,
     GAP_INTERVALS,
     LEAST_SHARE,
     check_window,
@@ -27,8 +28,9 @@ from fogml.signals.clock import (
 
 Number = Literal["float64", "float32", "fixed"]
 OPERATORS = frozenset(("value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"))
-METHODS = frozenset(("block", "slope", "exp", "first"))
-"""Operators and methods of windows that there is C for: each has its lines in the templates."""
+"""Operators that there is C for, beside one's own: each has its lines in the templates."""
+_UNTIMED_S = 3600.0
+# Of recursions that know no time: what their clock must reach over.
 
 TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
 """Held temperatures are multiples of 2**-bits degC."""
@@ -61,6 +63,8 @@ class Operator:
         Time until what the window holds counts; what it reaches over.
     lag
         Whether it is a first-order lag, with the window's length as its time constant.
+    own
+        The atom of a recursion of one's own, likewise.
     """
 
     window: Window
@@ -74,6 +78,7 @@ class Operator:
     counting_ticks: int
     span_ticks: int
     lag: bool = False
+    own: Atom | None = None
 
     @property
     def filling(self) -> str:
@@ -82,8 +87,8 @@ class Operator:
 
     @property
     def method(self) -> str:
-        """``block``, ``slope``, ``exp``, ``first`` or ``lag``."""
-        return "lag" if self.lag else self.window.method
+        """``block``, ``slope``, ``exp``, ``first``, a window of one's own; ``lag`` or ``own``."""
+        return "own" if self.own is not None else "lag" if self.lag else self.window.method
 
 
 @dataclass(frozen=True)
@@ -142,6 +147,11 @@ class Layout:
         """Operators of a method with their places."""
         return [(i, operator) for i, operator in enumerate(self.operators) if operator.method == method]
 
+    @property
+    def lines(self) -> list[tuple[int, Operator]]:
+        """The slopes and the windows of one's own, which hold their samples alike, with their places."""
+        return [(i, o) for i, o in enumerate(self.operators) if o.window.held and o.method != "block"]
+
 
 def layout(plan: Plan, number: Number) -> Layout:
     """The windows and memories of a plan for C code.
@@ -156,19 +166,20 @@ def layout(plan: Plan, number: Number) -> Layout:
         _check_held(atom, number)
     signals = tuple(dict.fromkeys(atom.signal for atom in plan.atoms))
     keys = tuple(dict.fromkeys(key for atom in plan.atoms if (key := _key(atom)) is not None))
-    for _, window, _, lag in keys:
-        _check(window, plan.sample_s, lag)
-    held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.method in HELD_METHODS))
+    for _, window, _, memory in keys:
+        _check(window, plan.sample_s, memory)
+    held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.held))
     ring, bin_samples = ring_of([window for _, window, _, _ in keys], plan.sample_s)
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
-    held_s = [w.span_s for _, w, _, _ in keys if w.method in HELD_METHODS]
+    held_s = [w.span_s for _, w, _, _ in keys if w.held]
     tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
     tick_s = tick_us * 1e-6
     operators = []
-    for (signal, window, unit_s, lag), gap_s in zip(keys, gaps):
+    for (signal, window, unit_s, memory), gap_s in zip(keys, gaps):
         place = signals.index(signal)
         operator = _operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s)
-        operators.append(replace(operator, lag=lag))
+        own = memory if memory is not None and memory.operator != "lag" else None
+        operators.append(replace(operator, lag=memory is not None and own is None, own=own))
     of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
     longest_gap = max(gaps, default=0.0)
     return Layout(
@@ -188,13 +199,16 @@ def layout(plan: Plan, number: Number) -> Layout:
 
 def _check_held(atom: Atom, number: Number) -> None:
     """Refuse what C code can't hold: what it has no lines for, columns whose range it can't know."""
-    known = atom.operator in OPERATORS and (atom.window is None or atom.window.method in METHODS)
-    if not known:
+    own = atom.own if atom.window is None else atom.window.own
+    if isinstance(own, Recursion) and own.c is None:
         raise InputError(
-            f"export: the model takes {atom.text}, which there is no C for; C code holds the operators "
-            f"{', '.join(sorted(OPERATORS))} and windows of {', '.join(sorted(METHODS))}. Export it "
-            "--to onnx or json, which take features, or --to onnx --with-pipeline, which takes any window "
-            "that is linear in temperature"
+            f"export: the model takes {atom.text}, which is declared without its C; state it in the `c` of "
+            "its Recursion. Or export it --to onnx or json, which take features"
+        )
+    if own is not None and number == "fixed":
+        raise InputError(
+            f"export: the model takes {atom.text}; what is declared as one's own is computed in floating "
+            "point: use --dtype float32 or float64"
         )
     if all(is_temperature(name) for name in atom.signal.sensors):
         return
@@ -203,29 +217,31 @@ def _check_held(atom: Atom, number: Number) -> None:
             f"export: the model takes {atom.text}; C code in fixed point takes temperatures alone, whose "
             "range it knows; use --dtype float32 or float64"
         )
-    if atom.window is not None and atom.window.method in HELD_METHODS:
+    if atom.window is not None and atom.window.held:
         raise InputError(
             f"export: the model takes {atom.text}; C code holds windows of temperatures alone, whose range "
             f"it knows; train with {atom.text.partition('[')[0]}[exp, {atom.window.length_s:g} s]"
         )
 
 
-def _key(atom: Atom) -> tuple[Signal, Window, float | None, bool] | None:
+def _key(atom: Atom) -> tuple[Signal, Window, float | None, Atom | None] | None:
     """What tells running operators apart: a rate and its direction share one."""
     if atom.operator == "lag":
-        return atom.signal, Window("exp", atom.memory), None, True
+        return atom.signal, Window("exp", atom.memory), None, atom
+    if isinstance(own := atom.own, Recursion):
+        return atom.signal, Window("exp", own.time_s(atom.parameters) or _UNTIMED_S), None, atom
     if atom.window is None:
         return None
-    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S, False
+    return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S, None
 
 
-def _check(window: Window, sample_s: float, lag: bool) -> None:
-    if lag:
-        check_window(window.length_s, sample_s, 1, "a lag's time constant")
+def _check(window: Window, sample_s: float, memory: Atom | None) -> None:
+    if memory is not None:
+        check_window(window.length_s, sample_s, 1, f"the time constant of {memory.text}")
     elif window.method == "block":
         check_window(window.length_s, sample_s, 1, "a block window")
-    elif window.method == "slope":
-        check_window(window.length_s, sample_s, 2, "a slope's window")
+    elif window.method not in ("exp", "first"):
+        check_window(window.length_s, sample_s, 2, f"a window of {window.method}")
     elif window.method == "exp":
         check_window(window.length_s, sample_s, 1, "a time constant")
 
@@ -256,8 +272,7 @@ def _operator(
     unit_s: float | None,
     gap_s: float,
 ) -> Operator:
-    span_s = {"block": 2.0, "slope": 1.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}[window.method]
-    needed = needed_s(span_s * window.length_s, sample_s)
+    needed = needed_s(window.span_s, sample_s)
 
     def ticks(seconds: float) -> int:
         return max(1, round(seconds / tick_s) - NOISE_TICKS)
@@ -265,12 +280,12 @@ def _operator(
     return Operator(
         window,
         signal,
-        held.index(signal) if signal in held and window.method in HELD_METHODS else -1,
+        held.index(signal) if signal in held and window.held else -1,
         unit_s,
         gap_s,
         ticks(window.length_s),
         ticks(2.0 * window.length_s),
         max(0, ticks(needed)) if needed > 0 else 0,
-        ticks(LEAST_SHARE * span_s * window.length_s),
-        round(span_s * window.length_s / tick_s),
+        ticks(LEAST_SHARE * window.span_s),
+        round(window.span_s / tick_s),
     )

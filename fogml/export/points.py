@@ -12,6 +12,7 @@ from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.features.atoms import AtomValues
 from fogml.features.features import Features
+from fogml.features.own import Recursion
 from fogml.features.signal import TIME_ON
 from fogml.runs.columns import is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
@@ -84,6 +85,11 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     rng = np.random.default_rng([seed, 2])
     spans = [atom.window.span_s for atom in plan.atoms if atom.window]
     spans += [EXPONENTIAL_SPAN * atom.memory for atom in plan.atoms if atom.operator == "lag"]
+    spans += [
+        EXPONENTIAL_SPAN * (own.time_s(atom.parameters) or 0.0)
+        for atom in plan.atoms
+        if isinstance(own := atom.own, Recursion)
+    ]
     longest = max(spans, default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))
     # So long in any case that windows fill, and go on after a gap.

@@ -38,6 +38,7 @@ def rust_bindings(source: CSource, state_bytes: int) -> str:
             version=__version__,
             places=max(1, len(source.plan.sensors)),
             state_bytes=state_bytes,
+            saves=bool(source.plan.atoms),
             temperature=CCode(_RUST[numbers["temperature_type"]]),
             gyro=CCode(_RUST[numbers["gyro_type"]]),
         )

@@ -11,8 +11,8 @@ from fogml.errors import InputError
 from fogml.export.layout import OPERATORS
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
+from fogml.features.own import Function
 from fogml.runs.columns import is_temperature
-from fogml.signals.memory import Beyond
 
 FloatArray = NDArray[np.float64]
 GRID = 401
@@ -123,7 +123,8 @@ def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
 def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     """An atom's values (n,) where nothing moves, from those of the columns that it is of, each (n,)."""
     count = len(next(iter(held.values())))
-    if atom.operator not in OPERATORS:
+    curve = isinstance(atom.own, Function)
+    if atom.operator not in OPERATORS and not curve:
         raise InputError(
             f"export: the model takes {atom.text}, of which it is not known what it is where nothing moves; "
             "export it --to onnx or json"
@@ -131,6 +132,8 @@ def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     if atom.window is not None or atom.operator == "since_on":
         return np.zeros(count)
     value = np.sum([weight * held[name] for name, weight in atom.signal.parts], axis=0)
-    if atom.bounds is not None:
-        value, _ = Beyond(*atom.bounds).push(np.arange(float(count)), value)
+    if atom.bounds is not None or curve:
+        operator = atom.memory_operator(1.0)
+        assert operator is not None
+        value, _ = operator.push(np.arange(float(count)), value)
     return np.asarray(value)

@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.features.own import Function, Recursion, own_operator
 from fogml.features.signal import TIME_ON, Signal, number_text
+from fogml.features.windows import DEFAULT_WINDOW, Window, windowed_values
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
-from fogml.signals import windows
-from fogml.signals.clock import EXPONENTIAL_SPAN, Clock
+from fogml.signals.clock import Clock
 from fogml.signals.memory import Beyond, Decay, Lag, MemoryOperator, Play
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 Operator = Literal["value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"]
-Method = Literal["block", "slope", "exp", "first"]
 
 OPERATORS: tuple[Operator, ...] = get_args(Operator)
 MEMORIES: tuple[Operator, ...] = ("lag", "play", "since_on")
@@ -29,61 +29,10 @@ WINDOWED: tuple[Operator, ...] = ("diff", "d", "sign")
 """Operators over a window."""
 HYSTERESIS_DEGC = (4.0, 10.0, 20.0)
 """Half widths of the plays that ``hysteresis(x)`` stands for [degC]: loops of 8 to 40 degC."""
-METHODS: tuple[Method, ...] = get_args(Method)
 RATE_UNIT_S = 60.0
 """Rates of temperature are per minute."""
 DEAD_BAND = 0.05
 """Rates up to this size [degC/min], either way, count as standing still: direction 0."""
-EXPONENTIAL_MEMORY = 40.0
-"""Time constants after which an exponential window has forgotten to below float64 (e**-40)."""
-
-
-@dataclass(frozen=True)
-class Window:
-    """How a difference or a rate is taken.
-
-    Attributes
-    ----------
-    method
-        ``block``: newest window's mean less the mean of the window before. ``slope``: least-squares
-        line over one window. ``exp``: exponential memory. ``first``: neighbouring samples.
-    length_s
-        Length of each window, or time constant of ``exp`` [s]; 0 for ``first``.
-    """
-
-    method: Method = "block"
-    length_s: float = 64.0
-
-    def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise InputError(f"window: no method '{self.method}'; known are {', '.join(METHODS)}")
-        if self.method == "first":
-            object.__setattr__(self, "length_s", 0.0)
-        elif not (np.isfinite(self.length_s) and self.length_s > 0.0):
-            raise InputError(f"window: a length of {self.length_s} s; a positive number was expected")
-        else:
-            object.__setattr__(self, "length_s", float(self.length_s))
-
-    @property
-    def text(self) -> str:
-        """The option in brackets, empty for the default."""
-        if self == DEFAULT_WINDOW:
-            return ""
-        return "[first]" if self.method == "first" else f"[{self.method}, {number_text(self.length_s)} s]"
-
-    @property
-    def span_s(self) -> float:
-        """Time from the start until it is full [s], to within a sample interval."""
-        spans = {"block": 2.0, "slope": 1.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}
-        return spans[self.method] * self.length_s
-
-    @property
-    def memory_s(self) -> float:
-        """How far back samples still change its value, at float64 [s]."""
-        return EXPONENTIAL_MEMORY * self.length_s if self.method == "exp" else self.span_s
-
-
-DEFAULT_WINDOW = Window()
 
 
 @dataclass(frozen=True)
@@ -105,16 +54,20 @@ class Atom:
         0 for the others.
     bounds
         Lower and upper one of ``beyond`` [unit of the signal]; None for the others.
+    parameters
+        Of an operator of one's own (`fogml.features.own`); empty for the others.
     """
 
-    operator: Operator
+    operator: str
     signal: Signal
     window: Window | None = None
     memory: float = 0.0
     bounds: tuple[float, float] | None = None
+    parameters: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if self.operator not in OPERATORS:
+        own = self.own
+        if self.operator not in OPERATORS and own is None:
             raise InputError(f"atom: no operator '{self.operator}'; known are {', '.join(OPERATORS)}")
         if self.operator not in WINDOWED:
             object.__setattr__(self, "window", None)
@@ -124,6 +77,8 @@ class Atom:
             raise InputError(
                 f"atom: sign(d({self.signal.text})) is not of a temperature; its dead band is not known"
             )
+        if len(self.parameters) != (0 if own is None else len(own.parameters)):
+            raise InputError(f"atom: {self.operator} with parameters {self.parameters}")
         object.__setattr__(self, "memory", float(self.memory))
         if self.operator == "since_on" and self.signal.sensors != (TIME_ON,):
             raise InputError(f"atom: since_on of {self.signal.text}; it is of {TIME_ON}")
@@ -138,6 +93,11 @@ class Atom:
         return self.text
 
     @property
+    def own(self) -> Function | Recursion | None:
+        """The declaration of an operator of one's own; None for the others."""
+        return None if self.operator in OPERATORS else own_operator(self.operator)
+
+    @property
     def text(self) -> str:
         """Text form, e.g. ``dT[slope, 60 s]``."""
         signal = self.signal.text
@@ -146,6 +106,11 @@ class Atom:
         if self.operator in MEMORIES:
             unit = "s" if self.operator == "lag" else self.signal.written_unit
             return f"{self.operator}({signal}, {f'{number_text(self.memory)} {unit}'.rstrip()})"
+        if (own := self.own) is not None:
+            units = {"s": "s", "x": self.signal.written_unit, "1": ""}
+            given = zip(self.parameters, own.parameters, strict=True)
+            told = (f"{number_text(value)} {units[kind]}".rstrip() for value, kind in given)
+            return f"{self.operator}({', '.join((signal, *told))})"
         if self.bounds is not None:
             ends = (f"{number_text(end)} {self.signal.written_unit}".rstrip() for end in self.bounds)
             return f"beyond({signal}, {', '.join(ends)})"
@@ -168,12 +133,15 @@ class Atom:
         """Unit of its values; empty for a direction."""
         if self.operator in ("since_on", "sign"):
             return ""
+        if (own := self.own) is not None and own.unit is not None:
+            return own.unit
         return f"{self.signal.unit}/min" if self.operator == "d" else self.signal.unit
 
     @property
     def order(self) -> tuple[Any, ...]:
         """Sort key among the factors of a term: values, memories, differences, rates, directions."""
-        return OPERATORS.index(self.operator), self.signal.order, self.text
+        place = OPERATORS.index(self.operator) if self.operator in OPERATORS else len(OPERATORS)  # type: ignore[arg-type]
+        return place, self.signal.order, self.text
 
     def memory_operator(self, sample_s: float) -> MemoryOperator | None:
         """A fresh operator for samples `sample_s` seconds apart; None for values and windows.
@@ -189,17 +157,9 @@ class Atom:
             return Play(self.memory)
         if self.bounds is not None:
             return Beyond(*self.bounds)
+        if (own := self.own) is not None:
+            return own.operator(self.parameters, sample_s)
         return Decay(self.memory) if self.operator == "since_on" else None
-
-
-def windowed_values(
-    signal: FloatArray, clock: Clock, window: Window, unit_s: float | None, out: FloatArray | None = None
-) -> windows.Windowed:
-    """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
-    if window.method == "first":
-        return windows.first_difference(clock, signal, unit_s=unit_s, out=out)
-    operator = {"block": windows.block_difference, "slope": windows.slope, "exp": windows.exponential}
-    return operator[window.method](clock, signal, window.length_s, unit_s=unit_s, out=out)
 
 
 def direction(rate: FloatArray) -> FloatArray:

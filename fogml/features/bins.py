@@ -20,8 +20,6 @@ MOST_IN_BIN = 8191
 """Samples that a bin holds at most: its sums then fit 63 bits."""
 _LONGEST_RING = 1 << 12
 """Bins at most; windows whose lengths are further apart are refused."""
-HELD_METHODS = ("block", "slope")
-"""Methods of windows that hold samples."""
 
 
 def ring_of(windows: Sequence[Window], sample_s: float) -> tuple[int, int]:
@@ -35,7 +33,7 @@ def ring_of(windows: Sequence[Window], sample_s: float) -> tuple[int, int]:
     InputError
         If the windows' lengths are too far apart.
     """
-    held = [window for window in windows if window.method in HELD_METHODS]
+    held = [window for window in windows if window.held]
     if not held:
         return 0, 1
     most = max(math.ceil(window.span_s / sample_s - EDGE_TOLERANCE) + 1 for window in held)

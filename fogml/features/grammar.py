@@ -12,6 +12,7 @@
                | "hysteresis" "(" signal ")"                         play(T, 4 degC), play(T, 10 degC) ...
                | "since_on" "(" time ")"                             since_on(400 s)
                | "beyond" "(" signal "," bound "," bound ")"         beyond(T, -20 degC, 60 degC)
+               | own "(" signal { "," number [ unit ] } ")"          one of one's own: `fogml.features.own`
     bound      = [ "-" ] number [ unit ]
     rate       = "d" temperature | "d" "(" signal ")"                dT, dT_in, d(T_in-T_out), d(power)
     signal     = [ "-" ] part { ("+" | "-") part }                   T, T_in-T_out, 0.5*T1+0.5*T3, power
@@ -30,10 +31,12 @@ from itertools import product as all_products
 from math import prod
 
 from fogml.errors import quoted
-from fogml.features.atoms import DEFAULT_WINDOW, METHODS, Atom, Method, Window
+from fogml.features.atoms import Atom
 from fogml.features.operands import OperandReader
+from fogml.features.own import own_operator, own_window
 from fogml.features.signal import Signal
 from fogml.features.terms import Term
+from fogml.features.windows import DEFAULT_WINDOW, METHODS, Window
 from fogml.runs.columns import is_temperature
 
 HIGHEST_POWER = 20
@@ -105,6 +108,12 @@ class _Parser(OperandReader):
         token = self.token
         if token.kind == "name" and token.text in ("lag", "play", "since_on", "beyond"):
             return self.memory()
+        if (
+            token.kind == "name"
+            and self.tokens[self.next + 1].text == "("
+            and (own := own_operator(token.text))
+        ):
+            return self.own(own)
         if self.calls("hysteresis"):
             self.fail("hysteresis(...) stands for several features; parentheses hold one", token.at)
         if token.kind == "name" and token.text == "diff":
@@ -194,11 +203,11 @@ class _Parser(OperandReader):
         token = self.token
         if token.kind == "number":
             return Window("block", self.length())
-        if token.kind != "name" or token.text not in METHODS:
+        if token.kind != "name" or (token.text not in METHODS and own_window(token.text) is None):
             hint = f"known methods: {', '.join(METHODS)}; e.g. dT[block, 64 s]"
             self.fail(f"a method or a window expected, found {self.found()}", token.at, hint)
         self.next += 1
-        method: Method = token.text
+        method = token.text
         comma = self.take(",")
         if comma is None:
             return Window(method)

@@ -6,6 +6,7 @@ import re
 
 from fogml.errors import InputError
 from fogml.features.atoms import HYSTERESIS_DEGC, Atom
+from fogml.features.own import Function, Recursion
 from fogml.features.signal import NOT_INPUTS, TIME_ON, Signal
 from fogml.features.tokens import Token, TokenReader
 
@@ -52,6 +53,27 @@ class OperandReader(TokenReader):
                 atom = self.beyond(signal)
         self.expect(")", f"to close {function}(")
         return atom
+
+    def own(self, declared: Function | Recursion) -> Atom:
+        """An operator of one's own, with its parameters."""
+        self.next += 2
+        signal, given = self.signal(), []
+        for kind in declared.parameters:
+            self.expect(",", f"before a parameter of {declared.name}")
+            given.append(self.length() if kind == "s" else self.number(signal, kind == "x"))
+        self.expect(")", f"to close {declared.name}(")
+        return Atom(declared.name, signal, parameters=tuple(given))
+
+    def number(self, signal: Signal, of_signal: bool) -> float:
+        """A number, in the unit of a signal or plain."""
+        sign = -1.0 if self.take("-") else 1.0
+        token = self.token
+        if token.kind != "number":
+            self.fail(f"a number expected, found {self.found()}", token.at)
+        self.next += 1
+        if of_signal:
+            self.unit_of_number(signal, "number", "4 degC")
+        return sign * float(token.text)
 
     def beyond(self, signal: Signal) -> Atom:
         at = self.token.at

@@ -16,6 +16,7 @@ from fogml.features.signal import TIME_ON, Signal
 from fogml.runs.columns import is_temperature
 from fogml.runs.thermometer_stream import ThermometerStream, Told
 from fogml.signals import window_streams
+from fogml.signals.kernel_windows import KernelStream
 
 FloatArray = NDArray[np.float64]
 
@@ -191,6 +192,8 @@ def _operator_key(atom: Atom) -> tuple[Signal, Window, float | None] | None:
 def _operator(window: Window, sample_s: float, unit_s: float | None) -> window_streams.WindowStream:
     if window.method == "first":
         return window_streams.FirstDifferenceStream(sample_s, unit_s)
+    if (own := window.own) is not None:
+        return KernelStream(window.length_s, sample_s, window.length_s if unit_s is None else unit_s, own)
     kinds: dict[str, Callable[[float, float, float | None], window_streams.WindowStream]] = {
         "block": window_streams.BlockDifferenceStream,
         "slope": window_streams.SlopeStream,

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NoReturn, cast
 
 from fogml.errors import InputError, quoted
-from fogml.features.atoms import METHODS
 from fogml.features.signal import known_temperatures
+from fogml.features.windows import METHODS
 
 MOST_CHARACTERS = 10_000
 """Longest feature text: what the toolkit writes itself has some hundreds of characters."""

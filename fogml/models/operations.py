@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fogml.features.atoms import Atom
-from fogml.features.bins import HELD_METHODS, ring_of
+from fogml.features.bins import ring_of
 from fogml.features.terms import Step
 from fogml.models.compact import Compact
 
 WINDOW_OPERATIONS = {"block": 8, "slope": 10, "exp": 6, "first": 4}
 """Additions, multiplications and divisions of a window's value at a sample."""
-HELD_OPERATIONS = dict(zip(HELD_METHODS, (14, 26), strict=True))
-"""Those for each sample, or bin of samples, that a window holds."""
+HELD_OPERATIONS = {"block": 14, "slope": 26}
+"""Those for each sample, or bin of samples, that a window holds; of one's own as many as a slope's."""
 EXPONENTIAL_OPERATIONS = 20
 MEMORY_OPERATIONS = {"lag": 6, "play": 8, "beyond": 9, "since_on": EXPONENTIAL_OPERATIONS + 1}
 """The same of a memory's step, at a steady sample interval."""
@@ -21,7 +21,7 @@ MEMORY_OPERATIONS = {"lag": 6, "play": 8, "beyond": 9, "since_on": EXPONENTIAL_O
 def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_s: float) -> int:
     """Additions, multiplications and divisions from a sample to feature columns, windows full.
 
-    Windows and memories that are not in the tables above count for nothing.
+    Operators of one's own count for nothing.
 
     Parameters
     ----------
@@ -34,8 +34,9 @@ def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_
     windows = {(atom.signal, atom.window, atom.operator == "diff") for atom in atoms if atom.window}
     for _, window, _ in windows:
         assert window is not None
-        count += WINDOW_OPERATIONS.get(window.method, 0)
-        count += HELD_OPERATIONS.get(window.method, 0) * ring_of([window], sample_s)[0]
+        alike = "slope" if window.own is not None else window.method
+        count += WINDOW_OPERATIONS[alike]
+        count += HELD_OPERATIONS.get(alike, 0) * ring_of([window], sample_s)[0]
     count += sum(MEMORY_OPERATIONS.get(atom.operator, 0) for atom in atoms)
     count += sum(2 * len(atom.signal.parts) - 1 for atom in atoms)
     count += 4 * len(atoms)

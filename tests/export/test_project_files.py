@@ -41,6 +41,12 @@ fn main() {
         (last, flag) = state.step(2_000_000 * i, &[20.0], 7.5);
     }
     assert!(flag == GOOD && last.is_finite() && last != 7.5 && self_test());
+    let mut kept = *state.save().bytes();
+    // The clock begins anew: off for two seconds, it goes on as if it had not been.
+    let mut again = State::restore(&Saved::from_bytes(&kept), 9_000_000, 2_000_000).unwrap();
+    assert!(again.step(9_000_000, &[20.5], 7.5) == state.step(400_000_000, &[20.5], 7.5));
+    kept[SAVED_BYTES / 2] ^= 1;
+    assert!(State::restore(&Saved::from_bytes(&kept), 0, 0).is_none());
 }
 """
 CMAKE = """

@@ -1,0 +1,227 @@
+"""Operators and windows of one's own, each declared once: how it is written, what it does, and its C.
+
+Three forms, by what they need to know:
+
+- `Function`: of the input's present value alone. Its C is a table.
+- `Recursion`: a state that goes on from sample to sample. Its C stands beside its Python.
+- `fogml.signals.kernel_windows.Kernel`: weights over a window. Its C follows from them.
+
+`declare` makes one known; so does a package's entry point in the group ``fogml.operators`` that names it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import entry_points
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
+from fogml.signals.kernel_windows import Kernel
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+GROUP = "fogml.operators"
+KINDS = ("s", "x", "1")
+"""Kinds of parameters: a time, a number in the unit of the input, a plain number."""
+State = tuple[float, ...]
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Named:
+    """What every operator of one's own states.
+
+    Attributes
+    ----------
+    name
+        As feature text has it, ``name(x, parameters)``.
+    parameters
+        A kind of `KINDS` for each parameter.
+    unit
+        Unit of its values; None for that of its input.
+    """
+
+    name: str
+    parameters: tuple[str, ...] = ()
+    unit: str | None = None
+
+    def __post_init__(self) -> None:
+        if not (self.name.isidentifier() and self.name.isascii()):
+            raise InputError(f"operator '{self.name}': a name of letters, digits and _ was expected")
+        if unknown := [kind for kind in self.parameters if kind not in KINDS]:
+            raise InputError(
+                f"operator {self.name}: kinds of parameters are {', '.join(KINDS)}, not {unknown}"
+            )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Function(_Named):
+    """An operator of the input's present value alone: a curve, bounded where inputs are.
+
+    Attributes
+    ----------
+    function
+        ``function(x, *parameters)`` of an array.
+    """
+
+    function: Callable[..., FloatArray]
+
+    def operator(self, parameters: State, sample_s: float) -> FunctionOperator:
+        """What takes samples in order."""
+        return FunctionOperator(self, parameters)
+
+
+@dataclass(frozen=True)
+class RecursionC:
+    """The C of a recursion, for float and double alike: write ``REAL`` for the type, ``R(1.5)`` for a number.
+
+    Known are ``x``, ``last`` (the input at the sample before), ``dt`` [s], ``p[0]`` ... the parameters, and
+    the state ``s[0]`` ...
+
+    Attributes
+    ----------
+    start, step
+        Statements that set the state at a first sample, and at each later one.
+    value
+        The operator's value, an expression.
+    settled
+        Whether what was before no longer matters, an expression; empty where the time constant tells.
+    """
+
+    start: str
+    step: str
+    value: str
+    settled: str = ""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Recursion(_Named):
+    """An operator with a state: begun at the first sample, and again after a gap that its time does not span.
+
+    Attributes
+    ----------
+    start
+        ``start(x, *parameters)``: the state, a tuple of numbers.
+    step
+        ``step(state, x, last, dt, *parameters)``: the state after a sample x, `last` before it by dt [s].
+    value
+        ``value(state, x, *parameters)``.
+    settled
+        ``settled(state, x, *parameters)``; None where the time constant tells, or it always is.
+    time_constant
+        Place among the parameters of its time constant: it is settled three of them after it began, and
+        begins anew after a gap that a window as long may not span; None for one that knows no time.
+    gain
+        How far its value moves at most where its inputs are each off by 1.
+    c
+        The same in C; None for none.
+    """
+
+    start: Callable[..., State]
+    step: Callable[..., State]
+    value: Callable[..., float]
+    settled: Callable[..., bool] | None = None
+    time_constant: int | None = None
+    gain: float = float("inf")
+    c: RecursionC | None = None
+
+    def operator(self, parameters: State, sample_s: float) -> RecursionOperator:
+        """What takes samples in order."""
+        return RecursionOperator(self, parameters, sample_s)
+
+    def time_s(self, parameters: State) -> float | None:
+        """The time constant [s]."""
+        return None if self.time_constant is None else parameters[self.time_constant]
+
+
+class FunctionOperator:
+    """`Function` over samples; always settled."""
+
+    def __init__(self, declared: Function, parameters: State) -> None:
+        self._declared, self._parameters = declared, parameters
+
+    def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Values at the next samples, and where they are settled; both of shape (n,)."""
+        values = np.asarray(self._declared.function(x, *self._parameters), dtype=np.float64)
+        return np.broadcast_to(values, x.shape), np.ones(len(x), dtype=np.bool_)
+
+
+class RecursionOperator:
+    """`Recursion` over samples."""
+
+    def __init__(self, declared: Recursion, parameters: State, sample_s: float) -> None:
+        self._declared, self._parameters = declared, parameters
+        time_s = declared.time_s(parameters)
+        self._gap_s, self._needed_s = float("inf"), 0.0
+        if time_s is not None:
+            check_window(time_s, sample_s, 1, f"the time constant of {declared.name}")
+            self._gap_s = longest_gap_s(time_s, sample_s)
+            self._needed_s = needed_s(EXPONENTIAL_SPAN * time_s, sample_s)
+        self._state: State | None = None
+        self._start = self._time = self._x = 0.0
+
+    def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Values at the next samples, and where they are settled; both of shape (n,)."""
+        declared, given = self._declared, self._parameters
+        values, settled = np.empty(len(x)), np.ones(len(x), dtype=np.bool_)
+        for i, (now, value) in enumerate(zip(time.tolist(), x.tolist())):
+            if self._state is None or now - self._time > self._gap_s:
+                self._state, self._start = declared.start(value, *given), now
+            else:
+                self._state = declared.step(self._state, value, self._x, now - self._time, *given)
+            self._time, self._x = now, value
+            values[i] = declared.value(self._state, value, *given)
+            settled[i] = now - self._start >= self._needed_s
+            if declared.settled is not None:
+                settled[i] &= bool(declared.settled(self._state, value, *given))
+        return values, settled
+
+
+Declared = Function | Recursion | Kernel
+_declared: dict[str, Declared] = {}
+_looked_up = False
+
+
+def declare(operator: Declared) -> Declared:
+    """Make an operator or a window known by its name.
+
+    Raises
+    ------
+    InputError
+        If another one has the name.
+    """
+    known = _declared.setdefault(operator.name, operator)
+    if known != operator:
+        raise InputError(f"operator {operator.name}: the name is taken")
+    return operator
+
+
+def own_operator(name: str) -> Function | Recursion | None:
+    """The operator of a name; None for none."""
+    found = _known().get(name)
+    return None if isinstance(found, Kernel) else found
+
+
+def own_window(name: str) -> Kernel | None:
+    """The window of a name; None for none."""
+    found = _known().get(name)
+    return found if isinstance(found, Kernel) else None
+
+
+def _known() -> dict[str, Declared]:
+    global _looked_up
+    if not _looked_up:
+        _looked_up = True
+        for point in entry_points(group=GROUP):
+            try:
+                declared: Any = point.load()
+            except Exception as error:
+                raise InputError(
+                    f"entry point '{point.name}' in group '{GROUP}' does not load: {error}"
+                ) from error
+            declare(declared)
+    return _declared

@@ -1,0 +1,95 @@
+"""Windows: how a difference or a rate is taken of a signal, and over what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.features.own import own_window
+from fogml.features.signal import number_text
+from fogml.signals import windows
+from fogml.signals.clock import EXPONENTIAL_SPAN, Clock
+from fogml.signals.kernel_windows import Kernel, kernel_rate
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+Method = Literal["block", "slope", "exp", "first"]
+METHODS: tuple[Method, ...] = get_args(Method)
+EXPONENTIAL_MEMORY = 40.0
+"""Time constants after which an exponential window has forgotten to below float64 (e**-40)."""
+
+
+@dataclass(frozen=True)
+class Window:
+    """How a difference or a rate is taken.
+
+    Attributes
+    ----------
+    method
+        ``block``: newest window's mean less the mean of the window before. ``slope``: least-squares
+        line over one window. ``exp``: exponential memory. ``first``: neighbouring samples. Or one of
+        one's own by its name (`fogml.features.own`).
+    length_s
+        Length of each window, or time constant of ``exp`` [s]; 0 for ``first``.
+    """
+
+    method: str = "block"
+    length_s: float = 64.0
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS and self.own is None:
+            raise InputError(f"window: no method '{self.method}'; known are {', '.join(METHODS)}")
+        if self.method == "first":
+            object.__setattr__(self, "length_s", 0.0)
+        elif not (np.isfinite(self.length_s) and self.length_s > 0.0):
+            raise InputError(f"window: a length of {self.length_s} s; a positive number was expected")
+        else:
+            object.__setattr__(self, "length_s", float(self.length_s))
+
+    @property
+    def text(self) -> str:
+        """The option in brackets, empty for the default."""
+        if self == DEFAULT_WINDOW:
+            return ""
+        return "[first]" if self.method == "first" else f"[{self.method}, {number_text(self.length_s)} s]"
+
+    @property
+    def own(self) -> Kernel | None:
+        """Its weights, of a window of one's own; None for the others."""
+        return None if self.method in METHODS else own_window(self.method)
+
+    @property
+    def held(self) -> bool:
+        """Whether it holds the samples within its span, and not what is left of them."""
+        return self.method not in ("exp", "first")
+
+    @property
+    def span_s(self) -> float:
+        """Time from the start until it is full [s], to within a sample interval."""
+        spans = {"block": 2.0, "exp": EXPONENTIAL_SPAN, "first": 0.0}
+        return spans.get(self.method, 1.0) * self.length_s
+
+    @property
+    def memory_s(self) -> float:
+        """How far back samples still change its value, at float64 [s]."""
+        return EXPONENTIAL_MEMORY * self.length_s if self.method == "exp" else self.span_s
+
+
+DEFAULT_WINDOW = Window()
+
+
+def windowed_values(
+    signal: FloatArray, clock: Clock, window: Window, unit_s: float | None, out: FloatArray | None = None
+) -> windows.Windowed:
+    """A signal's difference (``unit_s=None``) or rate per `unit_s` seconds, and where it is full."""
+    if window.method == "first":
+        return windows.first_difference(clock, signal, unit_s=unit_s, out=out)
+    if (own := window.own) is not None:
+        unit_s = window.length_s if unit_s is None else unit_s
+        return kernel_rate(clock, signal, window.length_s, own, unit_s, out)
+    operator = {"block": windows.block_difference, "slope": windows.slope, "exp": windows.exponential}
+    return operator[window.method](clock, signal, window.length_s, unit_s=unit_s, out=out)

@@ -1,0 +1,138 @@
+"""Operators and windows of one's own are declared once: batch, streaming, C and messages follow."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.export.c_program import CProgram
+from fogml.export.c_source import c_source
+from fogml.export.plan import Plan
+from fogml.features import own
+from fogml.features.own import Function, Recursion, RecursionC, declare
+from fogml.features.parse import parse_features
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+from fogml.signals.clock import Clock
+from fogml.signals.kernel_windows import Kernel, kernel_rate
+from fogml.signals.windows import slope
+from fogml.testing import check_feature
+from tests.export.conftest import training_run
+from tests.export.test_c_code import SANITIZERS, WITH_SHADOW, disturbed, fast_run, needs_cc, outputs
+
+LINE = Kernel("line", (1.0, 0.0))
+"""Weights that fall with age in a straight line: those of the least-squares slope."""
+HANN = Kernel("hann", tuple(np.cos(np.linspace(0.0, np.pi, 33))))
+BEND = Function(name="bend", parameters=("x", "1"), function=lambda x, w, k: k * w * np.tanh(x / w))
+CREEP = Recursion(
+    name="creep",
+    parameters=("s",),
+    start=lambda x, tau: (0.0,),
+    step=lambda s, x, last, dt, tau: ((s[0] + x - last) / (1.0 + dt / tau),),
+    value=lambda s, x, tau: x - s[0],
+    time_constant=0,
+    gain=1.0,
+    c=RecursionC("s[0] = R(0);", "s[0] = (s[0] + x - last) / (R(1) + dt / p[0]);", "x - s[0]"),
+)
+PEAK = Recursion(
+    name="peak",
+    start=lambda x: (x, x),
+    step=lambda s, x, last, dt: (max(s[0], x), min(s[1], x)),
+    value=lambda s, x: s[0],
+    settled=lambda s, x: s[0] - s[1] > 5.0,
+    gain=1.0,
+    c=RecursionC(
+        "s[0] = x; s[1] = x;",
+        "s[0] = x > s[0] ? x : s[0]; s[1] = x < s[1] ? x : s[1];",
+        "s[0]",
+        "s[0] - s[1] > R(5)",
+    ),
+)
+TEXT = (
+    "T_in, dT_in[hann, 60 s], diff(T_out)[line, 40 s], bend(T_in, 30 degC, 2), creep(T_in-T_out, 300 s), "
+    "peak(T_out)"
+)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def declared():
+    held = dict(own._declared)
+    for operator in (LINE, HANN, BEND, CREEP, PEAK):
+        declare(operator)
+    yield
+    own._declared.clear()
+    own._declared.update(held)
+
+
+def test_they_keep_the_contract_of_features():
+    check_feature("T, dT[hann, 64 s], bend(T, 20 degC, 0.5)")
+    check_feature("T, creep(T, 300 s), peak(T)^2")
+    assert parse_features(TEXT).text == TEXT
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_a_kernel_that_falls_in_a_line_is_the_least_squares_slope(jitter):
+    rng = np.random.default_rng(1)
+    time = 2.0 * np.arange(400) + jitter * rng.uniform(-1.0, 1.0, 400)
+    time[200:] += 50.0
+    x = 20.0 + np.cumsum(rng.normal(0.0, 0.1, 400))
+    found = kernel_rate(Clock(time, 2.0), x, 60.0, LINE, 60.0)
+    expected = slope(Clock(time, 2.0), x, 60.0, unit_s=60.0)
+    np.testing.assert_array_equal(found.full, expected.full)
+    np.testing.assert_array_equal(found.counts, expected.counts)
+    np.testing.assert_allclose(found.values, expected.values, atol=1e-9)
+
+
+@needs_cc
+@pytest.mark.parametrize(("dtype", "bound"), [("float64", 2e-6), ("float32", 2e-3)])
+def test_their_c_gives_what_compensate_gives(tmp_path, dtype, bound):
+    model = make_model("polynomial", features=TEXT).fit(training_run())
+    source = c_source(Plan.of(model), dtype, [])
+    run = disturbed(5, jitter=0.3)
+    out, flag = outputs(CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW), source, run)
+    expected = model.compensate(run)
+    np.testing.assert_allclose(out, expected.compensated, atol=bound)
+    assert np.count_nonzero(flag[1:] != expected.flag[1:]) <= (0 if dtype == "float64" else 2)
+    assert set(flag.tolist()) == {1, 2}  # never as slow as in training
+
+
+@needs_cc
+def test_bins_hold_a_window_of_ones_own(tmp_path):
+    model = make_model("polynomial", features="T_in, dT_in[hann, 64 s]").fit(training_run())
+    run = fast_run(0.1)
+    source = c_source(Plan.of(model, run.sample_s), "float64", [])
+    assert source.layout.binned
+    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    expected = model.compensate(run)
+    np.testing.assert_array_equal(flag, expected.flag)
+    assert np.abs(out - expected.compensated)[flag == 0].max() < 1e-4
+
+
+def test_what_can_not_be_written_is_named():
+    silent = replace(CREEP, name="silent", c=None)
+    step = Function(name="step", function=lambda x: np.where(x > 20.0, 1.0, 0.0))
+    declare(silent), declare(step)
+    for text, dtype, told in (
+        ("T_in, silent(T_in, 300 s)", "float64", r"silent\(T_in, 300 s\).*`c`"),
+        ("T_in, step(T_in)", "float64", r"step\(T_in\).*corners"),
+        ("T_in, bend(T_in-T_out, 2 degC, 1)", "float64", "range of T_in-T_out"),
+        ("T_in, peak(T_in)", "q31", r"peak\(T_in\).*float32"),
+        ("T_in, dT_in[hann, 64 s]", "q15", "hann.*float32"),
+    ):
+        model = make_model("polynomial", features=text).fit(training_run())
+        with pytest.raises(InputError, match=told):
+            c_source(Plan.of(model), dtype, [])
+    with pytest.raises(InputError, match="fall from now"):
+        Kernel("flat", (1.0, 1.0))
+    with pytest.raises(InputError, match="taken"):
+        declare(replace(PEAK, name="bend"))
+    with pytest.raises(InputError, match="a parameter of bend"):
+        parse_features("bend(T)")
+
+
+def test_columns_may_be_named_like_an_operator():
+    run = Run("r", {"time": np.arange(9.0), "gyro": np.zeros(9), "peak": np.arange(9.0)})
+    np.testing.assert_array_equal(parse_features("peak").transform(run)[:, 0], np.arange(9.0))
