@@ -70,7 +70,7 @@ def limits_from_dict(values: Mapping[str, float] | None) -> DropoutRule:
 def trained_limits(
     runs: Sequence[Run], names: Iterable[str], settings: LimitSettings = LIMITS
 ) -> DropoutRule:
-    """What a thermometer can show, from training runs; never more than `RULE` allows.
+    """What a thermometer can show, from training runs; no more than `RULE` allows where they keep to it.
 
     Parameters
     ----------
@@ -87,12 +87,14 @@ def trained_limits(
         for sensor in sensors:
             values, bad = run.temperature(sensor), run.dropouts(sensor)
             good = slice(None) if bad is None else ~bad
-            fastest = _fastest(run.time[good], values[good], settings.averaging_s)
+            fastest = min(_fastest(run.time[good], values[good], settings.averaging_s), RULE.rate_degC_s)
             apart, moved = np.diff(run.time[good]), np.abs(np.diff(values[good]))
             rate = max(rate, fastest)
             step = max(step, float((moved - fastest * apart).max(initial=0.0)))
+    # A thermometer that was noisier than any other in training may be so later on.
+    most = RULE.jump_degC if step <= RULE.jump_degC else settings.step_margin * step
     return DropoutRule(
-        jump_degC=min(max(settings.step_margin * step, settings.least_step_degC), RULE.jump_degC),
+        jump_degC=min(max(settings.step_margin * step, settings.least_step_degC), most),
         rate_degC_s=min(max(settings.rate_margin * rate, settings.least_rate_degC_s), RULE.rate_degC_s),
         noise_sigma=0.0,
     )
