@@ -213,18 +213,16 @@ class Run:
 
     @cached_property
     def _readings(self) -> dict[str, Reading]:
-        time, names = self.time, self.temperature_columns
-        return {name: read_thermometer(time, self.columns[name], self._rule) for name in names}
+        held = {name: self.columns[name] for name in self.temperature_columns}
+        return {name: read_thermometer(self.time, values, self._rule) for name, values in held.items()}
 
     def read_by(self, rule: DropoutRule) -> Run:
         """The run, its thermometers read by a rule of one's own: what is no reading by that is held."""
-        if rule == self._rule:
-            return self
         known: dict[DropoutRule, Run] = self.__dict__.setdefault("_read_by", {})
-        if rule not in known:
+        if rule not in known and rule != self._rule:
             (run := self._with(self.columns)).__dict__.update(_rule=rule, clock=self.clock)
             known[rule] = run
-        return known[rule]
+        return known.get(rule, self)
 
     def after(self, before: Run) -> Run:
         """The run behind the one before it as one, with the columns of that.
