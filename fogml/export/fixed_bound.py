@@ -25,10 +25,14 @@ from fogml.export.fixed_scales import (
 from fogml.export.layout import RANGE_BITS, Layout, Operator
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
+from fogml.signals.clock import LEAST_SHARE, told_share
 
 FloatArray = NDArray[np.float64]
 _GYRO_DEG_H = 20.0
 _HELD = 2.0**-HELD_BITS
+_SHARES = np.linspace(0.01, 1.0, 1000)
+_FILLING = float(np.max(told_share(_SHARES, LEAST_SHARE) / _SHARES)) * (1.0 + 2.0**-8)
+"""How much more the rounding of its samples can move a window that fills than a full one."""
 _STEEPEST, _LARGEST, _TWICE = (2.0 / exp(1.0)) ** 0.5, (0.5 / exp(1.0)) ** 0.5, 2.0 / exp(1.0)
 # Of exp(-z^2): its steepest slope, and the largest of z and of 2 z^2 times it.
 
@@ -89,6 +93,8 @@ def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, win
         per_step = 2.0**-LAG_BITS + (EXP_ERROR + 2.0**-28) * span
         return float(read * 2.0 * sum(abs(w) for _, w in atom.signal.parts) + steps * per_step)
     gain = atom_gain(atom, step, spell=True)
+    if operator.window.held:
+        gain *= _FILLING
     unit_s = length if operator.unit_s is None else operator.unit_s
     held = 2.0 * _HELD if windows.binned else 0.0
     if operator.method == "block":

@@ -140,7 +140,7 @@ class Atom:
     @property
     def order(self) -> tuple[Any, ...]:
         """Sort key among the factors of a term: values, memories, differences, rates, directions."""
-        place = OPERATORS.index(self.operator) if self.operator in OPERATORS else len(OPERATORS)  # type: ignore[arg-type]
+        place = OPERATORS.index(self.operator) if self.operator in OPERATORS else len(OPERATORS)
         return place, self.signal.order, self.text
 
     def memory_operator(self, sample_s: float) -> MemoryOperator | None:
