@@ -19,10 +19,14 @@ from fogml.escaping import CCode
 from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.fixed_scales import (
+    HELD_BITS,
+    LAG_BITS,
     OUTPUT_BITS,
+    SIGNAL_SHIFT,
     VALUE_BITS,
     Scales,
     common_bits,
+    divide_bits,
     fitting_bits,
     product_range,
 )
@@ -34,10 +38,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 EXP_ERROR = 3e-8
 """Greatest absolute error of the generated exponential, its argument's rounding included."""
-HELD_BITS = 20
-SIGNAL_SHIFT = 24
-LAG_BITS = HELD_BITS + 2
-# A lag's distance from its signal: up to 2**9 degC times a decay of 30 bits fits.
 
 
 def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
@@ -133,12 +133,6 @@ def _signal(parts: tuple[tuple[str, float], ...], bits: int) -> str:
         for name, coefficient in parts
     ]
     return f"(int32_t)clipped(scaled({' + '.join(factors)}, {SIGNAL_SHIFT}), INT64_C(1) << 29)"
-
-
-def divide_bits(unit_ticks: float) -> int:
-    """Bits of a quotient with which rates up to 1024 degC per unit fit, and their product with the unit."""
-    unit_bits = log2(unit_ticks)
-    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - HELD_BITS)
 
 
 def _operator_bits(windows: Layout, plan: Plan, scales: Scales) -> list[int]:

@@ -12,13 +12,17 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.export.c_fixed import EXP_ERROR, HELD_BITS, LAG_BITS, SIGNAL_SHIFT, divide_bits
+from fogml.export.c_fixed import EXP_ERROR
 from fogml.export.false_readings import atom_gain
 from fogml.export.fixed_scales import (
+    HELD_BITS,
+    LAG_BITS,
     OUTPUT_BITS,
+    SIGNAL_SHIFT,
     VALUE_BITS,
     Scales,
     common_bits,
+    divide_bits,
     fitting_bits,
     product_range,
 )

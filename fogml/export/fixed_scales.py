@@ -15,6 +15,10 @@ IntArray = NDArray[np.int64]
 OUTPUT_BITS = 12
 """Outputs are multiples of 2**-12 deg/h."""
 VALUE_BITS = 30
+HELD_BITS = 20
+SIGNAL_SHIFT = 24
+LAG_BITS = HELD_BITS + 2
+# A lag's distance from its signal: up to 2**9 degC times a decay of 30 bits fits.
 _SUM_BITS = 60
 _MOST_DRIFT_BITS = 36
 _TEMPERATURE_MARGIN = 1.1
@@ -94,3 +98,9 @@ def sixteen_bits(plan: Plan) -> int:
         if atom.operator == "value" and atom.signal.is_sensor:
             most = max(most, abs(plan.limits.box_low[i]), abs(plan.limits.box_high[i]))
     return floor(log2(32767.0 / (most * _TEMPERATURE_MARGIN)))
+
+
+def divide_bits(unit_ticks: float) -> int:
+    """Bits of a quotient with which rates up to 1024 degC per unit fit, and their product with the unit."""
+    unit_bits = log2(unit_ticks)
+    return max(0, floor(unit_bits + min(36.0, 62.0 - unit_bits)) - 10 - HELD_BITS)
