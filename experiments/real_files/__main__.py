@@ -20,6 +20,7 @@ from fogml.outputs import whole_file
 
 HERE = Path(__file__).parent
 PARTS = {
+    "formats": "every format, and headers as laboratories write them",
     "clocks": "clocks, dropouts and what the numbers give away",
     "noise": "noise terms of filtered and polled gyros",
     "standard_errors": "standard errors of coefficients",

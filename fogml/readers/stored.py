@@ -183,11 +183,19 @@ class Parquet:
         self.told = {
             "arrays": [array.told for array in self.arrays],
             "facts": {key: metadata[key] for key in keys if key in metadata},
+            "origin_s": next((array.first_ns / 1e9 for array in self.arrays if array.is_stamp), None),
         }
 
     def close(self) -> None:
         self.arrays.clear()
         self.file.close()
+
+
+def nanoseconds(stamps: Any) -> Any:
+    """Arrow's stamps as nanoseconds since 1970."""
+    import pyarrow as arrow
+
+    return stamps.cast(arrow.timestamp("ns", stamps.type.tz)).cast(arrow.int64())
 
 
 class ParquetColumn:
@@ -203,10 +211,17 @@ class ParquetColumn:
         self.same = names[:index].count(self.name)
         self.shape = (file.metadata.num_rows,)
         kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
-        kind = "f" if any(is_kind(held) for is_kind in kinds) else "O"
-        self.told = {"name": self.name[:1000], "unit": None, "fault": None, "kind": kind}
+        self.is_stamp = types.is_timestamp(held)
+        kind = "f" if self.is_stamp or any(is_kind(held) for is_kind in kinds) else "O"
+        unit = "s" if self.is_stamp else None
+        self.told = {"name": self.name[:1000], "unit": unit, "fault": None, "kind": kind}
         self.told |= {"type": str(held)[:60], "shape": list(self.shape)}
         self.at, self.ahead, self.batches = 0, None, iter(())
+        self.first_ns = 0
+        if self.is_stamp and self.shape[0]:
+            first = next(self.parts(0, 1))
+            self.first_ns = (nanoseconds(first).to_pylist() or [0])[0] or 0
+            self.at = self.shape[0]
 
     def parts(self, start: int, stop: int) -> Iterator[Any]:
         """The rows from `start` to `stop`, as Arrow holds them, in pieces."""
@@ -229,8 +244,13 @@ class ParquetColumn:
         start, stop = part[0].start, part[0].stop
         found, at = np.empty(stop - start), 0
         for piece in self.parts(start, stop):
-            # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
-            found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+            if self.is_stamp:
+                since = nanoseconds(piece).fill_null(self.first_ns).to_numpy(zero_copy_only=False)
+                held = np.where(piece.is_null().to_numpy(zero_copy_only=False), np.nan, since - self.first_ns)
+                found[at : at + len(piece)] = held / 1e9
+            else:
+                # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
+                found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
             at += len(piece)
         return found
 

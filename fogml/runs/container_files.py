@@ -13,7 +13,6 @@ import weakref
 from collections.abc import Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +25,7 @@ from fogml.runs.csv_dialect import is_sure
 from fogml.runs.csv_files import csv_blocks, read_csv
 from fogml.runs.findings import Finding
 from fogml.runs.header_spelling import canonical_cells
-from fogml.runs.raw_table import RawTable, choose_vectors, stored_blocks
+from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
@@ -149,7 +148,7 @@ def container_blocks(
             if _is_joined(cell, main) and (columns is None or parse_header(cell)[0] in columns)
         ]
         findings += [*left_out, *_joined_findings(joined)]
-        started = _moment(stored.told.get("origin_s"))
+        started = moment(stored.told.get("origin_s"))
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
             yield replace(_with_joined(table, stored, joined), started=started)
 
@@ -251,12 +250,6 @@ def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> Flo
 
 def _factor(cell: str, file: str) -> float:
     return conversion("time", parse_header(cell)[1], file)[0]
-
-
-def _moment(origin_s: object) -> datetime | None:
-    if not isinstance(origin_s, int | float) or origin_s <= 0.0:
-        return None
-    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=origin_s)
 
 
 def sheet_blocks(

@@ -20,6 +20,7 @@ from typing import Any
 from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import Facts
+from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import (
     FACTS_KEY,
     RawTable,
@@ -68,7 +69,10 @@ def hdf5_blocks(
     with stored_file(path, "hdf5", (FACTS_KEY, *Facts.model_fields), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no datasets; one per column was expected, e.g. 'time [s]'")
-        vectors, findings = choose_vectors(path.name, [(_cell(array), array) for array in stored.arrays])
+        vectors, findings = choose_vectors(
+            path.name,
+            list(zip(canonical_cells([_cell(a) for a in stored.arrays]), stored.arrays, strict=True)),
+        )
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the attributes")
         yield from stored_blocks(stored, vectors, findings, facts, rows, columns)
 

@@ -23,6 +23,7 @@ from fogml.errors import InputError, quoted
 from fogml.runs.columns import parse_header
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
+from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, stored_blocks
 from fogml.runs.reader_process import stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
@@ -57,8 +58,8 @@ def mat_blocks(
             raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
-        cells = [(_cell(array.name, units.get(array.name)), array) for array in stored.arrays]
-        vectors, findings = choose_vectors(path.name, cells)
+        cells = canonical_cells([_cell(array.name, units.get(array.name)) for array in stored.arrays])
+        vectors, findings = choose_vectors(path.name, list(zip(cells, stored.arrays, strict=True)))
         source = f"{path.name}, facts"
         facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
         yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)

@@ -6,6 +6,7 @@ Facts stand there as JSON under ``fogml.facts``, as `write_run` puts them, or on
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.facts import Facts
-from fogml.runs.raw_table import FACTS_KEY, RawTable, embedded_facts, stored_blocks, text_column
+from fogml.runs.header_spelling import canonical_cells
+from fogml.runs.raw_table import FACTS_KEY, RawTable, embedded_facts, moment, stored_blocks, text_column
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
@@ -40,7 +42,7 @@ def parquet_blocks(
         for array in stored.arrays:
             name = parse_header(array.name)[0]
             if array.kind == "f":
-                vectors.append((array.name, array))
+                vectors.append((array.name if array.unit is None else f"{name} [{array.unit}]", array))
             elif column_spec(name) is not None:
                 raise InputError(
                     f"{path.name}, column '{name}': holds {array.type_name}, numbers were expected"
@@ -48,7 +50,11 @@ def parquet_blocks(
             else:
                 findings.append(text_column(name))
         facts = embedded_facts(stored.told["facts"], f"{path.name}, facts in the metadata")
-        yield from stored_blocks(stored, vectors, tuple(findings), facts, rows, columns)
+        cells = canonical_cells([cell for cell, _ in vectors])
+        vectors = [(cell, array) for cell, (_, array) in zip(cells, vectors, strict=True)]
+        started = moment(stored.told.get("origin_s"))
+        for table in stored_blocks(stored, vectors, tuple(findings), facts, rows, columns):
+            yield replace(table, started=started)
 
 
 def parquet_rows(path: Path) -> int:

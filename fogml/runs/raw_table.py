@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import numpy as np
@@ -152,6 +152,13 @@ def stored_blocks(
         stop = min(start + step, count)
         values = {cell: stored.read(array, start, stop) for cell, array in vectors}
         yield RawTable(stored.path.name, cells, values, facts, named_from(start), findings)
+
+
+def moment(origin_s: object) -> datetime | None:
+    """A moment by its seconds since 1970, None where there are none."""
+    if not isinstance(origin_s, int | float) or origin_s <= 0.0:
+        return None
+    return datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=origin_s)
 
 
 def no_samples(file: str) -> InputError:

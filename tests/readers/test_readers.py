@@ -141,3 +141,30 @@ def test_objects_in_a_numpy_archive_are_never_unpickled(tmp_path):
 def test_readers_have_names_of_their_own():
     assert len({reader.name for reader in READERS}) == len(READERS)
     assert all(reader_of(reader.name) is reader for reader in READERS)
+
+
+@pytest.mark.parametrize("zone", [None, "Europe/Berlin"])
+def test_timestamps_of_pandas_in_parquet(tmp_path, zone):
+    import pandas as pd
+
+    begin = pd.Timestamp(files.START_S, unit="s", tz="UTC").tz_convert(zone)
+    index = begin + pd.to_timedelta(TIME, unit="s")
+    frame = pd.DataFrame({"Gyro (dph)": GYRO, "Temperature [°C]": WARM}, index=index)
+    frame.to_parquet(tmp_path / "log.parquet")
+    run = read_run(tmp_path / "log.parquet")
+    np.testing.assert_allclose(run.time, TIME, atol=1e-9)
+    np.testing.assert_array_equal(run.gyro, GYRO)
+    np.testing.assert_array_equal(run.columns["T"], WARM)
+    assert run.facts.started == STARTED
+    blocks = list(read_blocks(tmp_path / "log.parquet", block_rows=50))
+    np.testing.assert_allclose(np.concatenate([block.time for block in blocks]), TIME, atol=1e-9)
+
+
+def test_a_struct_of_matlab(tmp_path):
+    from scipy.io import savemat
+
+    held = {"Time": TIME, "gyro": GYRO, "T_in": WARM, "units": {"Time": "s", "gyro": "dph", "T_in": "°C"}}
+    savemat(tmp_path / "log.mat", {"log": held, "bench": "4"})
+    run = read_run(tmp_path / "log.mat")
+    np.testing.assert_array_equal(run.gyro, GYRO)
+    np.testing.assert_array_equal(run.columns["T_in"], WARM)
