@@ -59,7 +59,7 @@ def section(quick: bool) -> Section:
         [
             "## Formats and headers",
             f"Files of {files.COUNT} samples, written by the library behind each reader (ULog and DataFlash "
-            "byte by byte after their documents), read as they are; the error is the largest of gyro and clock"
+            "byte by byte after their documents), read as they are; the error is that of gyro and clock"
             " against what was written, relative to the largest value. Time is this process's own.",
             table(["format", "file", "rows", "columns", "error", "CPU [s]"], rows),
             "Text files of 30 samples with one habit each:",
