@@ -249,11 +249,12 @@ class _Means:
             self.sample_s = float(np.median(np.diff(time))) if len(time) > 1 else self.window_s
         window = np.floor((time[kept] - self.start) / self.window_s).astype(np.int64)
         names, place = np.unique(window, return_inverse=True)
-        sums = {
-            name: np.bincount(place, values[kept], minlength=len(names))
+        counts: NDArray[np.int64] = np.bincount(place, minlength=len(names)).astype(np.int64)
+        sums: dict[str, FloatArray] = {
+            name: np.asarray(np.bincount(place, values[kept], minlength=len(names)), dtype=np.float64)
             for name, values in {"time": time, **columns}.items()
         }
-        self.parts.append((names, np.bincount(place, minlength=len(names)).astype(np.int64), sums))
+        self.parts.append((np.asarray(names, dtype=np.int64), counts, sums))
 
     def values(self) -> tuple[FloatArray, dict[str, FloatArray]]:
         """Mean times [s] and columns of the windows that are at least half full, each of shape (m,)."""
