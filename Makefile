@@ -3,6 +3,8 @@ PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# All that the tests use but 'dataflash': its package unpacks to 93 MB, most of the time of an installation.
+EXTRAS := xlsx,tdms,mdf,ulog,ros,mcap,miniseed,sweep,cluster,export,test
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: demo test oldest newest docs lint format benchmarks clean
@@ -11,7 +13,7 @@ $(READY): pyproject.toml constraints.txt
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	$(PIP) install --quiet --upgrade -c constraints.txt pip setuptools
 	$(PIP) install --quiet -c constraints.txt torch
-	$(PIP) install --quiet -c constraints.txt -e '.[readers,sweep,cluster,export,test]'
+	$(PIP) install --quiet -c constraints.txt -e '.[$(EXTRAS)]'
 	touch $(READY)
 
 ## Train on one leg of a real thermal cycle, judge on another, and say which page to open.

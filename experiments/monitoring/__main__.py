@@ -117,10 +117,10 @@ def changed(months: int, limit: float = 1000.0) -> list[dict]:
                 continue
             found += 1
             delays.append(first.raised_at - CHANGED_AT + 1)
-            right += first.figure == figure
-            onset += first.onset_ci90[0] <= CHANGED_AT <= first.onset_ci90[1]
+            right += int(first.figure == figure)
+            onset += int(first.onset_ci90[0] <= CHANGED_AT <= first.onset_ci90[1])
             expected = np.log(size) if figure == "scatter" else size
-            covered += first.size_ci90[0] <= expected <= first.size_ci90[1]
+            covered += int(first.size_ci90[0] <= expected <= first.size_ci90[1])
         row = {"kind": kind, "months": months, "found": found, "early": early, "right": right}
         rows.append({**row, "onset": onset, "size": covered, "delays": delays})
     return rows
