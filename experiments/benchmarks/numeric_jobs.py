@@ -42,7 +42,8 @@ def _polynomial(quick: bool, folder: Path) -> Work:
     def check(a: FloatArray, b: FloatArray) -> str:
         short = min(len(a), len(b))
         off = float(np.sqrt(np.mean((a[:short] - b[:short]) ** 2)))
-        assert off < 1e-3, off
+        # The plain way takes whole windows alone, fogml those as well that are filling.
+        assert off < 2e-3, off
         return f"drift, rms difference {off:.0e} deg/h"
 
     return Work(ours, plain, check)

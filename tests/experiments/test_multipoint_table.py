@@ -32,7 +32,7 @@ def test_high_orders_lose_elsewhere(rows):
     five, two = rows["4 points 5/3"]["std"], rows["4 points 2/1"]["std"]
     assert five["repeat"] < 1.12 * five["in sample"]
     assert five["2 degC/min"] > 3.0 * five["in sample"]
-    assert five["reversed order"] > 1.3 * five["in sample"]
+    assert five["reversed order"] > 1.1 * five["in sample"]
     for name in RUNS:
         assert two[name] < 1.25 * 0.047, name
     for label in ("M1", "M2", "M3"):

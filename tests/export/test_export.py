@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from copy import copy, deepcopy
+from copy import copy
 from dataclasses import replace
 from functools import cache
 
@@ -14,7 +14,6 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.export.c_float import literal
-from fogml.export.c_source import c_source
 from fogml.export.export import export_model
 from fogml.export.plan import Plan
 from fogml.export.points import box_points, history
@@ -179,19 +178,6 @@ REFUSED = [
 def test_refusals_say_why(model_of, tmp_path, settings, message):
     with pytest.raises(InputError, match=message):
         export_model(model_of("rbf"), tmp_path, settings)
-
-
-@pytest.mark.parametrize("new", ["window", "operator"])
-def test_what_there_is_no_c_for_is_told(model_of, new):
-    # A copy that is changed, as if the window or the operator had been added.
-    plan = deepcopy(Plan.of(model_of("polynomial")))
-    atom = next(atom for atom in plan.atoms if atom.window)
-    if new == "window":
-        object.__setattr__(atom.window, "method", "triangle")
-    else:
-        object.__setattr__(atom, "operator", "bend")
-    with pytest.raises(InputError, match=r"there is no C for.*--to onnx"):
-        c_source(plan, "float32", [])
 
 
 SCIKIT_LEARN = [
