@@ -60,7 +60,7 @@ def test_rate_and_difference_by_definition(clock: str) -> None:
 def test_difference_is_the_features_where_their_windows_are_full(clock: str) -> None:
     time = CLOCKS[clock]
     run = Run(name="r", columns={"time": time, "gyro": np.zeros(3000), "T": temperature(time)})
-    values, full, _ = parse_features("diff(T)").atom_values(run)
+    values, _, full = parse_features("diff(T)").atom_values(run)
     assert full.sum() > 2000
     found = Memory().difference("a", time, temperature(time), 64.0)
     assert found[full] == pytest.approx(values[full, 0], abs=1e-10)
