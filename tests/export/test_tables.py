@@ -54,7 +54,7 @@ def test_a_parabola_is_cut_into_equal_parts():
 
 
 def test_as_few_as_the_tolerance_allows():
-    temperature = np.linspace(0.0, 50.0, 401)
+    temperature = np.linspace(0.0, 50.0, 101)
     whole = curve(np.sin(temperature / 8.0), temperature)
     found = segments(whole, tolerance=0.01)
     assert found.largest <= 0.01
