@@ -35,8 +35,8 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
     else:
         verdict = ["No unit has changed."]
     verdict.append(
-        f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; of runs without a change one in "
-        f"{every:g} gives an alarm, at most."
+        f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; where runs are alike and "
+        f"independent, one in {every:g} gives a false alarm, at most."
     )
     return render(
         "monitor.html",
