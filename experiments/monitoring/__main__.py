@@ -150,10 +150,10 @@ def page(no_change: list[dict], change: list[dict]) -> str:
         )
     lines += [
         "",
-        "With every figure normal and independent the limit holds. Here it does not: temperature takes another "
-        "course on each run, so that slopes and scatter are told now well, now badly, and what is badly told "
-        "passes for a change. At a limit of 1000, months with a false alarm are five times as many as stated, "
-        "with a bias that wanders ten times.",
+        "With every figure normal and independent the limit holds. Here it does not: temperature takes "
+        "another course on each run, so that slopes and scatter are told now well, now badly, and what is "
+        "badly told passes for a change. At a limit of 1000, months with a false alarm are five times as "
+        "many as stated, with a bias that wanders ten times.",
         "",
         f"## Something changes with run {CHANGED_AT + 1}, limit 1000",
         "",
