@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from fogml.blind.scoring.marks_file import Marks
 
 LEDGER = "experiments/gap_blind/final_uses.json"
-_WANTED = "wanted"
 _BASELINES = "baselines"
 
 

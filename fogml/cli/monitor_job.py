@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import cache
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from fogml.cli.monitor import MonitorSettings
-from fogml.cli.runs import open_blocks
+from fogml.cli.runs import check_named_once, open_blocks
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -67,9 +67,7 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
 
 def _records(settings: MonitorSettings, terminal: Terminal) -> list[RunRecord]:
     assert settings.model
-    twice = sorted({run for run in settings.runs if settings.runs.count(run) > 1})
-    if twice:
-        raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
+    check_named_once(settings.runs)
     model_of = _models(Path(settings.model))
     records = []
     with terminal.work("monitoring", total=len(settings.runs)) as work:
@@ -81,17 +79,13 @@ def _records(settings: MonitorSettings, terminal: Terminal) -> list[RunRecord]:
                 raise InputError(f"{path}: holds no samples, there is nothing to monitor")
             record = record_run(
                 model_of(first),
-                _chained(first, blocks),
+                chain([first], blocks),
                 averaging_s=settings.averaging,
                 any_unit=settings.any_unit,
             )
             records.append(record)
             work.advance()
     return records
-
-
-def _chained(first: Run, rest: Iterable[Run]) -> Iterable[Run]:
-    return chain([first], rest)
 
 
 def _models(place: Path) -> Callable[[Run], DriftModel]:
@@ -122,14 +116,14 @@ def _models(place: Path) -> Callable[[Run], DriftModel]:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.monitor_words import alarm_words, calibration_words, state_words
+    from fogml.report.monitor_words import alarm_words, calibration_words, state_words, unit_label
 
     rows = []
     for unit in values["units"][:_SHOWN]:
         last = unit["runs"][-1]
         rows.append(
             [
-                f"{unit['unit']} {unit['axis']}".strip() or "(no name)",
+                unit_label(unit),
                 str(len(unit["runs"])),
                 number(last["level"]),
                 number(unit["statistic"][-1]),
@@ -142,10 +136,10 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
         rows,
     )
     for unit in values["units"][:_SHOWN]:
-        label = f"{unit['unit']} {unit['axis']}".strip()
+        label = unit_label(unit)
         calibration = "" if unit["alarms"] else calibration_words(unit)
         for text in (*map(alarm_words, unit["alarms"]), calibration, *unit["notes"]):
             if text:
-                terminal.say(f"{label}: {text}" if label else text)
+                terminal.say(f"{label}: {text}")
     told = values["runs"]
     terminal.say(f"{told['added']} new runs kept, {told['repeated']} were there before")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.noise import NoiseSettings
-from fogml.cli.runs import open_run
+from fogml.cli.runs import check_named_once, open_run
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
@@ -56,8 +56,7 @@ def _for_others(settings: NoiseSettings, values: dict[str, Any]) -> tuple[str, s
 
 def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
     paths = [settings.run] if isinstance(settings.run, str) else list(settings.run or ())
-    if len(set(paths)) < len(paths):
-        raise InputError(f"{', '.join(paths)}: a run is named more than once; give each run once")
+    check_named_once(paths)
     with terminal.work(f"reading {paths[0]}") as work:
         runs = []
         for path in paths:

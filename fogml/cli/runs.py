@@ -55,6 +55,19 @@ def most_dropped(repair: Repairing) -> float:
     return 1.0 if repair == "anyway" else MOST_DROPPED
 
 
+def check_named_once(paths: Sequence[str]) -> None:
+    """Hold that no run is named twice.
+
+    Raises
+    ------
+    InputError
+        Naming those that are.
+    """
+    twice = sorted({path for path in paths if list(paths).count(path) > 1})
+    if twice:
+        raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
+
+
 def open_runs(
     paths: Sequence[str], terminal: Terminal, *, repair: Repairing = False, axis: str | None = None
 ) -> list[Run]:
@@ -65,9 +78,7 @@ def open_runs(
     InputError
         If a file is named twice.
     """
-    twice = sorted({path for path in paths if list(paths).count(path) > 1})
-    if twice:
-        raise InputError(f"{', '.join(twice)}: named more than once; give each run once")
+    check_named_once(paths)
     runs: list[Run] = []
     with terminal.work("reading", total=len(paths)) as work:
         for path in paths:

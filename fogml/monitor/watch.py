@@ -207,12 +207,11 @@ def _calibration(age: FloatArray, level: FloatArray, limit: float) -> Calibratio
     half = float(student.ppf(0.95, n - 2))
     deviation = float(np.sqrt(left @ left / (n - 2)))
     slope_half = half * deviation / np.sqrt(v)
-    ahead = np.geomspace(0.1, LONGEST_DAYS, 4000)
-    passed = age[-1] - age[0] + ahead
 
     def due(slope: float) -> float:
-        beyond = np.abs(slope) * passed >= limit
-        return float(ahead[np.argmax(beyond)]) if beyond.any() else float("inf")
+        """Days from the last run until a line of that slope has gone as far as the limit."""
+        days = limit / abs(slope) - float(np.ptp(age)) if slope else np.inf
+        return max(days, 0.0) if days <= LONGEST_DAYS else float("inf")
 
     low, high = trend - slope_half, trend + slope_half
     latest = float("inf") if low <= 0.0 <= high else due(min(low, high, key=abs))

@@ -28,7 +28,6 @@ _UNITS = {
     "deg/h/degC": "deg/h/°C",
     "ppm/degC": "ppm/°C",
 }
-NOT_TESTED = "not tested"
 
 
 def acceptance_page(values: Mapping[str, Any]) -> str:

@@ -86,17 +86,12 @@ def by_unit(fleet: Mapping[str, Any], order: Sequence[Mapping[str, Any]], outlie
                 y=[unit["after"] for unit in odd],
                 mode="markers",
                 name="unlike the others",
-                marker={
-                    "symbol": "circle-open",
-                    "size": 17,
-                    "color": style.VERMILION,
-                    "line": {"width": 2.5},
-                },
+                marker=style.ring(17),
             )
         )
     every = [v for unit in units for v in (unit["before"], unit["after"], unit["floor"]) if v and v > 0]
     figure.update_yaxes(title_text="rms [deg/h], logarithmic", **log_axis(min(every), max(every)))
-    _serials(figure, labels)
+    serial_axis(figure, labels)
     style.styled(figure, 400)
     return Drawing(
         figure,
@@ -133,7 +128,7 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
             figure.add_hline(y=end, line=style.FLOOR_LINE, row=row, col=column)
         title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"
         figure.update_yaxes(title_text=title, title_font_size=12, tickformat=".3~g", row=row, col=column)
-    _serials(figure, labels)
+    serial_axis(figure, labels)
     style.styled(figure, 90 + 170 * rows)
     moving = [trend["name"] for trend in found["trends"] if trend["seen"]]
     told = f"Drift over serial numbers is seen in {', '.join(moving)}." if moving else "No drift is seen."
@@ -148,7 +143,7 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
     )
 
 
-def _serials(figure: go.Figure, labels: Sequence[str]) -> None:
+def serial_axis(figure: go.Figure, labels: Sequence[str]) -> None:
     """An axis of serial numbers, of which as many are written as there is room for."""
     step = max(1, -(-len(labels) // _LABELS))
     figure.update_xaxes(

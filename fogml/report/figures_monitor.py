@@ -11,7 +11,8 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.axes import log_axis
-from fogml.report.monitor_words import FIGURE_WORDS, onset_words
+from fogml.report.figures_fleet import serial_axis
+from fogml.report.monitor_words import FIGURE_WORDS, onset_words, unit_label
 from fogml.report.page import Drawing
 from fogml.report.words import plural
 
@@ -70,12 +71,7 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
                         x=[age[raised]],
                         y=[values[raised]],
                         mode="markers",
-                        marker={
-                            "symbol": "circle-open",
-                            "size": 16,
-                            "color": style.VERMILION,
-                            "line": {"width": 2.5},
-                        },
+                        marker=style.ring(16),
                         showlegend=False,
                         hoverinfo="skip",
                     ),
@@ -139,7 +135,7 @@ def evidence(unit: Mapping[str, Any], limit: float) -> Drawing:
 
 def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
     """The last run's bias of every unit with the model's interval, changed units apart."""
-    labels = [f"{unit['unit']} {unit['axis']}".strip() or "(no name)" for unit in units]
+    labels = [unit_label(unit) for unit in units]
     figure = go.Figure()
     for state, symbol, colour in (("steady", "circle", style.GREEN), ("alarm", "x", style.VERMILION)):
         some = [i for i, unit in enumerate(units) if (unit["state"] == "alarm") == (state == "alarm")]
@@ -162,15 +158,7 @@ def levels(units: Sequence[Mapping[str, Any]]) -> Drawing:
                 },
             )
         )
-    step = max(1, -(-len(labels) // 24))
-    figure.update_xaxes(
-        type="category",
-        categoryorder="array",
-        categoryarray=labels,
-        tickmode="array",
-        tickvals=labels[::step],
-        tickangle=-60 if len(labels) > 8 else 0,
-    )
+    serial_axis(figure, labels)
     figure.update_yaxes(title_text="bias left by the model [deg/h]", tickformat=".3~g")
     style.styled(figure, 380)
     changed = sum(unit["state"] == "alarm" for unit in units)

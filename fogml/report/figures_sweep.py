@@ -135,12 +135,7 @@ def pareto_front(study: Mapping[str, Any]) -> Drawing:
                 y=[best["rms"]],
                 mode="markers",
                 name="winner",
-                marker={
-                    "symbol": "circle-open",
-                    "size": 18,
-                    "color": style.VERMILION,
-                    "line": {"width": 2.5},
-                },
+                marker=style.ring(18),
                 showlegend=shown,
             ),
             row=1,

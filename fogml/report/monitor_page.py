@@ -9,7 +9,7 @@ from typing import Any
 
 from fogml.fleet.summary import in_order_of_serial, label_of
 from fogml.report.figures_monitor import evidence, levels, run_figures, shown_figure
-from fogml.report.monitor_words import FIGURE_WORDS, alarm_words, calibration_words, state_words
+from fogml.report.monitor_words import FIGURE_WORDS, alarm_words, calibration_words, state_words, unit_label
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import number, percent, plural
@@ -54,11 +54,9 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
             ),
             Tile("Runs", str(runs), "", f"{monitor['runs']['added']} new"),
         ],
-        changed=[(label_of(unit) or "(no name)", alarm_words(unit["alarms"][-1])) for unit in changed],
+        changed=[(unit_label(unit), alarm_words(unit["alarms"][-1])) for unit in changed],
         levels=levels(units),
-        links=[
-            (label_of(unit) or "(no name)", f"units/{unit_file(unit)}", state_words(unit)) for unit in units
-        ],
+        links=[(unit_label(unit), f"units/{unit_file(unit)}", state_words(unit)) for unit in units],
     )
 
 
@@ -72,7 +70,7 @@ def unit_page(unit: Mapping[str, Any], limit: float) -> str:
     limit
         The ``runs_between_false_alarms``.
     """
-    label = label_of(unit) or "Unit without a name"
+    label = unit_label(unit)
     last = unit["runs"][-1]
     beyond = last["beyond_interval"]
     return render(

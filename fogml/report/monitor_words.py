@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+from fogml.fleet.summary import label_of
 from fogml.report.words import number, plural
 
 FIGURE_WORDS = {
@@ -16,6 +17,11 @@ FIGURE_WORDS = {
     "scale_factor": "scale factor error",
 }
 STATE_WORDS = {"baseline": "first runs", "steady": "steady", "alarm": "changed"}
+
+
+def unit_label(unit: Mapping[str, Any]) -> str:
+    """Serial number and axis, or that there is none."""
+    return label_of(unit) or "(no name)"
 
 
 def state_words(unit: Mapping[str, Any]) -> str:

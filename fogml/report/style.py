@@ -103,6 +103,11 @@ def floor_in_legend() -> go.Scatter:
     return go.Scatter(x=[None], y=[None], mode="lines", name="noise floor", line=FLOOR_LINE)
 
 
+def ring(size: int) -> dict[str, Any]:
+    """The marker that sets one point off from others, of so many px."""
+    return {"symbol": "circle-open", "size": size, "color": VERMILION, "line": {"width": 2.5}}
+
+
 def styled(figure: go.Figure, height: int, **layout: Any) -> go.Figure:
     """Put the house style on a figure, with its height in px and further layout settings."""
     figure.update_layout(template=TEMPLATE, height=height, **layout)

@@ -54,11 +54,6 @@ class Quantity:
         """Usual range (low, high) for a grade."""
         return self.tactical if grade == "tactical" else self.navigation
 
-    @property
-    def of_any_grade(self) -> tuple[float, float]:
-        """Range (low, high) that holds those of all grades."""
-        return min(self.tactical[0], self.navigation[0]), max(self.tactical[1], self.navigation[1])
-
     def typical(self, grade: Grade = "tactical") -> float:
         """`default`, else the middle of the grade's range: geometric where all of it is positive."""
         if self.default is not None:

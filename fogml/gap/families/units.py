@@ -19,7 +19,7 @@ from scipy.special import expit
 from scipy.stats import t as student
 
 from fogml.errors import InputError
-from fogml.gap.families.answer import answered, inferred
+from fogml.gap.families.answer import LISTED, answered, inferred
 from fogml.gap.families.inference import Inference, Progress
 from fogml.gap.families.priors import Priors
 from fogml.gap.families.search import Explanation
@@ -28,8 +28,6 @@ from fogml.gap.twin_model import AnyModel
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.twin import Twin
 
-LISTED = 0.02
-"""Causes are listed from this probability on."""
 SCHEMA = "fogml.gap_units/1"
 
 
