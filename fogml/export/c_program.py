@@ -210,11 +210,7 @@ def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
         words = [compiler, *CORTEX_M4, *FLAGS, "-Os", *more, "-c", str(folder / SOURCE), "-o", str(target)]
         _compile(words)
         figures[label] = _sizes(size, target)
-    probe = folder / "state.c"
-    probe.write_text('#include "fogml_model.h"\nfogml_state state;\n', encoding="utf-8")
-    words = [compiler, *CORTEX_M4, "-std=c99", "-fno-common", "-c", str(probe), "-o", str(folder / "state.o")]
-    _compile(words)
-    ram = sum(_sizes(size, folder / "state.o")[1:])
+    ram = cortex_m4_state_bytes(source, folder)
     version = _compile([compiler, "-dumpfullversion"]).strip()
     lean, whole = figures["lean"], figures["whole"]
     return {
@@ -225,6 +221,16 @@ def cortex_m4_size(source: CSource, folder: Path) -> dict[str, Any] | None:
         "self_test_flash_bytes": whole[0] + whole[1] - lean[0] - lean[1],
         "self_test_ram_bytes": whole[2] - lean[2],
     }
+
+
+def cortex_m4_state_bytes(source: CSource, folder: Path) -> int:
+    """RAM of one state on a Cortex-M4 [bytes], whose compiler is installed."""
+    write_files(source.files, folder)
+    probe, target = folder / "state.c", folder / "state.o"
+    probe.write_text('#include "fogml_model.h"\nfogml_state state;\n', encoding="utf-8")
+    more = ["-std=c99", "-fno-common", "-c", str(probe), "-o", str(target)]
+    _compile(["arm-none-eabi-gcc", *CORTEX_M4, *more])
+    return sum(_sizes("arm-none-eabi-size", target)[1:])
 
 
 def _compile(words: Sequence[str]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.export.c_program import CProgram
+from fogml.export.c_program import FLAGS, CProgram
 from fogml.export.c_source import CSource
 from fogml.export.plan import Plan
 from fogml.export.points import POINTS, box_points, history
@@ -161,10 +161,12 @@ def _largest(off: NDArray[Any]) -> float:
     return float(np.max(off, initial=0.0))
 
 
-def expected_outputs(source: CSource, program_folder: Path) -> tuple[list[float], list[int]]:
+def expected_outputs(
+    source: CSource, program_folder: Path, flags: Sequence[str] = FLAGS
+) -> tuple[list[float], list[int]]:
     """What the compiled source gives at the checks of its self-test, in the numbers of the code."""
     test = source.self_test
-    program = CProgram(source, program_folder)
+    program = CProgram(source, program_folder, flags=flags)
     kind = {"float64": np.float64, "float32": np.float32}.get(source.dtype, np.int64)
     step = np.arange(test.steps)
     fold = step % (2 * test.period)

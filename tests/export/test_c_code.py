@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from fogml.errors import InputError
 from fogml.export.c_fixed import EXP_ERROR as FIXED_EXP_ERROR
 from fogml.export.c_float import EXP_ERROR
-from fogml.export.c_program import FLAGS, RUNNING, CProgram, cortex_m4_size
+from fogml.export.c_program import FLAGS, RUNNING, CProgram, cortex_m4_size, cortex_m4_state_bytes
 from fogml.export.c_source import c_source
 from fogml.export.check import expected_outputs
 from fogml.export.instructions import instructions_per_sample
@@ -30,7 +30,9 @@ needs_cc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not in
 pytestmark = needs_cc
 WITH_SHADOW = replace(RUNNING, memory_bytes=None)
 # The address sanitizer maps a sixteenth of all there is.
-SANITIZERS = (*FLAGS, "-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
+QUICK = (*FLAGS, "-O0")
+"""Where the optimiser is not the matter: ARM's bits, sizes and exports are taken with it."""
+SANITIZERS = (*QUICK, "-fsanitize=address,undefined", "-fno-sanitize-recover=all")
 BOUND = {"float64": 2e-6, "float32": 2e-3, "q31": 2e-3}
 
 
@@ -66,7 +68,7 @@ def outputs(program: CProgram, source, run: Run):
 def test_equals_compensate_sample_by_sample(model_of, tmp_path, name, dtype):
     model = model_of(name)
     source = c_source(Plan.of(model), dtype, ["card"])
-    program = CProgram(source, tmp_path)
+    program = CProgram(source, tmp_path, flags=QUICK)
     run = disturbed(5)
     expected = model.compensate(run)
     out, flag = outputs(program, source, run)
@@ -90,7 +92,7 @@ def test_other_columns_and_time_since_power_on_are_inputs(tmp_path, dtype):
     inputs = {"T": run.columns["T"], "light": run.columns["light"], "time_on": run.time}
     assert "#define FOGML_INPUT_LIGHT" in source.files["fogml_model.h"]
     places = np.column_stack([inputs[name] for name in source.plan.sensors])
-    out, flag = CProgram(source, tmp_path).steps(run.time, places, run.gyro)
+    out, flag = CProgram(source, tmp_path, flags=QUICK).steps(run.time, places, run.gyro)
     expected = model.compensate(run)
     np.testing.assert_allclose(out, expected.compensated, atol=1e-9 if dtype == "float64" else 1e-4)
     np.testing.assert_array_equal(flag, expected.flag)
@@ -115,7 +117,7 @@ def test_true_times_are_heeded(model_of, tmp_path):
     model = model_of("rich")
     source = c_source(Plan.of(model), "float64", [])
     run = disturbed(6, jitter=0.3)
-    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     expected = model.compensate(run)
     np.testing.assert_allclose(out, expected.compensated, atol=1e-4)
     np.testing.assert_array_equal(flag, expected.flag)
@@ -125,7 +127,7 @@ def test_true_times_are_heeded(model_of, tmp_path):
 @pytest.mark.parametrize("name", ["mean", "rich", "memory", "rbf", "joint"])
 def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name, dtype):
     source = c_source(Plan.of(model_of(name)), dtype, ["a card with a */ in it".replace("*/", "* /")])
-    source = source.with_expected(*expected_outputs(source, tmp_path))
+    source = source.with_expected(*expected_outputs(source, tmp_path, QUICK))
     program = CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW)
     assert program.self_test() == 0
     out, _ = outputs(program, source, disturbed(7))
@@ -139,12 +141,12 @@ def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name
 @pytest.mark.parametrize("dtype", ["float64", "q15"])
 def test_the_self_test_notices_a_changed_number(model_of, tmp_path, dtype):
     source = c_source(Plan.of(model_of("rbf")), dtype, [])
-    source = source.with_expected(*expected_outputs(source, tmp_path))
+    source = source.with_expected(*expected_outputs(source, tmp_path, QUICK))
     text = source.files["fogml_model.c"]
     line = next(line for line in text.splitlines() if line.startswith("#define CONSTANT"))
     changed = "#define CONSTANT 0.125" if dtype == "float64" else "#define CONSTANT INT64_C(12345)"
     source.files["fogml_model.c"] = text.replace(line, changed)
-    assert CProgram(source, tmp_path).self_test() != 0
+    assert CProgram(source, tmp_path, flags=QUICK).self_test() != 0
 
 
 def faulty(run: Run) -> Run:
@@ -164,11 +166,12 @@ def test_readings_that_are_none_enter_neither_windows_nor_memories(model_of, tmp
     model, run = model_of(name), faulty(disturbed(5))
     source = c_source(Plan.of(model), dtype, [])
     expected = model.compensate(run)
-    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     scale = 1.0 if dtype == "float64" else 5.0
     np.testing.assert_allclose(out, expected.compensated, atol=scale * BOUND[dtype], rtol=1e-6)
     assert np.count_nonzero(flag != expected.flag) <= (0 if dtype == "float64" else 4)
     # Sample by sample and block by block as the whole.
+    run, expected = run[:900], model.compensate(run[:900])
     stream, names = model.stream(run.sample_s), ("T_in", "T_out")
     rows = zip(run.time, *(run.columns[name] for name in names))
     steps = [stream.step(time, dict(zip(names, readings))) for time, *readings in rows]
@@ -202,7 +205,7 @@ def test_no_reading_holds_the_last_drift_and_a_false_first_one_is_replaced(model
 
 
 def test_a_clock_that_steps_back_starts_the_windows_anew(model_of, tmp_path):
-    program = CProgram(c_source(Plan.of(model_of("polynomial")), "float64", []), tmp_path)
+    program = CProgram(c_source(Plan.of(model_of("polynomial")), "float64", []), tmp_path, flags=QUICK)
     time = np.concatenate([2.0 * np.arange(100.0), 2.0 * np.arange(100.0)])
     _, flag = program.steps(time, np.full((200, 1), 20.0), np.zeros(200))
     np.testing.assert_array_equal(flag[:100], flag[100:])
@@ -224,7 +227,7 @@ ORIGINS_US = (
 @pytest.mark.parametrize("clock", [(), ("-DFOGML_CLOCK_32",)])
 def test_how_long_a_unit_has_run_does_not_matter(model_of, tmp_path, dtype, clock):
     source = c_source(Plan.of(model_of("memory"), 0.5), dtype, [])
-    source = source.with_expected(*expected_outputs(source, tmp_path))
+    source = source.with_expected(*expected_outputs(source, tmp_path, QUICK))
     program = CProgram(source, tmp_path, flags=(*SANITIZERS, *clock), running=WITH_SHADOW)
     assert program.self_test() == 0
     time = 500_000 * np.arange(400, dtype=np.int64)
@@ -277,7 +280,7 @@ def test_a_lag_of_hours_holds_in_fixed_point(tmp_path):
     time = 0.1 * np.arange(40_000)
     T = np.round(16.0 * (20.0 + 30.0 * np.sin(time / 900.0))) / 16.0
     run = Run("fine", {"time": time, "gyro": np.zeros(len(time)), "T_in": T, "T_out": T})
-    out, _ = outputs(CProgram(source, tmp_path), source, run)
+    out, _ = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     assert np.abs(out - model.compensate(run).compensated).max() < 3e-3
 
 
@@ -287,7 +290,7 @@ def test_arm_gives_the_same_bits(model_of, tmp_path, dtype):
         if shutil.which(tool) is None:
             pytest.skip(f"{tool} is not installed")
     source = c_source(Plan.of(model_of("rbf")), dtype, [])
-    here = outputs(CProgram(source, tmp_path), source, disturbed(8))
+    here = outputs(CProgram(source, tmp_path, flags=QUICK), source, disturbed(8))
     arm = tmp_path / "arm"
     arm.mkdir()
     flags = (*FLAGS, "-static", "-march=armv7-a", "-mfpu=vfpv4")
@@ -296,7 +299,7 @@ def test_arm_gives_the_same_bits(model_of, tmp_path, dtype):
         assert mine.tobytes() == theirs.tobytes()
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
+@pytest.mark.parametrize("dtype", ["float32", "q15"])
 def test_compiles_for_a_cortex_m4(model_of, tmp_path, dtype):
     if shutil.which("arm-none-eabi-gcc") is None:
         pytest.skip("arm-none-eabi-gcc is not installed")
@@ -339,12 +342,12 @@ def test_one_thermometer_takes_less_than_two_kilobytes_at_any_rate(model_of, tmp
         pytest.skip("arm-none-eabi-gcc is not installed")
     for rate_hz in (1.0, 3.0, 100.0, 2000.0):
         source = c_source(Plan.of(model_of("polynomial"), 1.0 / rate_hz), dtype, [])
-        assert cortex_m4_size(source, tmp_path)["ram_bytes"] < 2000
+        assert cortex_m4_state_bytes(source, tmp_path) < 2000
 
 
 def test_nothing_of_the_c_library_is_called(model_of, tmp_path):
     source = c_source(Plan.of(model_of("rbf")), "float64", [])
-    CProgram(source, tmp_path)
+    CProgram(source, tmp_path, flags=QUICK)
     source_file, target = tmp_path / "fogml_model.c", tmp_path / "model.o"
     subprocess.run(["gcc", *FLAGS, "-c", str(source_file), "-o", str(target)], check=True)
     undefined = subprocess.run(["nm", "-u", str(target)], capture_output=True, text=True, check=True).stdout
@@ -353,7 +356,7 @@ def test_nothing_of_the_c_library_is_called(model_of, tmp_path):
 
 @pytest.mark.parametrize("dtype", ["float64", "float32"])
 def test_exponential_against_long_double(model_of, tmp_path, dtype):
-    program = CProgram(c_source(Plan.of(model_of("rbf")), dtype, []), tmp_path)
+    program = CProgram(c_source(Plan.of(model_of("rbf")), dtype, []), tmp_path, flags=QUICK)
     u = np.concatenate([np.linspace(0.0, 40.0, 100_001), np.geomspace(1e-12, 79.0, 20_001)])
     u = u.astype(np.float32 if dtype == "float32" else np.float64)
     exact = np.exp(-u.astype(np.longdouble))
@@ -364,7 +367,7 @@ def test_exponential_against_long_double(model_of, tmp_path, dtype):
 
 
 def test_fixed_point_exponential_against_long_double(model_of, tmp_path):
-    program = CProgram(c_source(Plan.of(model_of("rbf")), "q31", []), tmp_path)
+    program = CProgram(c_source(Plan.of(model_of("rbf")), "q31", []), tmp_path, flags=QUICK)
     u = np.arange(0, 30 << 26, 9973)
     exact = np.exp(-(u.astype(np.longdouble) / 2**26))
     error = np.abs(program.exponential(u) / np.longdouble(2**30) - exact)
@@ -411,7 +414,7 @@ def test_any_features(tmp_path, text, seed, dtype):
     source = c_source(Plan.of(model), dtype, [])
     run = disturbed(seed)
     expected = model.compensate(run)
-    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     if dtype == "float64":
         size = float(np.abs(expected.drift).max()) + 1.0
         np.testing.assert_allclose(out, expected.compensated, atol=1e-5 * size)

@@ -17,7 +17,7 @@ from fogml.models.saved import load_model, save_model
 from fogml.runs.dropouts import RULE, read_thermometer
 from fogml.runs.run import Run
 from fogml.runs.thermometer_limits import LIMITS, trained_limits
-from tests.export.test_c_code import disturbed, needs_cc, outputs
+from tests.export.test_c_code import QUICK, disturbed, needs_cc, outputs
 
 RATE = 4.0 / 60.0
 
@@ -75,7 +75,7 @@ def test_c_takes_offsets_as_batch_does(model_of, tmp_path, name, dtype):
     model = model_of(name)
     run, _ = with_offsets(disturbed(5), 3, 4.0)
     source = c_source(Plan.of(model), dtype, [])
-    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     expected = model.compensate(run)
     assert np.mean(flag != expected.flag) < (1e-9 if dtype == "float64" else 2e-3)
     same = flag == expected.flag
@@ -114,6 +114,6 @@ def test_fixed_point_stays_within_its_proven_bound(model_of, tmp_path, name, dty
     plan = Plan.of(model_of(name))
     source = c_source(plan, dtype, [])
     proven = fixed_point_error(plan, source.layout, dtype)
-    program = CProgram(source, tmp_path)
+    program = CProgram(source, tmp_path, flags=QUICK)
     measured = [c_difference(plan, source, program, seed).inside for seed in (0, 1)]
     assert max(measured) <= proven < factor * max(measured)

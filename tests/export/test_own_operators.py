@@ -21,7 +21,7 @@ from fogml.signals.kernel_windows import Kernel, kernel_rate
 from fogml.signals.windows import slope
 from fogml.testing import check_feature
 from tests.export.conftest import training_run
-from tests.export.test_c_code import SANITIZERS, WITH_SHADOW, disturbed, fast_run, needs_cc, outputs
+from tests.export.test_c_code import QUICK, SANITIZERS, WITH_SHADOW, disturbed, fast_run, needs_cc, outputs
 
 LINE = Kernel("line", (1.0, 0.0))
 """Weights that fall with age in a straight line: those of the least-squares slope."""
@@ -105,7 +105,7 @@ def test_bins_hold_a_window_of_ones_own(tmp_path):
     run = fast_run(0.1)
     source = c_source(Plan.of(model, run.sample_s), "float64", [])
     assert source.layout.binned
-    out, flag = outputs(CProgram(source, tmp_path), source, run)
+    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
     expected = model.compensate(run)
     np.testing.assert_array_equal(flag, expected.flag)
     assert np.abs(out - expected.compensated)[flag == 0].max() < 1e-4

@@ -115,6 +115,7 @@ def test_a_folder_is_a_library_of_arduino(exported, model_of, tmp_path):
 
 def violated(folder: Path) -> set[str]:
     words = ["cppcheck", "--addon=misra", "--std=c99", "--platform=arm32-wchar_t4", "-q", "--template={id}"]
+    words.append("--max-configs=1")  # as it is compiled: all but C++ and narrower clocks
     done = subprocess.run([*words, "fogml_model.c"], cwd=folder, capture_output=True, text=True, check=True)
     return set(re.findall(r"misra-c2012-([0-9.]+)", done.stderr))
 
