@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.twin_model import TwinModel
 from fogml.runs.epochs import with_epoch
 from fogml.runs.facts import Facts
 from fogml.twin.between_runs import Storage, storage_times
@@ -158,13 +157,12 @@ def test_a_unit_ages_from_its_first_run_on_whichever_run_is_replayed() -> None:
 
 
 def test_a_diagnosis_knows_the_time_between_its_runs() -> None:
-    twin = unit()
-    runs = [simulate(DOWN, twin, sample_s=60.0, facts=facts(hours)).run for hours in (700.0, 0.0, 24.0)]
+    twin = unit().with_effect("ageing", 1.0, time_constant=360_000.0)
+    runs = [simulate(DOWN, unit(), sample_s=60.0, facts=facts(hours)).run for hours in (700.0, 0.0, 24.0)]
     (fit, held) = with_epoch(runs[:2], runs[2:])
     assert [run.facts.epoch_s for run in (*fit, *held)] == [700.0 * 3600.0, 0.0, 86_400.0]
-    shape = {"time_constant": 360_000.0}
     for run in (*fit, *held):
-        found = TwinModel(twin).on(run).response("ageing", shape, {})
+        found = replay(twin, run, only="ageing")
         assert found == pytest.approx(np.log1p((run.facts.epoch_s + run.time) / 360_000.0), rel=1e-9)
     naive = simulate(DOWN, twin, sample_s=60.0, facts=Facts(started=datetime(2026, 3, 2))).run
     with pytest.raises(InputError, match="time zone in some of the runs"):

@@ -28,7 +28,7 @@ from fogml.gap.families.reports import (
 )
 from fogml.gap.families.shares import cause_shares
 from fogml.gap.how_far_result import Nearest, WhatIf
-from fogml.gap.preparing import LEAST_MOTION_DEGC, check_runs, keep_back
+from fogml.gap.preparing import check_runs, keep_back
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.twin_model import AnyModel, TwinModel
 from fogml.gap.where import GapOnRun, where
@@ -120,16 +120,7 @@ def inferred(
     if not held_out:
         fit, held_out = keep_back(fit)
     with threadpool_limits(1):
-        found = infer(model, fit, held_out, noise, without, priors or Priors(), tell)
-    runs = found.setting.scene.runs
-    moved = max(float(np.ptp(r.temperature)) for r in runs[: found.setting.scene.fitted])
-    if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in runs):
-        names = ", ".join(r.run.name for r in runs[: found.setting.scene.fitted])
-        raise InputError(
-            f"{names}: temperature moves by {moved:.2g} degC in all; a diagnosis needs a run in which it "
-            f"moves by {LEAST_MOTION_DEGC:g} degC or more"
-        )
-    return found
+        return infer(model, fit, held_out, noise, without, priors or Priors(), tell)
 
 
 def answered(

@@ -29,6 +29,7 @@ from fogml.gap.families.priors import Priors
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Explanation, Search
 from fogml.gap.noise import prior_of
+from fogml.gap.preparing import LEAST_MOTION_DEGC
 from fogml.gap.twin_model import AnyModel, TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
@@ -105,7 +106,13 @@ def infer(
     priors: Priors,
     tell: Progress = lambda what: None,
 ) -> Inference:
-    """The posterior of the causes behind the fit runs."""
+    """The posterior of the causes behind the fit runs.
+
+    Raises
+    ------
+    InputError
+        If no run can be used, or no temperature moves.
+    """
     tell("reading inputs")
     plant = plant_of(model)
     most = min(priors.most_rows, priors.most_of_all // max(len(fit), 1))
@@ -114,6 +121,7 @@ def infer(
         raise InputError("; ".join(reason for _, reason in unusable))
     held, more = _rows(held_out, model, plant, most)
     scene = Scene((*runs, *held), len(runs), model.grade, candidates=candidates_of(model))
+    _check_motion(scene)
     prior, source = prior_of(model, noise)
     setting = _setting(model, plant, scene, priors, prior.centre)
     first = first_noise(setting, prior)
@@ -150,6 +158,16 @@ def infer(
             break
         points = points.within(priors.hopeless)
     return Inference(model, plant, setting, columns, points, search, tuple(rescored), (*unusable, *more))
+
+
+def _check_motion(scene: Scene) -> None:
+    fit = scene.runs[: scene.fitted]
+    moved = max(float(np.ptp(r.temperature)) for r in fit)
+    if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in fit):
+        raise InputError(
+            f"{', '.join(r.run.name for r in fit)}: temperature moves by {moved:.2g} degC in all; "
+            f"a diagnosis needs a run in which it moves by {LEAST_MOTION_DEGC:g} degC or more"
+        )
 
 
 def _gap_length(setting: Setting, noise: NoiseModel) -> float:

@@ -53,6 +53,9 @@ def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, 
         raise Unusable(f"{run.name}: holds no temperature; a replay needs 'T [degC]' or 'T_in [degC]'")
     usable, masked = _usable(run)
     if usable.sum() < FEWEST_ROWS:
+        empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
+        if empty:
+            raise Unusable(f"{run.name}: column '{empty[0]}' holds no number; fill it or leave it out")
         raise Unusable(
             f"{run.name}: {int(usable.sum())} rows have a number in every column; a diagnosis needs more"
         )
