@@ -14,6 +14,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.twin.nominal import PRIOR_SD
 from fogml.twin.programme import load_programme
+from fogml.twin.replay import replay
 from fogml.twin.twin_file import load_twin
 
 TWIN = load_twin("nominal")
@@ -124,6 +125,12 @@ def test_an_effect_that_is_no_candidate_gets_no_certain_wrong_name():
     assert found.held_out_is_part and found.held_out == ("b.csv",)
     (far,) = found.how_far
     assert far.run == "b.csv" and far.recalibrated > 0.0
+
+
+def test_records_without_noise_have_no_gap_to_the_twin_that_made_them():
+    a, _, c = (r.with_columns(gyro=replay(TWIN, r)) for r in plain(1))
+    found = diagnose(TWIN, [a], [c], plan=False)
+    assert found.verdict == "no_gap" and found.how_far[0].after < 1e-3
 
 
 def still():

@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
-from fogml.gap.families.noise_points import white_noise
+from fogml.gap.families.noise_points import NOISELESS, white_noise
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
@@ -117,7 +117,7 @@ class HeldOut:
         self.run, self.rows = run, found.setting.scene.runs[run]
         self._rng = np.random.default_rng([seed, run])
         self._windows = windows = averages(self.rows)
-        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise)
+        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise, found.points.prior.centre.N)
         self._before = _square(windows.of(self.rows.gap))
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
@@ -178,12 +178,12 @@ class HeldOut:
         )
 
 
-def _own_noise(rows: Rows, model: NoiseModel) -> tuple[NoiseModel, str]:
+def _own_noise(rows: Rows, model: NoiseModel, expected: float) -> tuple[NoiseModel, str]:
     """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
-    own, usual = white_noise(rows), model.N
+    own, usual = max(white_noise(rows), NOISELESS * expected), model.N
     # The median of second differences of m rows is told to about 1.4 over the root of m.
     chance = 3.0 * 1.4 / math.sqrt(len(rows))
-    if abs(math.log(max(own, 1e-12) / usual)) < max(chance, math.log(UNIT_FACTOR)):
+    if abs(math.log(own / usual)) < max(chance, math.log(UNIT_FACTOR)):
         return model, ""
     apart = f"{own / usual:.2g} times" if own > usual else f"only {own / usual:.2g} times"
     said = f"white noise of this run is {apart} that of the others; its floor is its own"

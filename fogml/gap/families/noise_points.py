@@ -26,6 +26,8 @@ SMOOTH_PRICE = 5.0
 """What one of them costs there [nats]: sizes and odds."""
 WHITE_STEPS = (1.3, 1.06)
 """Factors by which white noise is searched, coarse and fine."""
+NOISELESS = 1e-3
+"""Share of the white noise expected under which none is: a simulation without noise is judged at that."""
 _MEDIAN = 0.6744897501960817
 
 
@@ -89,15 +91,16 @@ def noise_points(
         flicker = prior.centre.B * float(np.exp(b * held["B"]))
         return NoiseModel(white, flicker, prior.centre.K * float(np.exp(k * held["K"])))
 
-    white = _glance(setting)
+    least = NOISELESS * prior.centre.N
+    white = first_noise(setting, prior).N
     for step in WHITE_STEPS:
         while True:
-            tried = [white / step, white, white * step]
+            tried = [max(white / step, least), white, white * step]
             scores = [_score(setting, columns, at(w, 0.0, 0.0)) for w in tried]
             best = int(np.argmax(scores))
-            white = tried[best]
-            if best == 1:
+            if best == 1 or tried[best] == white:
                 break
+            white = tried[best]
     told = None if static is None else StaticRun.of(static)
     noises: list[NoiseModel] = []
     log_priors = []
@@ -114,14 +117,9 @@ def noise_points(
 
 
 def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
-    """White noise as neighbouring rows show it, slow noise as expected."""
-    return replace(prior.centre, N=_glance(setting))
-
-
-def _glance(setting: Setting) -> float:
-    """Coefficient N from second differences of neighbouring rows."""
+    """White noise as second differences of neighbouring rows show it, slow noise as expected."""
     found = [white_noise(rows) for rows in setting.scene.runs[: setting.scene.fitted]]
-    return max(float(np.median(found)), 1e-9)
+    return replace(prior.centre, N=max(float(np.median(found)), NOISELESS * prior.centre.N))
 
 
 def white_noise(rows: Rows) -> float:
