@@ -97,7 +97,7 @@ def whiteness(
     longest = min(longest_lag, count // 8)
     every = np.array([_products(series, lag) for lag in range(1, longest + 1)])
     pairs = np.array([sum(max(len(part) - lag, 0) for part in series) for lag in range(1, longest + 1)])
-    correlation = every / squares
+    correlation = every / (squares or 1.0)
     portmanteau = count * (count + 2.0) * np.cumsum(correlation**2 / np.maximum(pairs, 1))
     lags = 2 ** np.arange(int(np.log2(longest)) + 1, dtype=np.int64)
     lag_p = chi2.sf(portmanteau[lags - 1], lags)
