@@ -93,21 +93,23 @@ def twin_runs(quick: bool = False, *, slow_noise: bool = True) -> Iterator[Case]
     twin = load_twin(TWIN)
     if not slow_noise:
         twin = twin.with_noise(B=0.0, K=0.0, Q=0.0)
+    sample_s = 20.0 if quick else 5.0
     for name in PROGRAMMES[:1] if quick else PROGRAMMES:
         if name == NO_RAMP:
             continue
         tests = {
-            label: _simulated(name, twin, factor, 100 + i) for i, (label, factor) in enumerate(TESTED.items())
+            label: _simulated(name, twin, factor, 100 + i, sample_s)
+            for i, (label, factor) in enumerate(TESTED.items())
         }
         for trained, factors in list(TRAINED.items())[: 1 if quick else None]:
-            train = tuple(_simulated(name, twin, factor, i)[0] for i, factor in enumerate(factors))
+            train = tuple(_simulated(name, twin, factor, i, sample_s)[0] for i, factor in enumerate(factors))
             for label, (run, noise) in tests.items():
                 yield Case(
                     "twin", {"programme": name, "trained": trained, "test": label}, train, run, 100.0, noise
                 )
 
 
-def _simulated(name: str, twin: Twin, factor: float, seed: int) -> tuple[Run, FloatArray]:
+def _simulated(name: str, twin: Twin, factor: float, seed: int, sample_s: float) -> tuple[Run, FloatArray]:
     """A run of a programme with its ramp rates times a factor, and the noise in it [deg/h]."""
     from fogml.twin.programme import load_programme
     from fogml.twin.simulate import simulate
@@ -120,7 +122,7 @@ def _simulated(name: str, twin: Twin, factor: float, seed: int) -> tuple[Run, Fl
     made = simulate(
         replace(programme, steps=tuple(steps)),
         twin,
-        sample_s=5.0,
+        sample_s=sample_s,
         seed=seed,
         columns=("T_in", "T_out", "rate"),
         truth=True,

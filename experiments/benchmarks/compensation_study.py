@@ -62,7 +62,7 @@ def measure(quick: bool, repeats: int, folder: Path) -> dict[str, Any]:
     from fogml.models.regressors import predict_rows
 
     budget = QUICK if quick else FULL
-    run = training_run(600, (0.5, 1.0, 2.0), 3_000 if quick else 30_000)
+    run = training_run(600, (0.5, 1.0, 2.0), 1_500 if quick else 30_000)
     model: Any = make_model("rbf").fit(run)
     columns = parse_features("T, dT, T*dT").transform(run)
     columns = np.resize(columns[200:], (2_000 if quick else _BATCH, columns.shape[1]))

@@ -38,7 +38,8 @@ def settings_of(quick: bool) -> dict[str, Any]:
     """The settings, cut down where quick."""
     settings: dict[str, Any] = read_yaml(HERE / "config.yaml")
     if quick:
-        settings |= {"orders": [[2, 1], [5, 3]], "choice": {"orders": [2, 5], "rate_orders": [1, 3]}}
+        settings |= {"orders": [[2, 1], [5, 3]]}
+        settings["choice"] = {"orders": [2, 5], "rate_orders": [1, 3], "sensors": [["T1"], [*SENSORS]]}
     return settings
 
 
@@ -169,7 +170,7 @@ def choice(recorded: Recorded, settings: Mapping[str, Any]) -> dict[str, Any]:
     """What folds of one training run, and of two at different rates, choose; and what was best in truth."""
     texts = [
         multipoint_form(sensors, order, rate_order)
-        for sensors in sensor_sets(SENSORS)
+        for sensors in settings["choice"].get("sensors", sensor_sets(SENSORS))
         for order in settings["choice"]["orders"]
         for rate_order in settings["choice"]["rate_orders"]
     ]

@@ -39,7 +39,7 @@ def settings_of(quick: bool) -> dict[str, Any]:
     if quick:
         settings |= {"seeds": [1], "products": [0.0, 0.01], "rates": [10, 60]}
         settings["loop"] = {**settings["loop"], "centres": [8], "widths": [2.0], "index": 0.05}
-        settings |= {"sample": 2.0, "cases": QUICK_CASES}
+        settings |= {"sample": 5.0, "samples": {"first difference": 2.0}, "cases": QUICK_CASES}
     return settings
 
 
@@ -62,21 +62,30 @@ def runs_of(settings: Mapping[str, Any], product: float, rates: Any, seed: int) 
 def directions(settings: Mapping[str, Any]) -> dict[str, Any]:
     """By model, rate, training and product: what is left on a fresh run each way at 10 degC/h."""
     found: dict[str, Any] = {}
+    # What a first difference tells goes with the sampling.
+    samples = {rate: settings.get("samples", {}).get(rate, settings["sample"]) for rate in RATES}
     for seed in settings["seeds"]:
-        tests = runs_of(settings, settings["product"], [10], seed)
         twin = unit(settings, settings["product"])
+        tests = {
+            s: runs_of({**settings, "sample": s}, settings["product"], [10], seed)
+            for s in set(samples.values())
+        }
         for k, way in enumerate(WAYS):
-            train = made(twin, 10, way, 5000 + 10 * seed + k, settings["sample"])
+            train = {s: made(twin, 10, way, 5000 + 10 * seed + k, s) for s in tests}
             for label, name in MODELS.items():
                 for rate, text in RATES.items():
                     key = f"{label}|{rate}|{way}"
                     if key not in settings.get("cases", [key]):
                         continue
+                    sample_s = samples[rate]
                     for product in (False, True):
-                        model = make_model(name, features(name, text, product)).fit(train.run)
+                        model = make_model(name, features(name, text, product)).fit(train[sample_s].run)
                         row = found.setdefault(key, {}).setdefault(str(product), [])
                         row.append(
-                            {n: deviation(model, test, settings["averaging"]) for n, test in tests.items()}
+                            {
+                                n: deviation(model, test, settings["averaging"])
+                                for n, test in tests[sample_s].items()
+                            }
                         )
     return {key: {p: _median(rows) for p, rows in told.items()} for key, told in found.items()}
 

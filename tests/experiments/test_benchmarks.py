@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import sys
 import time
@@ -13,8 +14,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 sys.path.insert(0, str(ROOT))
 
-from experiments.benchmarks import run  # noqa: E402
-from experiments.benchmarks.harness import Job, Timed, Work, measure, run_python  # noqa: E402
+from experiments.benchmarks import command_jobs, harness, run  # noqa: E402
+from experiments.benchmarks.harness import Job, Ran, Timed, Work, measure, run_python  # noqa: E402
 from experiments.benchmarks.jobs import JOBS  # noqa: E402
 from experiments.benchmarks.pages import results_page  # noqa: E402
 
@@ -126,8 +127,13 @@ def test_what_is_missing_is_said(
 
 
 def test_a_job_measured_on_its_own_takes_its_place_among_the_rest(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ):
+    # What a process of its own takes is told elsewhere; no two of these take the same.
+    seconds = itertools.count(1)
+    monkeypatch.setattr(command_jobs, "run_python", lambda words: Ran(f"{next(seconds)}", 1.0, 0.0))
+    monkeypatch.setattr(harness, "run_python", lambda words: Ran('{"peak_mb": 100.0}', 1.0, 0.0))
+
     def quick(*names: str, merge: bool = True) -> dict:
         only = [word for name in names for word in ("--only", name)]
         words = ["--quick", *only, "--repeats", "1", "--out", str(tmp_path), *(["--merge"] if merge else [])]
