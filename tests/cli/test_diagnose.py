@@ -24,6 +24,7 @@ from fogml.runs.writing import write_run
 from fogml.twin.programme import load_programme
 from fogml.twin.simulate import simulate
 from fogml.twin.twin_file import load_twin
+from tests.cli.conftest import run_program
 from tests.report.diagnoses import every_diagnosis
 from tests.report.pages import Page
 
@@ -34,6 +35,7 @@ PROGRAMMES = {
     "c": (25, 45, 5, 30),
 }
 HYSTERESIS = 0.3
+SAMPLE_S = 20.0
 
 
 def steps(levels: tuple[int, ...]) -> list[str]:
@@ -46,15 +48,14 @@ def steps(levels: tuple[int, ...]) -> list[str]:
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory) -> dict[str, Path]:
-    """Three runs of one synthetic unit with hysteresis of the bias, at 0.1 Hz."""
+    """Three runs of one synthetic unit with hysteresis of the bias."""
     twin = load_twin("nominal").with_nominal(b0=2.0, b1=0.02, e0=100.0, m=0.5)
     twin = twin.with_effect("thermal_hysteresis", HYSTERESIS, half_width=8.0)
     folder = tmp_path_factory.mktemp("runs")
     paths = {}
     for seed, (name, levels) in enumerate(PROGRAMMES.items(), start=1):
-        made = simulate(
-            load_programme(steps(levels)), twin, sample_s=10.0, seed=seed, columns=["T_in", "T_out", "rate"]
-        )
+        columns = ["T_in", "T_out", "rate"]
+        made = simulate(load_programme(steps(levels)), twin, sample_s=SAMPLE_S, seed=seed, columns=columns)
         paths[name] = folder / f"{name}.csv"
         write_run(made.run, paths[name])
     return paths
@@ -165,7 +166,7 @@ def test_segments_lie_within_their_run(gap, runs):
     for segment in gap["where"]["segments"]:
         end = read_run(runs[segment["run"][0]]).span_s
         assert segment["run"] in gap["runs"]["fit"]
-        assert segment["from_s"] >= -10.0 and segment["to_s"] <= end + 10.0
+        assert segment["from_s"] >= -SAMPLE_S and segment["to_s"] <= end + SAMPLE_S
         assert segment["to_s"] - segment["from_s"] >= 600.0
 
 
@@ -179,19 +180,18 @@ def test_the_written_twin_has_the_effect_and_replays_the_run_held_out(diagnosed,
     # The nominal model's change of temperature reaches back over the last 128 s.
     left = left[recorded.time - recorded.time[0] >= 128.0]
     (far,) = gap["how_far"]
-    width = round(far["averaging_s"] / 10.0)
+    width = round(far["averaging_s"] / SAMPLE_S)
     averages = left[: len(left) // width * width].reshape(-1, width).mean(axis=1)
     # It has the catalogue's form, near the family's but not the same.
     assert np.sqrt(np.mean(averages**2)) < 0.7 * far["recalibrated"]
     assert far["after"] < 0.7 * far["recalibrated"]
 
 
-def test_the_written_settings_repeat_the_diagnosis(diagnosed, tmp_path, invoke):
+def test_the_written_settings_hold_what_was_asked(diagnosed, runs):
     settings = yaml.safe_load((diagnosed / "diagnose.config.yaml").read_text())
-    assert settings["twin"] == "nominal" and len(settings["runs"]) == 2
-    out = tmp_path / "again"
-    invoke("diagnose", "--config", diagnosed / "diagnose.config.yaml", "--out", out)
-    assert (out / "gap.json").read_bytes() == (diagnosed / "gap.json").read_bytes()
+    assert settings["twin"] == "nominal" and settings["rehearse"]
+    assert settings["runs"] == [str(runs["a"]), str(runs["b"])]
+    assert settings["held_out"] == [str(runs["c"])]
 
 
 def test_the_page_tells_the_figures_of_the_json(diagnosed, gap):
@@ -199,14 +199,6 @@ def test_the_page_tells_the_figures_of_the_json(diagnosed, gap):
     (far,) = gap["how_far"]
     assert f"{100 * far['closed']:.0f} %" in page.text
     assert "synthetic" in page.text and "Thermal hysteresis of the bias" in page.text
-
-
-def test_without_an_effect_it_is_not_named_and_nothing_held_out_is_said(runs, tmp_path, invoke_json):
-    out = tmp_path / "out"
-    gap = invoke_json("diagnose", runs["a"], runs["b"], "--without", "thermal_hysteresis", "--out", out)
-    assert gap["runs"]["held_out_is_part_of_last_run"] is True
-    assert all("thermal_hysteresis" not in found["class"] for found in gap["which"])
-    assert "No run was held out" in (out / "gap.html").read_text(encoding="utf-8")
 
 
 def rewritten(path: Path, folder: Path, name: str, **changes) -> Path:
@@ -312,16 +304,36 @@ def test_no_run_at_all(tmp_path, invoke):
     assert "no run is given" in refused(invoke, tmp_path)
 
 
-def test_a_run_that_cannot_be_used_is_told_where_others_can(runs, tmp_path, invoke_json):
-    short = rewritten(runs["a"], tmp_path, "short.csv", rows=slice(0, 15))
-    bare = tmp_path / "bare.csv"
+@pytest.fixture(scope="module")
+def one_usable(runs, tmp_path_factory) -> Path:
+    """The folder that a diagnosis wrote of one run and two that can't be used, an effect left out."""
+    folder = tmp_path_factory.mktemp("one-usable")
+    short = rewritten(runs["a"], folder, "short.csv", rows=slice(0, 15))
     run = read_run(runs["b"])
+    bare = folder / "bare.csv"
     write_run(Run.from_columns("bare.csv", run.facts, time=run.time, gyro=run.gyro), bare)
-    out = tmp_path / "out"
-    gap = invoke_json("diagnose", runs["a"], short, bare, "--held-out", runs["c"], "--out", out)
+    words = [runs["a"], short, bare, "--without", "thermal_hysteresis", "--out", folder / "out"]
+    run_program("diagnose", *words)
+    return folder / "out"
+
+
+def test_a_run_that_cannot_be_used_is_told_where_others_can(one_usable):
+    gap = json.loads((one_usable / "gap.json").read_text())
     assert gap["runs"]["fit"] == ["a.csv"]
     reasons = {item["run"]: item["reason"] for item in gap["runs"]["unusable"]}
     assert set(reasons) == {"short.csv", "bare.csv"}
     assert "a diagnosis needs more" in reasons["short.csv"] and "temperature" in reasons["bare.csv"]
-    page = Page((out / "gap.html").read_text(encoding="utf-8")).text
+    page = Page((one_usable / "gap.html").read_text(encoding="utf-8")).text
     assert "short.csv was not used" in page
+
+
+def test_without_an_effect_it_is_not_named_and_nothing_held_out_is_said(one_usable):
+    gap = json.loads((one_usable / "gap.json").read_text())
+    assert gap["runs"]["held_out_is_part_of_last_run"] is True
+    assert all("thermal_hysteresis" not in found["class"] for found in gap["which"])
+    assert "No run was held out" in (one_usable / "gap.html").read_text(encoding="utf-8")
+
+
+def test_the_written_settings_repeat_the_diagnosis(one_usable, tmp_path, invoke):
+    invoke("diagnose", "--config", one_usable / "diagnose.config.yaml", "--out", tmp_path / "again")
+    assert (tmp_path / "again" / "gap.json").read_bytes() == (one_usable / "gap.json").read_bytes()

@@ -84,7 +84,7 @@ def small_disk(tmp_path: Path) -> Iterator[Callable[[int], Path]]:
 
 
 def test_a_fleet_on_a_disk_that_fills(small_disk, invoke, refused, tmp_path):
-    manifest = write_fleet(tmp_path, 4)
+    manifest = write_fleet(tmp_path, 3)
     home = small_disk(2 * UNIT_KIB + UNIT_KIB // 2) / "out"
     arguments = ("fleet", manifest, *FLEET, "--out", home)
     refused("No space left on device", *arguments)
@@ -96,7 +96,7 @@ def test_a_fleet_on_a_disk_that_fills(small_disk, invoke, refused, tmp_path):
     assert not list(home.parent.rglob(".partial-*"))
     small_disk(8 * UNIT_KIB)
     assert invoke(*arguments).stderr == ""
-    assert len(finished(home)) == 4
+    assert len(finished(home)) == 3
     assert {name: finished(home)[name] for name in kept} == kept
 
 

@@ -3,12 +3,20 @@
 from __future__ import annotations
 
 import json
+from functools import partial
 
 import pytest
 import yaml
 
+from fogml.gap.plan import plan_runs
 from fogml.runs.reading import read_run
 from fogml.twin.programme import load_programme
+
+
+@pytest.fixture(autouse=True)
+def few_programmes_tried(monkeypatch):
+    """How well the search does is tested of `plan_runs` itself."""
+    monkeypatch.setattr("fogml.cli.plan_job.plan_runs", partial(plan_runs, most=24))
 
 
 def test_plan_then_simulate(tmp_path, invoke, invoke_json, monkeypatch):

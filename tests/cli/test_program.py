@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from fogml.outputs import whole_file, whole_folder
+from tests.cli.conftest import csv_text
 
 PROGRAM = [sys.executable, "-c", "from fogml.cli.main import main; main()"]
 
@@ -22,7 +23,7 @@ def run(*arguments: object, cwd=None):
     return subprocess.run(command, capture_output=True, text=True, timeout=120, cwd=cwd)
 
 
-def test_an_unmet_limit_is_status_1_and_what_is_written_is_used(run_files, tmp_path):
+def test_an_unmet_limit_is_status_1_and_what_is_written_is_used(run_files, tmp_path, invoke):
     arguments = ("--model", "M1", "--limit", "rms=0.001", "-o", "out", "--json")
     found = run("train", "a.csv", "--test", "b.csv", *arguments, cwd=tmp_path)
     assert (found.returncode, found.stderr) == (1, "")
@@ -30,8 +31,9 @@ def test_an_unmet_limit_is_status_1_and_what_is_written_is_used(run_files, tmp_p
     assert report["schema"] == "fogml.train/1" and not report["limits"][0]["met"]
     assert json.loads((tmp_path / "out" / "report.json").read_text()) == report
     assert (tmp_path / "out" / "certificate.html").exists()
-    found = run("compensate", "b.csv", "--model", "out/model", "-o", "c.csv", "--quiet", cwd=tmp_path)
-    assert (found.returncode, found.stdout, found.stderr) == (0, "", "")
+    model = tmp_path / "out" / "model"
+    found = invoke("compensate", tmp_path / "b.csv", "--model", model, "-o", tmp_path / "c.csv", "--quiet")
+    assert (found.stdout, found.stderr) == ("", "")
     header = (tmp_path / "c.csv").read_text().split("\n", 1)[0]
     assert header == "time [s],gyro [deg/h],T [degC],drift [deg/h],gyro_compensated [deg/h],flag"
 
@@ -51,43 +53,49 @@ def test_bad_input_is_status_2_and_one_line(run_files, tmp_path, invoke, monkeyp
 
 
 # Under a job in the background an interrupt is ignored from the start.
-WAITING_IN_THE_FIT = """
+WAITING = """
 import pathlib, signal, time
 signal.signal(signal.SIGINT, signal.default_int_handler)
 signal.signal(signal.SIGHUP, signal.SIG_DFL)
-import sklearn.svm
+import {module}
 
-def fit(self, *rows, **more):
-    pathlib.Path("fitting").touch()
+def wait(*words, **more):
+    pathlib.Path("waiting").touch()
     time.sleep(60.0)
 
-sklearn.svm.SVR.fit = fit
+{module}.{function} = wait
 from fogml.cli.main import main
 main()
 """
 
 
 @pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143), (signal.SIGHUP, 129)]
+    ("number", "status", "module", "function", "model"),
+    [
+        (signal.SIGINT, 130, "sklearn.svm", "SVR.fit", "sklearn.svm.SVR"),
+        (signal.SIGTERM, 143, "fogml.cli.runs", "open_runs", "mean"),
+        (signal.SIGHUP, 129, "fogml.cli.runs", "open_runs", "mean"),
+    ],
+    ids=["keyboard, in the fit", "end, while reading", "hang-up, while reading"],
 )
-def test_an_interrupt_leaves_nothing(run_files, tmp_path, number, status):
-    arguments = ["train", "a.csv", "--test", "b.csv", "--model", "sklearn.svm.SVR", "-o", "out"]
+def test_an_interrupt_leaves_nothing(run_files, tmp_path, number, status, module, function, model):
+    arguments = ["train", "a.csv", "--test", "b.csv", "--model", model, "-o", "out"]
     process = subprocess.Popen(
-        [sys.executable, "-c", WAITING_IN_THE_FIT, *arguments],
+        [sys.executable, "-c", WAITING.format(module=module, function=function), *arguments],
         cwd=tmp_path,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
     deadline = time.monotonic() + 60
-    while not (tmp_path / "fitting").exists() and time.monotonic() < deadline:
+    while not (tmp_path / "waiting").exists() and time.monotonic() < deadline:
         time.sleep(0.01)
     os.kill(process.pid, number)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == status
     assert "Traceback" not in errors
     assert "interrupted: what is finished is kept, nothing is half written" in errors
-    assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "a.yaml", "b.csv", "b.yaml", "fitting"}
+    assert {path.name for path in tmp_path.iterdir()} == {"a.csv", "a.yaml", "b.csv", "b.yaml", "waiting"}
 
 
 def test_a_closed_pipe_is_no_traceback(run_files, tmp_path):
@@ -126,7 +134,8 @@ def test_a_name_that_is_no_text_is_told_or_taken(run_files, tmp_path, invoke):
     assert {path.name for path in tmp_path.glob("*out*")} == {out.name}
 
 
-def test_a_locale_of_ascii(run_files, tmp_path):
+def test_a_locale_of_ascii(tmp_path):
+    (tmp_path / "a.csv").write_text(csv_text(0, rows=300))
     ascii_only = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONIOENCODING": "ascii", "PYTHONCOERCECLOCALE": "0"}
     found = subprocess.run(
         [*PROGRAM, "noise", "a.csv", "-o", "out"],

@@ -22,7 +22,7 @@ SPACE = {
 @pytest.fixture
 def sweep_config(tmp_path):
     for seed, name in enumerate(("a", "b", "c")):
-        write_run(tmp_path / f"{name}.csv", "FOG-1", seed, slope=0.05, cycles=1.0 + 0.3 * seed, rows=600)
+        write_run(tmp_path / f"{name}.csv", "FOG-1", seed, slope=0.05, cycles=1.0 + 0.3 * seed, rows=400)
     values = {
         "schema": "fogml.sweep/1",
         "name": "mine",
@@ -30,7 +30,7 @@ def sweep_config(tmp_path):
         "test": ["c.csv"],
         "space": SPACE,
         "objectives": ["rms", "bytes", "operations"],
-        "trials": 6,
+        "trials": 4,
         "out": str(tmp_path / "out"),
     }
     path = tmp_path / "mine.yaml"
@@ -44,14 +44,14 @@ def test_a_sweep_writes_its_winner_as_a_configuration_of_train(invoke_json, swee
     assert written == {"best.yaml", "sweep.config.yaml", "study.journal", "sweep.html", "sweep.json"}
     assert values == json.loads((tmp_path / "out" / "sweep.json").read_text())
     assert values["schema"] == "fogml.study/1"
-    assert values["counts"]["complete"] + values["counts"]["pruned"] == 6
+    assert values["counts"]["complete"] + values["counts"]["pruned"] == 4
     assert "dT" in values["winner"]["features"]
     report = invoke_json("train", "--config", tmp_path / "out" / "best.yaml", "--out", tmp_path / "best")
     assert report["test"] == values["winner"]["judged"]["test"]
     again = invoke_json("sweep", tmp_path / "out" / "sweep.config.yaml")
     assert again == values
-    more = invoke_json("sweep", sweep_config, "--trials", 8)
-    assert [trial["rms"] for trial in more["trials"]][:6] == [trial["rms"] for trial in values["trials"]]
+    more = invoke_json("sweep", sweep_config, "--trials", 5)
+    assert [trial["rms"] for trial in more["trials"]][:4] == [trial["rms"] for trial in values["trials"]]
     page = (tmp_path / "out" / "sweep.html").read_text()
     assert "fogml train" in page
 
@@ -96,7 +96,8 @@ def test_a_fleet_and_the_next_unit_drawn_to_it(invoke, invoke_json, tmp_path):
     manifest = write_fleet(tmp_path, 4)
     lines = manifest.read_text().splitlines()
     manifest.write_text("\n".join([*lines, "FOG-000,compare,0a.csv,0b.csv,x", "WRONG,train,1a.csv,1b.csv,x"]))
-    arguments = ("fleet", manifest, "--model", "polynomial", "--averaging", 40, "--out", tmp_path / "out")
+    model = ("--model", "polynomial", "--features", "T, dT")
+    arguments = ("fleet", manifest, *model, "--averaging", 40, "--out", tmp_path / "out")
     values = invoke_json(*arguments, status=1)
     states = {(unit["unit"], unit["job"]): unit for unit in values["units"]}
     assert states[("WRONG", "train")]["status"] == "failed"

@@ -28,7 +28,7 @@ def home(tmp_path_factory):
     """Two files of three gyros, and beside them the same as a file an axis."""
     folder = tmp_path_factory.mktemp("three")
     for seed, name in enumerate(("a", "b")):
-        rows = [line.split(",") for line in csv_text(seed, rows=600).splitlines()]
+        rows = [line.split(",") for line in csv_text(seed, rows=400).splitlines()]
         time, gyro, temperature = zip(*rows[1:], strict=True)
         of = {axis: [f"{gain * float(g):.6f}" for g in gyro] for axis, gain in GAINS.items()}
         lines = [",".join(row) for row in zip(time, *of.values(), temperature, strict=True)]
