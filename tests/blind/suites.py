@@ -15,7 +15,7 @@ from fogml.runs.run import Run
 from fogml.runs.writing import write_run
 from fogml.twin.twin_file import load_twin
 
-SAMPLE_S = 20.0
+SAMPLE_S = 30.0
 N, B = 0.002, 0.002
 
 

@@ -17,7 +17,7 @@ from fogml.blind.sums import check_sums
 from fogml.blind.truth import read_truth
 from fogml.cli.blind_reports import link_reports
 from fogml.cli.main import app
-from tests.blind.suites import HandMade, make_suite
+from tests.blind.suites import SAMPLE_S, HandMade, make_suite
 from tests.blind.test_parts import WHOLE, marks_of, written
 
 RUNNER = CliRunner()
@@ -55,28 +55,15 @@ def test_wrong_usage_ends_with_2(tmp_path: Path) -> None:
 
 
 def test_leave_one_out_takes_each_effect_in_turn(tmp_path: Path) -> None:
-    made = RUNNER.invoke(
-        app,
-        [
-            "blind",
-            "make",
-            str(tmp_path / "s"),
-            "-n",
-            "3",
-            "--leave-one-out",
-            "--sample",
-            "30",
-            "--workers",
-            "1",
-        ],
-    )
+    options = ["-n", "2", "--leave-one-out", "--sample", "30", "--workers", "1"]
+    made = RUNNER.invoke(app, ["blind", "make", str(tmp_path / "s"), *options])
     assert made.exit_code == 0, made.output
     folder = BlindFolder(tmp_path / "s")
-    assert check_sums(folder.truth) == 3
+    assert check_sums(folder.truth) == 2
     truths = [read_truth(folder.truth / f"{name}.json") for name in folder.names()]
     assert {truth.kind for truth in truths} == {"unknown_left_out"}
     left = [truth.unknown[0].name for truth in truths]
-    assert len(set(left)) == 3
+    assert len(set(left)) == 2
     for truth in truths:
         assert truth.left_out and truth.unknown[0].id in truth.left_out
 
@@ -104,7 +91,7 @@ def test_scored_parts_are_merged(tmp_path: Path) -> None:
     for wrong in ([str(file)], ["--out", str(out)], [str(file), str(file), "--out", str(out)]):
         result = RUNNER.invoke(app, ["blind", "merge", *wrong])
         assert result.exit_code == 2 and not out.exists(), result.output
-    other = written(tmp_path, "other", marks_of(range(11, 15), ("abstain",), sample_s=20.0))
+    other = written(tmp_path, "other", marks_of(range(11, 15), ("abstain",), sample_s=SAMPLE_S))
     merged = RUNNER.invoke(app, ["blind", "merge", str(other), str(file), "--out", str(out), "--json"])
     assert merged.exit_code == 0, merged.output
     told = json.loads(merged.stdout)
