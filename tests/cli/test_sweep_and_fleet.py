@@ -127,10 +127,9 @@ def test_networks_in_batches_are_those_of_train(invoke_json, tmp_path):
     model = ("--model", "rbf", "--features", "T, dT", "--set", "centres=4", "--set", "average_rows=200")
     shared = ("--averaging", 40)
     values = invoke_json("fleet", manifest, *model, *shared, "--device", "cpu", "--out", tmp_path / "out")
-    for number, unit in enumerate(values["units"]):
-        runs = (tmp_path / f"{number}a.csv", "--test", tmp_path / f"{number}b.csv")
-        report = invoke_json("train", *runs, *model, *shared, "--out", tmp_path / f"one-{number}")
-        assert unit["after"] == pytest.approx(report["test"][0]["after"]["rms"], abs=1e-6)
+    runs = (tmp_path / "1a.csv", "--test", tmp_path / "1b.csv")
+    report = invoke_json("train", *runs, *model, *shared, "--out", tmp_path / "one")
+    assert values["units"][1]["after"] == pytest.approx(report["test"][0]["after"]["rms"], abs=1e-6)
 
 
 @pytest.mark.parametrize(
