@@ -16,7 +16,7 @@ from fogml.twin.programme import load_programme
 @pytest.fixture(autouse=True)
 def few_programmes_tried(monkeypatch):
     """How well the search does is tested of `plan_runs` itself."""
-    monkeypatch.setattr("fogml.cli.plan_job.plan_runs", partial(plan_runs, most=24))
+    monkeypatch.setattr("fogml.cli.plan_job.plan_runs", partial(plan_runs, most=12))
 
 
 def test_plan_then_simulate(tmp_path, invoke, invoke_json, monkeypatch):
