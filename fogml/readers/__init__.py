@@ -62,15 +62,15 @@ READERS = (
     Reader("mdf", "MDF4", (".mf4", ".mdf"), (b"MDF     ", b"UnFinMF "), f"{_TABLES}:Mdf", "asammdf", "mdf",
            1.0),
     Reader("miniseed", "miniSEED", (".mseed", ".miniseed", ".ms"), (b"MS\x03",), f"{_TABLES}:MiniSeed",
-           "pymseed", "miniseed", 0.0, 60.0),
+           "pymseed", "miniseed"),
     Reader("ulog", "ULog", (".ulg", ".ulog"), (b"ULog\x01\x12\x35",), f"{_VEHICLES}:ULog", "pyulog", "ulog",
-           2.0, 30.0),
+           2.0),
     Reader("dataflash", "DataFlash", (".bin",), (b"\xa3\x95\x80\x80",), f"{_VEHICLES}:DataFlash",
-           "pymavlink.DFReader", "dataflash", 3.0, 60.0),
+           "pymavlink.DFReader", "dataflash", 3.0),
     Reader("rosbag", "ROS bag", (".bag", ".db3"), (b"#ROSBAG V2.0", b"SQLite format 3\0"),
-           f"{_MESSAGES}:RosBag", "rosbags.highlevel", "ros", 5.0, 60.0),
+           f"{_MESSAGES}:RosBag", "rosbags.highlevel", "ros", 5.0),
     Reader("mcap", "MCAP", (".mcap",), (b"\x89MCAP0\r\n",), f"{_MESSAGES}:Mcap", "mcap.reader", "mcap",
-           5.0, 60.0),
+           5.0),
 )  # fmt: skip
 """Every format, in the order in which first bytes are compared."""
 _BY_NAME = {reader.name: reader for reader in READERS}

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.readers.spool import Rows, Spool
+
 Slice = Callable[[int, int], Any]
 MOST_COLUMNS = 5000
 
@@ -34,6 +36,7 @@ class Container:
         self.described: list[dict[str, Any]] = []
         self.origin_s: float | None = None
         """Seconds from 1970 to the time 0 of its columns, where the format has a date."""
+        self._spool: Spool | None = None
 
     @property
     def told(self) -> dict[str, Any]:
@@ -57,6 +60,25 @@ class Container:
             }
         )
 
+    @property
+    def spool(self) -> Spool:
+        """Where tables are kept that are unpacked as they are read."""
+        if self._spool is None:
+            self._spool = Spool()
+        return self._spool
+
+    def add_rows(
+        self,
+        group: str,
+        name: str,
+        unit: str | None,
+        rows: Rows,
+        field: str | None = None,
+        change: Callable[[Any], Any] = np.asarray,
+    ) -> None:
+        """A field of a table, or the rows of a plain one, with what turns the values into numbers."""
+        self.add(group, name, unit, Column(rows.count, lambda a, b: change(rows.read(field, a, b))))
+
     def add_values(self, group: str, name: str, unit: str | None, values: Any) -> None:
         """A column that is held."""
         held = np.asarray(values)
@@ -65,6 +87,8 @@ class Container:
     def close(self) -> None:
         """Let go of what is open."""
         self.arrays.clear()
+        if self._spool is not None:
+            self._spool.close()
 
 
 class Kept:

@@ -3,86 +3,166 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import math
+import struct
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.readers.columns import Column, Container, Kept
+from fogml.readers.spool import Rows
 
+ToFloats = Callable[[Any], Sequence[float]]
+_NUMBER = (bool, int, float, np.number)
 _DEEPEST = 5
 _LONGEST_ARRAY = 16
+_MOST_FIELDS = 100
+_MOST_TOPICS = 1000
+_STAMP = "header.stamp"
 _CLOCK = "time"
 _STAMPS = {("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")}
 
 
-def numbers(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, float]]:
-    """The numbers of a message by their paths, those of short arrays by place; stamps as seconds."""
-    if isinstance(message, bool | int | float | np.number):
-        yield above, float(message)
-    elif isinstance(message, dict):
-        yield from _fields(message, above, depth)
+def leaves(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, ToFloats]]:
+    """What holds the numbers of a message: path, value, and what makes numbers of it.
+
+    It is a number, a short array of numbers, or a stamp.
+    """
+    if isinstance(message, _NUMBER):
+        yield above, message, _one
     elif isinstance(message, list | tuple | np.ndarray):
         if len(message) <= _LONGEST_ARRAY:
-            for i, item in enumerate(message):
-                yield from numbers(item, f"{above}.{i}", depth + 1)
+            if all(isinstance(item, _NUMBER) for item in message):
+                yield above, message, list
+            else:
+                for i, item in enumerate(message):
+                    yield from leaves(item, f"{above}.{i}", depth + 1)
     elif not isinstance(message, str | bytes | None.__class__):
-        known: Any = getattr(message, "__dataclass_fields__", None)
-        names = tuple(known or getattr(message, "__slots__", ()))
-        yield from _fields({n: getattr(message, n) for n in names if not n.startswith("__")}, above, depth)
+        fields = message if isinstance(message, dict) else _fields(message)
+        if tuple(fields) in _STAMPS:
+            yield above, message, _stamp
+        elif depth < _DEEPEST:
+            for name, item in fields.items():
+                yield from leaves(item, f"{above}.{name}" if above else str(name), depth + 1)
 
 
-def _fields(fields: dict[str, Any], above: str, depth: int) -> Iterator[tuple[str, float]]:
-    if tuple(fields) in _STAMPS:
-        whole, parts = fields.values()
-        yield above, float(whole) + 1e-9 * float(parts)
-        return
-    if depth < _DEEPEST:
-        for name, item in fields.items():
-            yield from numbers(item, f"{above}.{name}" if above else str(name), depth + 1)
+def _fields(message: Any) -> dict[str, Any]:
+    known: Any = getattr(message, "__dataclass_fields__", None)
+    names = tuple(known or getattr(message, "__slots__", ()))
+    return {name: getattr(message, name) for name in names if not name.startswith("__")}
+
+
+def _one(value: Any) -> tuple[float]:
+    return (float(value),)
+
+
+def _stamp(message: Any) -> tuple[float]:
+    """Seconds of a stamp."""
+    whole, parts = (message if isinstance(message, dict) else _fields(message)).values()
+    return (float(whole) + 1e-9 * float(parts),)
+
+
+def numbers(message: Any) -> Iterator[tuple[str, float]]:
+    """The numbers of a message by their paths, those of short arrays by place; stamps as seconds."""
+    for path, value, to_floats in leaves(message):
+        found = to_floats(value)
+        if to_floats is list:
+            yield from ((f"{path}.{i}", float(each)) for i, each in enumerate(found))
+        else:
+            yield path, found[0]
+
+
+def values_of(first: Any, names: Sequence[str]) -> Callable[[Any], Sequence[float]]:
+    """What gives the numbers of these paths of a message, NaN where it has none.
+
+    Messages of a topic are mostly of the shape of the first, whose attributes are got at once; what is of
+    another, or no object, is searched through.
+    """
+
+    def search(message: Any) -> Sequence[float]:
+        found = dict(numbers(message))
+        return [found.get(name, math.nan) for name in names]
+
+    held = [(path, to_floats, len(to_floats(value))) for path, value, to_floats in leaves(first)]
+    if isinstance(first, dict) or any(part.isdigit() for path, *_ in held for part in path.split(".")):
+        return search
+    attributes = attrgetter(*(path for path, *_ in held))
+    parts = [(to_floats, count) for _, to_floats, count in held]
+
+    def get(message: Any) -> Sequence[float]:
+        try:
+            found: list[float] = []
+            together = attributes(message) if len(parts) > 1 else (attributes(message),)
+            for value, (to_floats, count) in zip(together, parts, strict=True):
+                floats = to_floats(value)
+                if len(floats) != count:
+                    return search(message)
+                found.extend(floats)
+            return found[: len(names)]
+        except (AttributeError, TypeError, ValueError):
+            return search(message)
+
+    return get
 
 
 class Messages(Container):
-    """Topics of messages; a topic is unpacked when the first of its columns is asked for."""
+    """Topics of messages; a topic is unpacked, block by block, when the first of its columns is asked for."""
 
     def __init__(self) -> None:
         super().__init__()
-        self.kept = Kept(self.unpacked, 2)
+        self.kept = Kept(self.unpacked, _MOST_TOPICS)
+        self.fields: dict[str, tuple[list[str], Callable[[Any], Sequence[float]], int]] = {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """Times of recording [ns] and messages of a topic, in order."""
         raise NotImplementedError
 
-    def topic(self, topic: str, kind: str) -> None:
-        """The columns of a topic."""
+    def topics(self, told: Iterable[tuple[str, str, int]]) -> None:
+        """The topics of connections, each with its topic, type and number of messages."""
+        kinds: dict[str, str] = {}
+        counts: Counter[str] = Counter()
+        for topic, kind, count in told:
+            kinds.setdefault(topic, kind)
+            counts[topic] += count
+        for topic, count in counts.items():
+            if count:
+                self.topic(topic, kinds[topic], count)
+
+    def topic(self, topic: str, kind: str, count: int) -> None:
+        """The columns of a topic of so many messages."""
         first = next(self.messages(topic), None)
-        if first is None or not (names := [name for name, _ in numbers(first[1])]):
+        if first is None or not (names := [name for name, _ in numbers(first[1])][:_MOST_FIELDS]):
             return
-        table = self.kept(topic)
-        self.add(topic, _CLOCK, "s", Column(len(table), partial(self.part, topic, 0)))
-        for place, name in enumerate(names[:100], start=1):
-            reader = Column(len(table), partial(self.part, topic, place))
-            self.add(topic, name, None, reader)
+        self.fields[topic] = names, values_of(first[1], names), count
+        self.add(topic, _CLOCK, "s", Column(count, partial(self.part, topic, _CLOCK)))
+        for place, name in enumerate(names):
+            self.add(topic, name, None, Column(count, partial(self.part, topic, str(place))))
             self.described[-1]["type"] = kind
 
-    def part(self, topic: str, place: int, start: int, stop: int) -> Any:
+    def part(self, topic: str, field: str, start: int, stop: int) -> Any:
         """Rows `start` to `stop` of a topic's column."""
-        return self.kept(topic)[start:stop, place]
+        return self.kept(topic).read(field, start, stop)
 
-    def unpacked(self, topic: str) -> NDArray[np.float64]:
-        """Times since the recording began [s] and numbers of a topic, shape (messages, columns)."""
-        rows, width = [], None
+    def unpacked(self, topic: str) -> Rows:
+        """Times since the recording began [s] and numbers of a topic, by place."""
+        names, values, count = self.fields[topic]
+        rows = Rows(self.spool, [(name, "<f8") for name in (_CLOCK, *map(str, range(len(names))))])
+        pack = struct.Struct(f"<{1 + len(names)}d").pack
+        stamp = names.index(_STAMP) if _STAMP in names else None
         for recorded_ns, message in self.messages(topic):
-            found = dict(numbers(message))
-            width = width if width is not None else list(found)
-            stamp = found.get("header.stamp", 0.0)
+            found = values(message)
             # Stamps of 0 are none.
-            since = stamp - self.begin_s if stamp > 0.0 else (recorded_ns - self.begin_ns) / 1e9
-            rows.append([since, *(found.get(name, np.nan) for name in width[:100])])
-        return np.array(rows, dtype=np.float64)
+            stated = found[stamp] if stamp is not None else 0.0
+            since = stated - self.begin_s if stated > 0.0 else (recorded_ns - self.begin_ns) / 1e9
+            rows += pack(since, *found)
+        if rows.count != count:
+            raise ValueError(f"{topic} holds {rows.count} messages, and its index states {count}")
+        return rows
 
     begin_ns = 0
 
@@ -103,12 +183,12 @@ class RosBag(Messages):
         place = Path(path)
         place = place.parent if place.suffix == ".db3" else place
         self.file = AnyReader([place], default_typestore=get_typestore(Stores.LATEST))
+        if not self.file.is2:
+            self.file.readers = [_chunk_by_chunk(place)]
         self.file.open()
         self.begin_ns = self.file.start_time
         self.origin_s = self.begin_s
-        for connection in self.file.connections:
-            if connection.msgcount:
-                self.topic(connection.topic, connection.msgtype)
+        self.topics((each.topic, each.msgtype, each.msgcount) for each in self.file.connections)
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """As `Messages`."""
@@ -120,6 +200,48 @@ class RosBag(Messages):
         """Let go of the file."""
         super().close()
         self.file.close()
+
+
+def _chunk_by_chunk(path: Path) -> Any:
+    """The library's reader of ROS 1 bags, which holds the index of one chunk at a time, not of all."""
+    from rosbags.rosbag1 import Reader
+
+    class ChunkByChunk(Reader):
+        def open(self) -> None:
+            super().open()
+            counts: dict[int, int] = {}
+            for info in self.chunk_infos:
+                for connection, count in info.connection_counts.items():
+                    counts[connection] = counts.get(connection, 0) + count
+            self.connections = [each._replace(msgcount=counts.get(each.id, 0)) for each in self.connections]
+
+        def read_index_data(self, pos: int, indexes: Any) -> None:
+            """Leave the index for when its chunk is read."""
+
+        def messages(
+            self, connections: Collection[Any] = (), start: int | None = None, stop: int | None = None
+        ) -> Any:
+            assert self.bio is not None
+            wanted = list(connections or self.connections)
+            chunks = sorted(self.chunk_infos, key=lambda info: info.start_time)
+            ahead: dict[int, list[Any]] = {each.id: [] for each in wanted}
+            for place, info in enumerate(chunks):
+                found: dict[int, list[Any]] = defaultdict(list)
+                chunk = self.chunks[info.pos]
+                self.bio.seek(chunk.datapos + chunk.datasize)
+                for _ in info.connection_counts:
+                    super().read_index_data(info.pos, found)
+                until = chunks[place + 1].start_time if place + 1 < len(chunks) else math.inf
+                ready: dict[int, list[Any]] = {}
+                for number, held in ahead.items():
+                    entries = sorted([*held, *found[number]])
+                    # What a later chunk may hold messages before waits for it.
+                    ready[number] = [entry for entry in entries if entry.time < until]
+                    ahead[number] = [entry for entry in entries if entry.time >= until]
+                self.indexes = ready
+                yield from super().messages(wanted, start, stop)
+
+    return ChunkByChunk(path)
 
 
 class Mcap(Messages):
@@ -138,14 +260,27 @@ class Mcap(Messages):
             raise ValueError("no summary at its end")
         self.begin_ns = summary.statistics.message_start_time if summary.statistics else 0
         self.origin_s = self.begin_s
-        for channel in summary.channels.values():
-            schema = summary.schemas.get(channel.schema_id)
-            if channel.message_encoding in ("cdr", "json"):
-                self.topic(channel.topic, schema.name if schema else "")
+        self.in_order = bool(summary.chunk_indexes)
+        counts = summary.statistics.channel_message_counts if summary.statistics else self.counted()
+        schemas = summary.schemas
+        self.topics(
+            (
+                one.topic,
+                schemas[one.schema_id].name if one.schema_id in schemas else "",
+                counts.get(one.id, 0),
+            )
+            for one in summary.channels.values()
+            if one.message_encoding in ("cdr", "json")
+        )
+
+    def counted(self) -> Mapping[int, int]:
+        """Messages of each channel, where the file does not state them."""
+        return Counter(found.channel_id for _, _, found in self.file.iter_messages(log_time_order=False))
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
-        """As `Messages`."""
-        for _, _, record, message in self.file.iter_decoded_messages(topics=[topic]):
+        """As `Messages`; a file without an index of its chunks is read in its own order, not sorted whole."""
+        found = self.file.iter_decoded_messages(topics=[topic], log_time_order=self.in_order)
+        for _, _, record, message in found:
             yield record.log_time, message
 
     def close(self) -> None:

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import csv
 import io
+import zipfile
+from collections.abc import Callable
+from dataclasses import dataclass
 from datetime import date, datetime, time, timedelta
 from functools import partial
+from itertools import chain, repeat
 from typing import Any
 
 import numpy as np
 
-from fogml.readers.columns import Column, Container, Kept
+from fogml.readers.columns import Column, Container
+from fogml.readers.spool import BLOCK_BYTES, Rows, Spool
 
+_MOST_OF_MATRIX = 64
 _UNIT_PROPERTIES = ("unit_string", "Unit", "unit", "NI_UnitDescription", "Units")
 
 
@@ -20,31 +26,66 @@ class Npz(Container):
 
     def __init__(self, path: str, keys: list[str]) -> None:
         super().__init__()
-        self.file = np.load(path, allow_pickle=False)
-        self.held = Kept(self.file.__getitem__, 4)
-        for name in self.file.files:
-            array = self.file[name]
-            if array.dtype.names:
-                for field in array.dtype.names:
-                    self.add_values(name, field, None, array[field])
-            elif array.dtype.kind in "fiub" and array.ndim == 1:
-                self.add("", name, None, Column(len(array), partial(self.part, name)))
-            elif array.dtype.kind == "M" and array.ndim == 1 and len(array):
-                seconds = (array - array[0]) / np.timedelta64(1, "s")
-                self.origin_s = float(array[0].astype("datetime64[ns]").astype(np.int64) / 1e9)
-                self.add_values("", name, "s", seconds)
-            elif array.dtype.kind in "fiub" and array.ndim == 2 and array.shape[1] <= 64:
-                for i in range(array.shape[1]):
-                    self.add_values(name, f"{name} column {i + 1}", None, array[:, i])
+        with zipfile.ZipFile(path) as archive:
+            for member in archive.namelist():
+                with archive.open(member) as file:
+                    self.member(member.removesuffix(".npy"), file)
 
-    def part(self, name: str, start: int, stop: int) -> Any:
-        """Rows `start` to `stop` of an array."""
-        return self.held(name)[start:stop]
+    def member(self, name: str, file: Any) -> None:
+        """The columns of an array that is unpacked as it is read."""
+        version = np.lib.format.read_magic(file)
+        read_header = getattr(np.lib.format, f"read_array_header_{version[0]}_0", None)
+        if read_header is None:
+            raise ValueError(f"{name}: an array of version {version[0]}")
+        shape, by_columns, kind = read_header(file)
+        if kind.names:
+            if len(shape) == 1 and not kind.hasobject:
+                rows = self.rows(file, kind, shape[0])
+                for field in kind.names:
+                    if kind[field].kind in "fiub" and not kind[field].shape:
+                        self.add_rows(name, field, None, rows, field)
+        elif kind.kind in "fiub" and len(shape) == 1:
+            self.add_rows("", name, None, self.rows(file, kind, shape[0]))
+        elif kind.kind == "M" and len(shape) == 1 and shape[0]:
+            rows = self.rows(file, kind, shape[0])
+            first = rows.read(None, 0, 1)[0]
+            self.origin_s = float(first.astype("datetime64[ns]").astype(np.int64) / 1e9)
+            self.add_rows("", name, "s", rows, None, partial(_seconds_since, first))
+        elif kind.kind in "fiub" and len(shape) == 2 and 0 < shape[1] <= _MOST_OF_MATRIX:
+            names = [f"{name} column {i + 1}" for i in range(shape[1])]
+            if by_columns:
+                for column in names:
+                    part = _Limited(file, shape[0] * kind.itemsize)
+                    self.add_rows(name, column, None, self.rows(part, kind, shape[0]))
+            else:
+                rows = self.rows(file, np.dtype([(column, kind) for column in names]), shape[0])
+                for column in names:
+                    self.add_rows(name, column, None, rows, column)
 
-    def close(self) -> None:
-        """Let go of the file."""
-        super().close()
-        self.file.close()
+    def rows(self, file: Any, kind: np.dtype[Any], count: int) -> Rows:
+        """A table of what a file holds from here on, so many rows."""
+        rows = Rows(self.spool, kind)
+        while part := file.read(BLOCK_BYTES):
+            rows += part
+        if rows.count != count:
+            raise ValueError(f"an array of {count} rows was stated, and {rows.count} are there")
+        return rows
+
+
+class _Limited:
+    """The next bytes of a file, and no more."""
+
+    def __init__(self, file: Any, size: int) -> None:
+        self.file, self.left = file, size
+
+    def read(self, size: int) -> bytes:
+        found: bytes = self.file.read(min(size, self.left))
+        self.left -= len(found)
+        return found
+
+
+def _seconds_since(first: np.datetime64, moments: Any) -> Any:
+    return (moments - first) / np.timedelta64(1, "s")
 
 
 class Sheet:
@@ -53,13 +94,29 @@ class Sheet:
     ndim = 1
     dtype = np.dtype("S")
 
-    def __init__(self, rows: Any) -> None:
+    def __init__(self, spool: Spool, rows: Any) -> None:
+        self.content = Rows(spool, np.uint8)
+        self.is_empty = True
         text = io.StringIO()
         writer = csv.writer(text, lineterminator="\n")
         for row in rows:
             writer.writerow([_cell(value) for value in row])
-        self.content = text.getvalue().encode()
-        self.shape = (len(self.content),)
+            if text.tell() > BLOCK_BYTES:
+                self.flush(text)
+        self.flush(text)
+        self.shape = (self.content.count,)
+
+    def flush(self, text: io.StringIO) -> None:
+        """Put what was written so far away."""
+        part = text.getvalue()
+        self.is_empty = self.is_empty and not part.strip(",\n")
+        self.content += part.encode()
+        text.seek(0)
+        text.truncate()
+
+    def text(self, start: int, stop: int) -> Any:
+        """Bytes of the text from one place to another."""
+        return self.content.read(None, start, stop)
 
 
 class Workbook(Container):
@@ -73,8 +130,9 @@ class Workbook(Container):
             for name in book.sheet_names:
                 held = book.get_sheet_by_name(name)
                 # Rows above the first cell count, as they do in the program that shows them.
-                sheet = Sheet([*[[]] * (held.start or (0, 0))[0], *held.iter_rows()])
-                if sheet.content.strip(b",\n"):
+                above = repeat((), (held.start or (0, 0))[0])
+                sheet = Sheet(self.spool, chain(above, held.iter_rows()))
+                if not sheet.is_empty:
                     self.add("", name, None, sheet)
 
 
@@ -185,23 +243,89 @@ class Mdf(Container):
 
 
 class MiniSeed(Container):
-    """A miniSEED file: one group for each channel, its clock from start and rate of each segment."""
+    """A miniSEED file: one group for each channel, its clock from start and rate of each segment.
+
+    The records of a segment are found first, and unpacked when samples of them are asked for.
+    """
 
     def __init__(self, path: str, keys: list[str]) -> None:
         from pymseed import MS3TraceList
 
         super().__init__()
-        self.traces = MS3TraceList.from_file(path, unpack_data=True)
-        starts = [segment.starttime for trace in self.traces for segment in trace]
+        self.file = open(path, "rb")  # noqa: SIM115  closed by `close`
+        traces = MS3TraceList.from_file(path, unpack_data=False, record_list=True)
+        starts = [segment.starttime for trace in traces for segment in trace]
         first = min(starts, default=0)
         self.origin_s = first / 1e9
-        for trace in self.traces:
-            parts = [segment for segment in trace if segment.sampletype in ("i", "f", "d")]
+        for trace in traces:
+            parts = [Segment.of(segment, first) for segment in trace]
+            parts = [part for part in parts if part.ends[-1] and part.is_of_numbers(self.file)]
             if not parts:
                 continue
-            times = [(p.starttime - first) / 1e9 + np.arange(p.numsamples) / p.samprate for p in parts]
-            values = [np.asarray(part.np_datasamples, dtype=np.float64) for part in parts]
             # FDSN:NET_STA_LOC_B_S_SS: band, source and subsource make the channel's code.
             code = "".join(trace.sourceid.split("_")[-3:])
-            self.add_values(trace.sourceid, "time", "s", np.concatenate(times))
-            self.add_values(trace.sourceid, code, "count", np.concatenate(values))
+            ends = np.cumsum([part.ends[-1] for part in parts])
+            for name, unit, read in (("time", "s", Segment.times), (code, "count", self.samples)):
+                reader = partial(_across, parts, ends, read)
+                self.add(trace.sourceid, name, unit, Column(int(ends[-1]), reader))
+        traces.close()
+
+    def samples(self, segment: Segment, start: int, stop: int) -> Any:
+        """Samples of a segment."""
+        return segment.samples(self.file, start, stop)
+
+    def close(self) -> None:
+        """Let go of the file."""
+        super().close()
+        self.file.close()
+
+
+def _across(parts: list[Segment], ends: Any, read: Callable[..., Any], start: int, stop: int) -> Any:
+    """Rows of segments that come one after the other."""
+    found = [np.empty(0)]
+    for part, end in zip(parts, ends, strict=True):
+        begin = end - part.ends[-1]
+        if begin < stop and start < end:
+            found.append(read(part, max(start - begin, 0), min(stop, end) - begin))
+    return np.concatenate(found)
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Records without a gap: begin, interval [s]; place, length [bytes] of each, samples up to its end."""
+
+    begin_s: float
+    interval_s: float
+    places: Any
+    lengths: Any
+    ends: Any
+
+    @classmethod
+    def of(cls, segment: Any, first_ns: int) -> Segment:
+        """A segment of the library's list, its begin counted from a moment."""
+        held = [(one.fileoffset, one.record.reclen, one.record.samplecnt) for one in segment.recordlist]
+        places, lengths, counts = np.array(held, dtype=np.int64).reshape(-1, 3).T
+        begin_s = (segment.starttime - first_ns) / 1e9
+        return cls(begin_s, 1.0 / segment.samprate, places, lengths, np.cumsum(counts))
+
+    def is_of_numbers(self, file: Any) -> bool:
+        """Whether its samples are no text."""
+        return self.record(file, 0).sampletype in ("i", "f", "d")
+
+    def times(self, start: int, stop: int) -> Any:
+        """Times of samples [s]."""
+        return self.begin_s + self.interval_s * np.arange(start, stop)
+
+    def samples(self, file: Any, start: int, stop: int) -> Any:
+        """Samples from one place to another."""
+        first, last = np.searchsorted(self.ends, (start, stop - 1), side="right").tolist()
+        parts = [np.array(self.record(file, i).np_datasamples) for i in range(first, last + 1)]
+        begin = int(self.ends[first - 1]) if first else 0
+        return np.concatenate(parts).astype(np.float64)[start - begin : stop - begin]
+
+    def record(self, file: Any, number: int) -> Any:
+        """A record with its samples."""
+        from pymseed import MS3Record
+
+        file.seek(int(self.places[number]))
+        return MS3Record.parse(file.read(int(self.lengths[number])), unpack_data=True)

@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError, listed, printable, quoted
 from fogml.readers import reader_of
-from fogml.runs.columns import column_spec, conversion, parse_header
+from fogml.runs.beside import Beside, clock_s, interpolated
+from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_dialect import is_sure
 from fogml.runs.csv_files import csv_blocks, read_csv
 from fogml.runs.findings import Finding
@@ -149,8 +150,9 @@ def container_blocks(
         ]
         findings += [*left_out, *_joined_findings(joined)]
         started = moment(stored.told.get("origin_s"))
+        beside = [Beside(cell, group.column("time"), array) for cell, group, array in joined]
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
-            yield replace(_with_joined(table, stored, joined), started=started)
+            yield replace(_with_joined(table, stored, beside), started=started)
 
 
 def _is_joined(cell: str, main: Group) -> bool:
@@ -168,21 +170,13 @@ def _joined_findings(joined: Sequence[tuple[str, Group, StoredArray]]) -> Iterat
         yield Finding("other_rate", message, column=name, count=max(array.shape))
 
 
-def _with_joined(
-    table: RawTable, stored: StoredFile, joined: Sequence[tuple[str, Group, StoredArray]]
-) -> RawTable:
+def _with_joined(table: RawTable, stored: StoredFile, joined: Sequence[Beside]) -> RawTable:
     """A block with the columns of other groups at its times."""
-    if not joined:
+    if not joined or not len(table):
         return table
     time = next(cell for cell in table.columns if parse_header(cell)[0] == "time")
-    seconds = table.columns[time] * _factor(time, table.file)
-    columns = dict(table.columns)
-    for cell, group, array in joined:
-        clock, times = group.column("time")
-        count = min(max(times.shape), max(array.shape))
-        stored.limits.check_size(stored.path, 2.0 * count)
-        at = stored.read(times, 0, count) * _factor(clock, table.file)
-        columns[cell] = interpolated(seconds, at, stored.read(array, 0, count))
+    seconds = table.columns[time] * clock_s(time, table.file)
+    columns = dict(table.columns) | {one.cell: one.at(stored, seconds) for one in joined}
     return replace(table, cells=tuple(columns), columns=columns)
 
 
@@ -236,20 +230,7 @@ def _clock_of(path: Path, stored: StoredFile, group: Group) -> FloatArray:
     if "time" not in group.names:
         raise InputError(f"{path.name}: {quoted(group.name)} has no clock by which it could be joined")
     cell, array = group.column("time")
-    return stored.read(array, 0, max(array.shape)) * _factor(cell, path.name)
-
-
-def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> FloatArray:
-    """Values of one rate at the times of another; the first and last are held beyond."""
-    sound = np.isfinite(at) & np.isfinite(values)
-    if not sound.any():
-        return np.full(len(seconds), np.nan)
-    order = np.argsort(at[sound], kind="stable")
-    return np.interp(seconds, at[sound][order], values[sound][order])
-
-
-def _factor(cell: str, file: str) -> float:
-    return conversion("time", parse_header(cell)[1], file)[0]
+    return stored.read(array, 0, max(array.shape)) * clock_s(cell, path.name)
 
 
 def sheet_blocks(
@@ -294,9 +275,11 @@ def _sheet(path: Path, folder: _Folder, limits: ReadingLimits) -> Path:
     with stored_file(path, "workbook", (), limits) as stored:
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no cells; a header and samples were expected")
-        texts = [stored.text(sheet) for sheet in stored.arrays]
-    file = Path(folder.name) / path.name
-    file.write_bytes(next((text for text in texts if is_sure(text)), texts[0]))
+        sure = (sheet for sheet in stored.arrays if is_sure(next(stored.text(sheet))))
+        sheet = next(sure, stored.arrays[0])
+        file = Path(folder.name) / path.name
+        with file.open("wb") as text:
+            text.writelines(stored.text(sheet))
     return file
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 from fogml.runs.columns import KNOWN, coil_sensor_number, column_spec, is_accepted, parse_header
@@ -44,11 +45,11 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
     found = [_parts(cell) for cell in cells]
     taken = {name for name, _ in found if column_spec(name)}
     is_warm = any(column_spec(n) is not None and is_accepted(n, u) and n.startswith("T") for n, u in found)
+    others = Counter(_MEANT.get(_plain(other)) for other, _ in found if column_spec(other) is None)
     names = []
     for name, unit in found:
         meant = _MEANT.get(_plain(name))
-        others = [_MEANT.get(_plain(other)) for other, _ in found if column_spec(other) is None]
-        alone = others.count(meant) == 1
+        alone = others[meant] == 1
         sound = meant is not None and meant not in taken and alone and is_accepted(meant, unit)
         if sound and not (meant == "T" and (is_warm or unit is None)):
             assert meant is not None

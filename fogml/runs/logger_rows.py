@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError, quoted
+from fogml.runs.beside import interpolated
 from fogml.runs.columns import conversion, is_temperature
-from fogml.runs.container_files import container_columns, interpolated, sheet_file
+from fogml.runs.container_files import container_columns, sheet_file
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable, read_logger_text
 from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByTime, RowFilter, TextLayout

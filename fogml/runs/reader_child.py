@@ -10,6 +10,7 @@ after it.
 from __future__ import annotations
 
 import contextlib
+import errno
 import importlib
 import json
 import os
@@ -19,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
+NO_ROOM = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def reader(place: str, package: str) -> Any:
@@ -81,8 +83,8 @@ def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, An
     array = files[number].arrays[request["array"]]
     names: list[str] = []
     if request["do"] == "text":
-        part = array.content[request["start"] : request["stop"]]
-        return {"count": len(part), "names": names}, part
+        part = array.text(request["start"], request["stop"])
+        return {"count": len(part), "names": names}, part.data
     if request["do"] == "marks":
         names, found = array.marks()
     else:
@@ -104,6 +106,10 @@ def main(parent: int) -> None:
             told, content = answer(json.loads(line), files)
         except MemoryError:
             told, content = {"memory": True}, b""
+        except OSError as error:
+            reason = error.strerror or str(error)
+            key = "room" if error.errno in NO_ROOM else "fault"
+            told, content = {key: reason[:500]}, b""
         except Exception as error:  # libraries raise whatever the damage leads to
             reason = next(iter(str(error).splitlines()), type(error).__name__)
             told, content = {"fault": reason[:500]}, b""

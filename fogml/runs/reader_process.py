@@ -13,6 +13,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import threading
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
@@ -98,8 +99,8 @@ class StoredFile:
         names = self.ask({"do": "marks", "array": array.index}, codes)["names"]
         return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
 
-    def text(self, array: StoredArray) -> bytes:
-        """The text of a worksheet, as of a CSV file.
+    def text(self, array: StoredArray, block: int = 1 << 20) -> Iterator[bytes]:
+        """The text of a worksheet, as of a CSV file, in blocks of so many bytes.
 
         Raises
         ------
@@ -107,22 +108,29 @@ class StoredFile:
             If the file is damaged.
         """
         self.limits.check_size(self.path, max(array.shape) / 8)
-        content = np.empty(max(array.shape), dtype=np.uint8)
-        self.ask({"do": "text", "array": array.index, "start": 0, "stop": len(content)}, content)
-        return content.tobytes()
+        for start in range(0, max(array.shape), block):
+            content = np.empty(min(block, max(array.shape) - start), dtype=np.uint8)
+            stop = start + len(content)
+            self.ask({"do": "text", "array": array.index, "start": start, "stop": stop}, content)
+            yield content.tobytes()
 
     def ask(self, request: Mapping[str, Any], into: NDArray[Any] | None = None) -> dict[str, Any]:
         """The answer to a request."""
         megabytes = self.path.stat().st_size / 1e6 if self.path.exists() else 0.0
-        cpu_s = self.limits.cpu_s + self.limits.cpu_s_per_mb * megabytes
-        request = {**request, "file": self._number, "cpu_s": cpu_s}
-        told = self._process.ask(request, into, self.limits.wall_s)
+        for_size = self.limits.cpu_s_per_mb * megabytes
+        request = {**request, "file": self._number, "cpu_s": self.limits.cpu_s + for_size}
+        told = self._process.ask(request, into, self.limits.wall_s + 2.0 * for_size)
         if told is None:
             raise InputError(f"{self.path.name}: damaged: {self._process.end()}; copy or export it again")
         if "memory" in told:
             raise InputError(
                 f"{self.path.name}: damaged, or too large: reading it takes more than "
                 f"{self.memory / 1e6:.0f} MB; copy or export it again"
+            )
+        if "room" in told:
+            raise InputError(
+                f"{self.path.name}: its columns are unpacked into {tempfile.gettempdir()}, which takes no "
+                f"more ({told['room']}); make room there, or let TMPDIR name another folder"
             )
         if "fault" in told:
             raise _Fault(str(told["fault"]))

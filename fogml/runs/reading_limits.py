@@ -20,7 +20,8 @@ class ReadingLimits:
     cpu_s_per_mb
         More of it for each megabyte of the file [s]; MATLAB files are unpacked whole, at over 50 MB/s.
     wall_s
-        Time for one answer by the clock [s], for a drive that does not answer.
+        Time for one answer by the clock [s], for a drive that does not answer; twice the time of computing
+        that the file's size allows comes on top, as other programs may want the processor too.
     memory_mb
         Memory beside that of the program itself [MB]: a block of a million rows of 30 columns takes 240.
     memory_per_byte

@@ -9,7 +9,7 @@ import numpy as np
 
 from tests.runs.test_damage import read_in_every_way, sound_bytes
 
-TRIALS = 150
+TRIALS = 50
 
 
 def main(folder: Path, suffix: str) -> None:

@@ -1,0 +1,127 @@
+"""What reading long logs takes: size, peak of memory in both processes, time."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from experiments.real_files import long_logs
+from experiments.real_files.section import Section, table
+from fogml.readers import READERS
+
+HOURS = {
+    "npz": (24.0,),
+    "workbook": (1e6 / 3600.0 / long_logs.RATE_HZ,),
+    "tdms": (24.0,),
+    "mdf": (24.0,),
+    "miniseed": (24.0,),
+    "ulog": (24.0,),
+    "dataflash": (24.0,),
+    "rosbag": (0.25, 1.0),
+    "mcap": (0.25, 1.0),
+}
+"""Lengths of each format's logs [h]: a worksheet ends at 1,048,576 rows; ROS takes long to write."""
+QUICK_HOURS = 0.01
+
+
+def section(quick: bool) -> Section:
+    """Write each log, read it in a process of its own, and take that one's figures."""
+    rows, data = [], []
+    for kind, lengths in HOURS.items():
+        for hours in lengths:
+            with tempfile.TemporaryDirectory(dir="/tmp") as folder:
+                suffix = next(reader.suffixes[0] for reader in READERS if reader.name == kind)
+                path = Path(folder) / f"log{suffix}"
+                getattr(long_logs, kind)(path, QUICK_HOURS if quick else hours)
+                found = _measured(path)
+            print(kind, hours, found, file=sys.stderr, flush=True)
+            data.append({"format": kind, "hours": hours, **found})
+            rows.append(
+                [
+                    kind,
+                    f"{hours:.3g}",
+                    f"{found['rows']:,}",
+                    f"{found['size_mb']:.0f}",
+                    f"{found['peak_mb']:.0f}",
+                    f"{found['reader_peak_mb']:.0f}",
+                    f"{found['cpu_s']:.0f}",
+                    f"{found['error']:.1g}",
+                ]
+            )
+    heads = ["format", "log [h]", "rows", "file [MB]", "peak [MB]", "reader's peak [MB]", "CPU [s]", "error"]
+    markdown = "\n\n".join(
+        [
+            "## Memory",
+            f"Synthetic logs at {long_logs.RATE_HZ:g} Hz, read from the first block to the last "
+            "(`read_blocks`, a million rows each, every column), in a process of its own. Peaks are "
+            "resident memory of that process, its libraries among it, and of the one that unpacks the file. "
+            "The error is that of the gyro against what was written, relative.",
+            table(heads, rows),
+        ]
+    )
+    return Section(markdown, {"logs": data})
+
+
+def _measured(path: Path) -> dict[str, float]:
+    done = subprocess.run(
+        [sys.executable, "-m", "experiments.real_files.memory", str(path)], capture_output=True, text=True
+    )
+    if done.returncode:
+        raise RuntimeError(done.stderr)
+    found: dict[str, float] = json.loads(done.stdout)
+    return found
+
+
+def _peak_mb(process: int | str) -> float:
+    """Most resident memory that a process has had [MB]."""
+    for line in Path(f"/proc/{process}/status").read_text().splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) / 1024.0
+    raise RuntimeError("the system tells no peak of memory")
+
+
+def read(path: Path) -> dict[str, float]:
+    """Read a log block by block, and tell what that took."""
+    import numpy as np
+
+    from fogml.runs import reader_process
+    from fogml.runs.reading import read_blocks
+
+    scale = {".mseed": 1000.0}.get(path.suffix, 1.0)
+    axis = "x" if path.suffix in (".ulg", ".bin", ".bag", ".db3", ".mcap") else None
+    # Those of three axes are in rad/s.
+    scale *= 1.0 if axis is None else float(np.degrees(3600.0))
+    began, rows, error = time.process_time(), 0, 0.0
+    child = None
+    for block in read_blocks(path, axis=axis):
+        right = scale * long_logs.gyro(block.time)
+        error = max(error, float(np.max(np.abs(block.gyro - right)) / np.max(np.abs(right))))
+        rows += len(block)
+        child = reader_process._processes.process
+        peak = _peak_mb(child._process.pid) if child is not None and child.is_ready() else 0.0
+    return {
+        "rows": rows,
+        "size_mb": path.stat().st_size / 1e6,
+        "peak_mb": _peak_mb("self"),
+        "reader_peak_mb": peak,
+        "cpu_s": time.process_time() - began + _cpu_s(child._process.pid if child is not None else None),
+        "error": error,
+    }
+
+
+def _cpu_s(process: int | None) -> float:
+    """Time that a process has computed [s]."""
+    import os
+
+    if process is None:
+        return 0.0
+    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
+if __name__ == "__main__":
+    print(json.dumps(read(Path(sys.argv[1]))))
