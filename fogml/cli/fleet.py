@@ -20,8 +20,8 @@ class FleetSettings(options.LimitSettings):
     """Do the same job for every unit of a manifest, in parallel, here or on a cluster.
 
     The same command goes on where it was interrupted; a bad unit is reported and the rest go on.
-    Writes fleet.json, fleet.html, fleet.xlsx and one folder per unit. Exit status 1 if a unit
-    failed or misses a limit.
+    Writes fleet.json, fleet.html, fleet.xlsx and one folder per unit; of units with the job acceptance
+    batch.json, batch.html and batch.xlsx too. Exit status 1 if a unit failed or misses a limit.
     """
 
     job: ClassVar[str] = "fogml.cli.fleet_job:fleet_and_write"
@@ -39,6 +39,10 @@ class FleetSettings(options.LimitSettings):
     prior: Annotated[
         str | None,
         option("Draw constants to those of an earlier fleet.", metavar="FLEET.JSON", reads=True),
+    ] = None
+    acceptance_limits: Annotated[
+        str | None,
+        option("Limits of acceptance reports (YAML), as of 'lab acceptance'.", metavar="FILE", reads=True),
     ] = None
     twin: options.Twin = "nominal"
     workers: options.Workers = 1

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.cli.fleet import FleetSettings
+from fogml.cli.fleet_batch import batch_of, write_batch
 from fogml.cli.fleet_unit import UnitWork
 from fogml.cli.terminal import Terminal, Work, number
 from fogml.errors import InputError
@@ -39,12 +40,16 @@ def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     with sole_writer(home), terminal.work("fleet", total=len(tasks)) as work:
         outcomes = _run(settings, tasks, work, terminal)
     values = finite_json(fleet_json(outcomes, settings.for_units()))
-    page = fleet_page(values, Path(settings.manifest).name)
+    batch = batch_of(values["units"], home)
+    name = Path(settings.manifest).name
+    page = fleet_page(values, name, None if batch is None else "batch.html")
     try:
         with whole_folder(settings.out, shared=True) as folder:
             write_json(folder / "fleet.json", values, indent=1)
             (folder / "fleet.html").write_text(page, encoding="utf-8")
             fleet_spreadsheet(values, folder / "fleet.xlsx")
+            if batch is not None:
+                write_batch(batch, folder, Path(settings.manifest).stem)
             settings.write_into(folder, "fleet")
     except OSError as error:
         raise full_disk(settings.out, error) from error
@@ -58,9 +63,13 @@ def _tasks(settings: FleetSettings, units: Sequence[Unit]) -> list[Task]:
     shared = None if settings.prior is None else _shared(settings.prior)
     own = settings.for_units()
     work = UnitWork(own, settings.form, shared)
-    # A twin is a file, or one that ships.
-    twin = sources_stamp([Path(settings.twin)]) if Path(settings.twin).is_file() else None
-    told = {**own, "shared": shared, "twin file": twin}
+    # A twin is a file, or one that ships; limits are a file if there are any.
+    files = {"twin": settings.twin, "acceptance_limits": settings.acceptance_limits or ""}
+    stamps = {
+        f"{key} file": sources_stamp([Path(file)]) if Path(file).is_file() else None
+        for key, file in files.items()
+    }
+    told = {**own, "shared": shared, **stamps}
     # Units that are done are known by their settings: workers write into one folder, wherever they run.
     return [Task(unit, work, str(Path(settings.out).absolute()), told) for unit in units]
 
@@ -71,6 +80,10 @@ def _check(settings: FleetSettings) -> None:
     from fogml.models.names import make_model
 
     parse_features(settings.form)
+    if settings.acceptance_limits is not None:
+        from fogml.lab.acceptance_limits import read_limits
+
+        read_limits(settings.acceptance_limits)
     if settings.device is not None:
         _check_device(settings)
     make_model(settings.model, settings.features, settings.seed, settings.for_units()["parameters"])

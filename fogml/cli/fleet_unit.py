@@ -1,9 +1,10 @@
-"""One unit's job in a fleet: train, compare or diagnose, and what the fleet wants of it."""
+"""One unit's job in a fleet: train, compare, diagnose or acceptance, and what the fleet wants of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class UnitWork:
-    """Does a unit's job as ``fogml train``, ``compare`` or ``diagnose`` would, and prints nothing.
+    """Does a unit's job as the command of that name would, and prints nothing.
 
     Attributes
     ----------
@@ -39,9 +40,8 @@ class UnitWork:
         """Do the job, and give what the fleet wants of it."""
         from fogml.runs.three_axes import SeveralAxes
 
-        do = {"train": self._train, "compare": self._compare, "diagnose": self._diagnose}
         try:
-            return do[unit.job](unit, folder)
+            return getattr(self, f"_{unit.job}")(unit, folder)
         except SeveralAxes:
             if not unit.axis or "axis" in self.settings:
                 raise
@@ -138,6 +138,34 @@ class UnitWork:
                 "floor": worst.floor,
                 "outside_training": None,
             },
+        }
+
+    def _acceptance(self, unit: Unit, folder: Path) -> dict[str, Any]:
+        """The report of the test runs, before and after a model of the training runs, if there are any."""
+        from fogml.cli.lab import AcceptanceSettings
+        from fogml.cli.lab_acceptance_job import write_report
+        from fogml.cli.runs import open_runs
+        from fogml.lab.acceptance import ACCEPTED, NO_LIMITS
+        from fogml.models.names import make_model
+
+        terminal = Terminal(quiet=True)
+        own = {"limits": self.settings.get("acceptance_limits")}
+        settings = self._for(AcceptanceSettings, unit, folder, runs=list(unit.test), **own)
+
+        def model_of() -> DriftModel | None:
+            if not unit.train:
+                return None
+            chosen = [self.settings[key] for key in ("model", "features", "seed", "parameters")]
+            trained = open_runs(list(unit.train), terminal, repair=settings.repair, axis=settings.axis)
+            check_belong(unit, trained)
+            return make_model(*chosen).fit(trained)
+
+        values = write_report(settings, terminal, model_of, partial(check_belong, unit))
+        return {
+            "model": str(self.settings["model"]) if unit.train else "",
+            "met": values["verdict"] in (ACCEPTED, NO_LIMITS),
+            "verdict": values["verdict"],
+            "notes": values["notes"],
         }
 
     def _for(self, kind: Any, unit: Unit, folder: Path, **own: Any) -> Any:

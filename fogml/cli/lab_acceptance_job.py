@@ -2,25 +2,59 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from fogml.cli.lab import AcceptanceSettings
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, number
 
+if TYPE_CHECKING:
+    from fogml.models.base import DriftModel
+    from fogml.runs.run import Run
+
 
 def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bool:
     """Test a gyro's runs, write the report where a folder is named, print it; whether all limits are met."""
-    from fogml.lab.acceptance import ACCEPTED, NO_LIMITS, acceptance_json
-    from fogml.lab.acceptance_limits import read_limits
+    from fogml.lab.acceptance import ACCEPTED, NO_LIMITS
     from fogml.models.saved import load_model
+
+    values = write_report(
+        settings, terminal, lambda: None if settings.model is None else load_model(settings.model)
+    )
+    _print(values, terminal)
+    terminal.result(values)
+    say_where("acceptance", settings.out, terminal)
+    return values["verdict"] in (ACCEPTED, NO_LIMITS)
+
+
+def write_report(
+    settings: AcceptanceSettings,
+    terminal: Terminal,
+    model_of: Callable[[], DriftModel | None],
+    check: Callable[[Sequence[Run]], None] = lambda runs: None,
+) -> dict[str, Any]:
+    """The report of the runs that are named, written where a folder is named.
+
+    Parameters
+    ----------
+    settings, terminal
+        As of the command.
+    model_of
+        Gives the drift model that the unit is used with, once limits are read.
+    check
+        Called with the runs before they are tested.
+    """
+    from fogml.lab.acceptance import acceptance_json
+    from fogml.lab.acceptance_limits import read_limits
 
     def make() -> dict[str, Any]:
         limits = None if settings.limits is None else read_limits(settings.limits)
-        model = None if settings.model is None else load_model(settings.model)
+        model = model_of()
         runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+        check(runs)
         noise = None
         if settings.noise is not None:
             (noise,) = open_runs([settings.noise], terminal, repair=settings.repair, axis=settings.axis)
@@ -45,11 +79,7 @@ def acceptance_and_write(settings: AcceptanceSettings, terminal: Terminal) -> bo
 
         acceptance_spreadsheet(values, path)
 
-    values = tell("acceptance", make, page, settings, settings.out, terminal, sheets)
-    _print(values, terminal)
-    terminal.result(values)
-    say_where("acceptance", settings.out, terminal)
-    return values["verdict"] in (ACCEPTED, NO_LIMITS)
+    return tell("acceptance", make, page, settings, settings.out, terminal, sheets)
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:

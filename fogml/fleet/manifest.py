@@ -20,7 +20,7 @@ _LONGEST_FOLDER = 100
 COLUMNS = ("unit", "job", "train", "test", "axis")
 COVARIATE = "covariate:"
 """What the names of columns begin with that state a number or a label of a unit's production."""
-JOBS = ("train", "compare", "diagnose")
+JOBS = ("train", "compare", "diagnose", "acceptance")
 SHIPPED = "shipped:"
 _COVARIATE_NAME = re.compile(COVARIATE + r"[A-Za-z0-9_ -]+")
 _UNSAFE = re.compile(r"[^A-Za-z0-9._+-]+")
@@ -35,9 +35,10 @@ class Unit:
     name
         Serial number.
     job
-        ``train``, ``compare`` or ``diagnose``.
+        ``train``, ``compare``, ``diagnose`` or ``acceptance``.
     train, test
-        Paths of runs; for ``diagnose`` those fitted to, and those held out.
+        Paths of runs; for ``diagnose`` those fitted to, and those held out; for ``acceptance`` those that the
+        unit's model is trained on, if it has one, and those that the report is of.
     axis
         Axis, or an empty text.
     folder
@@ -154,7 +155,7 @@ def _unit(row: Mapping[str, Any], place: str, path: Path) -> Unit:
         )
         for key in ("train", "test")
     )
-    if not train:
+    if not train and job != "acceptance":
         raise InputError(f"{where}: column 'train' names no run")
     if not test and job != "diagnose":
         raise InputError(f"{where}: column 'test' names no run; '{job}' judges on at least one")

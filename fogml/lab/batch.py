@@ -5,8 +5,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from os.path import relpath
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import numpy as np
 
@@ -102,7 +104,7 @@ def figure_of(row: Mapping[str, Any]) -> float | None:
 
 def _unit(file: Path, report: Mapping[str, Any], home: Path | None) -> dict[str, Any]:
     page = file.with_suffix(".html").absolute()
-    link = page.as_uri() if home is None else Path(_relative(page, home.absolute())).as_posix()
+    link = page.as_uri() if home is None else quote(Path(relpath(page, home.absolute())).as_posix())
     return {
         "serial_number": report["serial_number"] or "not stated",
         "axis": report["axis"] or "",
@@ -113,12 +115,6 @@ def _unit(file: Path, report: Mapping[str, Any], home: Path | None) -> dict[str,
         "figures": {row["quantity"]: figure_of(row) for row in report["rows"] if row["tested"]},
         "missed": [row["quantity"] for row in report["rows"] if row["met"] is False],
     }
-
-
-def _relative(page: Path, home: Path) -> str:
-    import os
-
-    return os.path.relpath(page, home)
 
 
 def _quantities(reports: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:

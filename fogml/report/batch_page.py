@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from fogml.report.acceptance_page import VERDICTS, limit_words
@@ -24,9 +24,8 @@ def batch_page(values: Mapping[str, Any], name: str = "Batch") -> str:
         verdict=verdict_sentences(values),
         tiles=_tiles(values),
         distribution=_distribution(values),
-        heads=[(one["name"], one["unit"]) for one in shown],
         left_out=len(values["quantities"]) - len(shown),
-        units=[_unit(one, [quantity["quantity"] for quantity in shown]) for one in values["units"]],
+        units=_units(values["units"], shown),
     )
 
 
@@ -94,15 +93,15 @@ def _distribution(values: Mapping[str, Any]) -> Table:
     )
 
 
-def _unit(unit: Mapping[str, Any], keys: list[str]) -> dict[str, Any]:
-    kind, sign, words = VERDICTS[unit["verdict"]]
-    return {
-        "name": " ".join(part for part in (unit["serial_number"], unit["axis"]) if part),
-        "page": unit["page"],
-        "kind": kind,
-        "verdict": f"{sign} {words}",
-        "figures": [
-            (number(unit["figures"].get(key)), unit["figures"].get(key), key in unit["missed"])
-            for key in keys
-        ],
-    }
+def _units(units: Sequence[Mapping[str, Any]], shown: Sequence[Mapping[str, Any]]) -> Table:
+    """A line for each unit, with its page, verdict and figures."""
+    heads = tuple((one["name"], one["unit"], "figure") for one in shown)
+    rows = []
+    for unit in units:
+        kind, sign, words = VERDICTS[unit["verdict"]]
+        name = " ".join(part for part in (unit["serial_number"], unit["axis"]) if part)
+        figures = {one["quantity"]: unit["figures"].get(one["quantity"]) for one in shown}
+        told = [number(figure) + (" ✗" if key in unit["missed"] else "") for key, figure in figures.items()]
+        cells = (name, f"{sign} {words}", *told)
+        rows.append(Row(cells, link=unit["page"], badge=kind, keys=(name, words, *figures.values())))
+    return Table((("Unit", "", "text"), ("Verdict", "", "text"), *heads), tuple(rows), sortable=True)

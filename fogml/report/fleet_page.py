@@ -4,15 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+from urllib.parse import quote
 
 from fogml.fleet.summary import in_order_of_serial, label_of
+from fogml.fleet.tasks import DONE
 from fogml.report.figures_fleet import by_unit, constants, distribution
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, averages, number, percent, plural
 
+_PAGES = {
+    "train": "report.html",
+    "compare": "compare.html",
+    "diagnose": "gap.html",
+    "acceptance": "acceptance.html",
+}
+"""Page in a unit's folder, by its job."""
 
-def fleet_page(fleet: Mapping[str, Any], name: str = "fleet") -> str:
+
+def fleet_page(fleet: Mapping[str, Any], name: str = "fleet", batch: str | None = None) -> str:
     """The self-contained HTML page of a ``fleet.json``.
 
     Parameters
@@ -21,6 +31,8 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet") -> str:
         Schema ``fogml.fleet/1``.
     name
         The manifest's name.
+    batch
+        Page of the batch of its acceptance reports, if there is one.
     """
     order = sorted(fleet["units"], key=lambda unit: in_order_of_serial(label_of(unit)))
     judged = [unit for unit in order if unit["after"] is not None]
@@ -38,6 +50,7 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet") -> str:
         outliers=[(item["unit"], item["why"]) for item in fleet["outliers"]],
         again=[(f"{item['unit']} ({item['job']})", item["why"]) for item in fleet["again"]],
         table=_table(order),
+        batch=batch,
     )
 
 
@@ -125,13 +138,21 @@ def _table(order: list[Mapping[str, Any]]) -> Table:
                 (
                     label_of(unit),
                     unit["job"],
-                    unit["status"] if unit["met"] is not False else "limit not met",
+                    _status(unit),
                     number(unit["before"]),
                     number(unit["after"]),
                     number(unit["floor"]),
                     percent(unit["outside_training"]),
                     told or MISSING,
-                )
+                ),
+                link=f"{quote(unit['folder'])}/{_PAGES[unit['job']]}" if unit["status"] == DONE else "",
+                keys=(
+                    label_of(unit),
+                    unit["job"],
+                    _status(unit),
+                    *(unit[key] for key in ("before", "after", "floor", "outside_training")),
+                    told,
+                ),
             )
         )
     columns = (
@@ -144,4 +165,11 @@ def _table(order: list[Mapping[str, Any]]) -> Table:
         ("Outside training", "", "figure"),
         ("Model, verdict or reason", "", "text"),
     )
-    return Table(columns, tuple(rows), "Every unit, its worst test run; its folder holds its own page.")
+    return Table(columns, tuple(rows), "Every unit, its worst test run.", sortable=True)
+
+
+def _status(unit: Mapping[str, Any]) -> str:
+    """How a unit's job ended, in words."""
+    if unit["verdict"] == "incomplete":
+        return "limits not all tested"
+    return str(unit["status"]) if unit["met"] is not False else "limit not met"

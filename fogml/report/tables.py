@@ -16,15 +16,32 @@ Column = tuple[str, str, str]
 
 @dataclass(frozen=True)
 class Row:
-    """Cells of a table's row as text, and a mark that sets it off: ``chosen`` or ``baseline``."""
+    """A table's row.
+
+    Attributes
+    ----------
+    cells
+        Its cells as text.
+    mark
+        What sets it off: ``chosen`` or ``baseline``.
+    link
+        Page that its first cell leads to.
+    badge
+        Kind of the badge that its second cell is: ``met``, ``missed`` or ``care``.
+    keys
+        What it is sorted by, a number or a text for each cell; of texts, the cells.
+    """
 
     cells: tuple[str, ...]
     mark: str = ""
+    link: str = ""
+    badge: str = ""
+    keys: tuple[str | float | None, ...] = ()
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table as a page shows it; every column has a heading.
+    """A table as a page shows it; every column has a heading, which sorts if it is `sortable`.
 
     Raises
     ------
@@ -35,6 +52,7 @@ class Table:
     columns: tuple[Column, ...]
     rows: tuple[Row, ...]
     caption: str = ""
+    sortable: bool = False
 
     def __post_init__(self) -> None:
         for place, (heading, _, _) in enumerate(self.columns, 1):

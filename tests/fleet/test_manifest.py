@@ -59,7 +59,7 @@ def test_a_list_is_no_name(folder):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (HEAD + "F-1,trian,a.csv,b.csv,x\n", "'trian'; train, compare, diagnose"),
+        (HEAD + "F-1,trian,a.csv,b.csv,x\n", "'trian'; train, compare, diagnose, acceptance"),
         (HEAD + ",train,a.csv,b.csv,x\n", "row 2: column 'unit' is empty"),
         (HEAD + "F-1,train,a.csv,,x\n", "column 'test' names no run"),
         (HEAD + "F-1,train,,b.csv,x\n", "column 'train' names no run"),
