@@ -35,7 +35,7 @@ PROGRAMMES = {
     "c": (25, 45, 5, 30),
 }
 HYSTERESIS = 0.3
-SAMPLE_S = 20.0
+SAMPLE_S = 30.0
 
 
 def steps(levels: tuple[int, ...]) -> list[str]:
