@@ -110,7 +110,8 @@ def test_score_page_and_gates(suite: BlindFolder) -> None:
 
 
 def test_the_command_ends_with_1_where_a_gate_fails(suite: BlindFolder, tmp_path: Path) -> None:
-    base = ["blind", "score", str(suite.path), "--method", "bic", "--out", str(tmp_path), "-q"]
+    base = ["blind", "score", str(suite.path), "--method", "bic", "--out", str(tmp_path)]
+    base += ["--workers", "1", "-q"]
     runner = CliRunner()
     assert runner.invoke(app, [*base, "--gate", "one_exact=0.9"]).exit_code == 0
     assert json.loads((tmp_path / "score.json").read_text())["schema"] == "fogml.blind_score/1"
