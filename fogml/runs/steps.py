@@ -10,7 +10,8 @@ from fogml.runs.run import FloatArray
 
 FINEST_STEP_DEGC = 5e-4
 """Steps of a record that are finer are its digits and no sensor's."""
-_WHOLE = 1e-2
+WHOLE = 1e-2
+"""Share of a step by which differences may miss a whole multiple of it."""
 _ORDERS = (2, 4, 6, 8)
 
 
@@ -22,7 +23,7 @@ def recorded_step(values: FloatArray) -> float:
         return 0.0
     least = float(steps.min())
     whole = steps / least
-    return least if float(np.abs(whole - np.rint(whole)).max()) < _WHOLE else 0.0
+    return least if float(np.abs(whole - np.rint(whole)).max()) < WHOLE else 0.0
 
 
 def to_steps(values: FloatArray, step: float) -> FloatArray:

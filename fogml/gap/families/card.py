@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
 
@@ -12,9 +12,11 @@ import numpy as np
 from fogml.gap.families.frame import Field, Setting
 from fogml.gap.families.linear_gaussian import LinearGaussian
 from fogml.gap.families.other_families import nodes_of, signature_of
+from fogml.gap.families.rows import Rows
 from fogml.gap.model import EffectValue
 from fogml.gap.shapes import AT_AMPLITUDE, Node, is_angle
 from fogml.runs.run import FloatArray
+from fogml.runs.steps import FINEST_STEP_DEGC, WHOLE, recorded_step
 from fogml.twin.effect import Effect
 
 MOST_NODES = 400
@@ -100,8 +102,17 @@ def card_of(
     shape |= {k: v for k, v in told.items() if k != AT_AMPLITUDE}
     if not declared.amplitude.signed and amplitude < 0.0:
         amplitude = abs(amplitude)
+    if getattr(declared, "digitises", False):
+        amplitude, se = _step(runs, amplitude, se)
     amplitude = float(np.clip(amplitude, *declared.amplitude.limits))
     return Card(EffectValue(id, amplitude, shape), se, shape_se, max(best[0], 0.0))
+
+
+def _step(runs: Sequence[Rows], amplitude: float, se: float) -> tuple[float, float]:
+    """The coarsest step of the recorded temperatures and what it is uncertain by, where they show one."""
+    held = [recorded_step(r.run.columns[name]) for r in runs for name in r.run.temperature_columns]
+    step = max(held, default=0.0)
+    return (step, 0.5 * WHOLE * step) if step >= FINEST_STEP_DEGC else (amplitude, se)
 
 
 def _value(declared: Effect, node: Node, weights: FloatArray) -> tuple[float, dict[str, float]]:
