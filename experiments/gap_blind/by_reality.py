@@ -3,7 +3,8 @@
 ``python -m experiments.gap_blind.by_reality DIR`` makes, answers and scores the parts of ``by_reality.yaml``
 in DIR and writes ``by_reality.json`` and ``by_reality.md`` of all that are there; an interrupted call goes on
 where it was. Each reality alone: ``--reality NAME``; the others then stand as they were found before. With
-``--answered`` the page is of those cases alone that have an answer by now.
+``--answered`` the page is of those cases alone that have an answer by now. ``--beside NAME`` has another
+method answer the same cases, for a column beside.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from pathlib import Path
 from typing import Any
 
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
+from fogml.blind.methods import BASELINES
 from fogml.blind.realities import SAME_TWIN
 from fogml.blind.score import gather, marks_of
 from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
 from fogml.blind.scoring.marks import Mark
-from fogml.blind.scoring.marks_file import MARKS, read_marks, write_marks
+from fogml.blind.scoring.marks_file import MARKS, Marks, read_marks, write_marks
 from fogml.blind.scoring.statistics import proportion
-from fogml.blind.seeds import record_use
+from fogml.blind.seeds import record_use, uses
 from fogml.blind.truth import read_truth
 from fogml.cli.blind import MakeSettings, RunSettings
 from fogml.cli.blind_job import make_and_tell, run_and_tell
@@ -43,7 +45,10 @@ def main() -> None:
     parser.add_argument("directory", type=Path, help="where the suites lie or are made")
     parser.add_argument("--reality", action="append", choices=choices, help="this one alone; may be repeated")
     parser.add_argument("--method", default=DIAGNOSIS, help="what answers (diagnosis)")
-    parser.add_argument("--share", type=float, default=1.0, help="how much of each part, to try it (1)")
+    parser.add_argument(
+        "--beside", action="append", default=[], choices=BASELINES, help="another method, too"
+    )
+    parser.add_argument("--share", type=float, help="how much of each part (1; with --final 9)")
     parser.add_argument("--page", action="store_true", help="the page of what is there alone")
     parser.add_argument("--answered", action="store_true", help="the page of the cases answered by now alone")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
@@ -52,26 +57,34 @@ def main() -> None:
     ledger = HERE / "final_uses.json" if given.final else None
     if given.final:
         config |= config["final"]
-        given.share = config["share"]
+    given.share = given.share or config.get("share", 1.0)
     for reality in () if given.page or given.answered else given.reality or choices:
         for part in _parts(config, reality):
             _do(given, config, reality, part, ledger)
-    found = [read_marks(path) for path in sorted(given.directory.glob(f"*/*/{given.method}-{MARKS}"))]
-    marks = [mark for one in found for mark in one.methods[given.method]]
+    found, marks = _found(given.directory, given.method)
     if given.answered:
         suites = [BlindFolder(path.parent) for path in sorted(given.directory.glob("*/*/cases"))]
         marks = [mark for suite in suites for mark in answered_marks(suite, given.method, given.workers)]
-    values = told(marks, choices, config["seed"], given.method, given.final)
+    others = {name: _found(given.directory, name)[1] for name in BASELINES}
+    values = told(marks, choices, config["seed"], given.method, given.final, others)
     if ledger is not None:
         hashes = "\n".join(one.truth for one in found)
         figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
         digest = hashlib.sha256(hashes.encode()).hexdigest()
-        record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})
+        # The same figures of the same cases are no second look.
+        if not any(u["truth"] == digest and u["figures"].get(given.method) == figures for u in uses(ledger)):
+            record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})
     with whole_file(HERE / "by_reality.md") as partial:
         partial.write_text(page(values), encoding="utf-8")
     with (HERE / "by_reality.json").open("w", encoding="utf-8") as file:
         json.dump(values, file, indent=1)
         file.write("\n")
+
+
+def _found(directory: Path, method: str) -> tuple[list[Marks], list[Mark]]:
+    """The scored parts of a method, and their marks."""
+    found = [read_marks(path) for path in sorted(directory.glob(f"*/*/{method}-{MARKS}"))]
+    return found, [mark for one in found for mark in one.methods[method]]
 
 
 def answered_marks(folder: BlindFolder, method: str, workers: int = 1) -> list[Mark]:
@@ -83,19 +96,34 @@ def answered_marks(folder: BlindFolder, method: str, workers: int = 1) -> list[M
 
 
 def told(
-    marks: Sequence[Mark], realities: Sequence[str], seed: int, method: str, final: bool
+    marks: Sequence[Mark],
+    realities: Sequence[str],
+    seed: int,
+    method: str,
+    final: bool,
+    others: Mapping[str, Sequence[Mark]] | None = None,
 ) -> dict[str, Any]:
-    """What ``by_reality.json`` holds of some marks."""
-    drawn = [m for m in marks if m.truth.reality != SAME_TWIN]
+    """What ``by_reality.json`` holds of some marks; `others` are those of other methods on the same cases."""
+    drawn = _drawn(marks)
+    asked = {(m.truth.reality, m.truth.kind, m.truth.case) for m in drawn}
+    beside = {
+        name: [m for m in _drawn(held) if (m.truth.reality, m.truth.kind, m.truth.case) in asked]
+        for name, held in (others or {}).items()
+    }
     return {
         "seed": seed,
         "final": final,
         "method": method,
         "by_reality": by_reality(drawn),
         "by_form": by_form(drawn),
+        "beside": {name: by_reality(held)[ALL] for name, held in beside.items() if held},
         "same_twin": list(same_twin(marks)),
         "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
     }
+
+
+def _drawn(marks: Sequence[Mark]) -> list[Mark]:
+    return [m for m in marks if m.truth.reality != SAME_TWIN]
 
 
 def _parts(config: Mapping[str, Any], reality: str) -> list[dict[str, Any]]:
@@ -124,13 +152,14 @@ def _do(
         **drawn,
     )
     make_and_tell(made, terminal)
+    methods = [given.method, *(given.beside if reality != SAME_TWIN else [])]
     answered = RunSettings(
-        directory=str(folder.path), methods=[given.method], workers=given.workers, limit=config["limit"]
+        directory=str(folder.path), methods=methods, workers=given.workers, limit=config["limit"]
     )
     run_and_tell(answered, terminal)
-    write_marks(
-        folder.path / f"{given.method}-{MARKS}", gather(folder, [given.method], ledger, workers=given.workers)
-    )
+    for name in methods:
+        marks = gather(folder, [name], ledger, workers=given.workers)
+        write_marks(folder.path / f"{name}-{MARKS}", marks)
 
 
 def same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
@@ -171,6 +200,7 @@ def page(values: Mapping[str, Any]) -> str:
             f"|---|---:|{'---:|' * len(names)}",
             *(_line(values["by_reality"], place, names) for place in places),
             "",
+            *_beside_lines(values),
             "## Single effects by distance of form",
             "",
             "Cosine of the true effect with the best member of the catalogue's form, whitened and beside "
@@ -183,6 +213,25 @@ def page(values: Mapping[str, Any]) -> str:
             *twin_lines(values["same_twin"]),
         ]
     )
+
+
+def _beside_lines(values: Mapping[str, Any]) -> list[str]:
+    """The section of other methods on the same cases; none where there are none."""
+    if not values.get("beside"):
+        return []
+    columns = {values["method"]: values["by_reality"][ALL], **values["beside"]}
+    places = range(len(values["by_reality"][ALL]))
+    return [
+        "## Other ways on the same cases",
+        "",
+        "All realities together. The oracle is told which effects act, and fits their catalogue's forms: "
+        "what the data allow to one who knows.",
+        "",
+        f"| figure | wanted | {' | '.join(columns)} |",
+        f"|---|---:|{'---:|' * len(columns)}",
+        *(_line(columns, place, list(columns)) for place in places),
+        "",
+    ]
 
 
 def _line(parts: Mapping[str, Sequence[Mapping[str, Any]]], place: int, names: Sequence[str]) -> str:
