@@ -95,11 +95,17 @@ class AutoModel(DriftModel):
         """What is in it and why, and what the training runs could not tell; for the card."""
         notes = [self.weighed_.told()]
         weighed = self.features is None
-        if weighed and trial.both_directions and trial.rates < RATES_THAT_TELL:
+        if weighed and trial.direction_told and trial.rates < RATES_THAT_TELL:
             notes.append(
                 f"at most temperatures the training runs hold {trial.rates} distinct rate(s), which don't "
                 "tell how the drift depends on the rate: what is weighed is linear in it; train at three or "
                 "more rates to allow other forms"
+            )
+        elif weighed and trial.both_directions and not trial.direction_told:
+            notes.append(
+                "each training run moves temperature one way only: a shift from run to run looks like an "
+                "effect of direction, so no simple form in the rate is weighed; train on runs that go up and "
+                "down, or on two or more of each"
             )
         if not trial.both_directions:
             only = "so only terms in temperature are weighed, " if weighed else ""

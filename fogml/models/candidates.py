@@ -58,10 +58,10 @@ def candidates_of(features: str) -> list[Candidate]:
 
 
 STATIC_STANDARD = Candidate("T^1..3")
-"""The same where temperature moves one way only."""
+"""The same where the direction of temperature is not told."""
 
 
-def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool) -> list[Candidate]:
+def candidates_for(runs: Sequence[Run], rates_told: bool, direction_told: bool) -> list[Candidate]:
     """Candidates for training runs, the standard form first.
 
     Parameters
@@ -74,12 +74,13 @@ def candidates_for(runs: Sequence[Run], rates_told: bool, both_directions: bool)
         nor whether a term in it may be left out, and what was fitted fails at the next rate: only
         what holds the standard form's terms in the rate, and is linear in it, is offered, and
         nothing smaller; no network is.
-    both_directions
-        Whether temperature both rises and falls. On one way only, rate and gradient are functions
-        of temperature and time, and what was fitted to them turns against the model on the way
-        back: only terms in the temperatures are offered.
+    direction_told
+        Whether what the direction of temperature does is told. On one way only, rate and gradient are
+        functions of temperature and time, and what was fitted to them turns against the model on the way
+        back; of a run up and a run down they are functions of the run too: only terms in the temperatures
+        are offered.
     """
-    if not both_directions:
+    if not direction_told:
         linear = [STATIC_STANDARD, *(Candidate(text) for text in _STATIC if text != STATIC_STANDARD.features)]
         return linear
     sensors = shared_sensors(runs)

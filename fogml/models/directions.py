@@ -37,6 +37,24 @@ def moves_both_ways(temperatures: Sequence[FloatArray]) -> bool:
     return len(ways_moved(temperatures)) == 2
 
 
+def direction_is_told(temperatures: Sequence[FloatArray]) -> bool:
+    """Whether what the direction of temperature does is told beside what shifts a run as a whole.
+
+    It is by a run that moves both ways, or by runs of one way each of which both ways are left whichever run
+    is left out. Of a run up and a run down, a shift from run to run looks like direction, and no run left out
+    can tell: what is left moves one way only.
+
+    Parameters
+    ----------
+    temperatures
+        T [degC] of each run, shapes (n,).
+    """
+    if any(moves_both_ways([T]) for T in temperatures):
+        return True
+    runs = list(temperatures)
+    return len(runs) > 2 and all(moves_both_ways(runs[:i] + runs[i + 1 :]) for i in range(len(runs)))
+
+
 LEAST_SPAN_DEGC = 5.0
 """Span of temperature below which what was learned holds at that temperature alone [degC]: less than a room
 changes in a day, and a few percent of what gyros are used over."""

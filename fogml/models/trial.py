@@ -13,7 +13,7 @@ from fogml.features.parse import parse_features
 from fogml.models.base import DriftModel
 from fogml.models.box import learn_box
 from fogml.models.candidates import Candidate, candidates_for, candidates_of, union_of
-from fogml.models.directions import moves_both_ways
+from fogml.models.directions import direction_is_told, moves_both_ways
 from fogml.models.folds import Fold, IndexArray, dealt_blocks, run_folds, time_folds
 from fogml.models.linear import LinearRegressor
 from fogml.models.rbf.rates import RATES_THAT_TELL, distinct_rates
@@ -58,17 +58,21 @@ class Trial:
         Whether there are several runs, each of which is left out in turn.
     both_directions
         Whether temperature moves both ways in the training runs (`fogml.models.directions`).
+    direction_told
+        Whether what its direction does is told beside what shifts a run; else simple forms hold no rates.
     """
 
     def __init__(self, runs: Sequence[Run], seed: int, features: str | None = None) -> None:
         self.seed = seed
         temperature, rate = _temperatures_and_rates(runs)
         self.rates = distinct_rates(rate, temperature)
-        self.both_directions = moves_both_ways([run.temperature("T") for run in runs])
+        temperatures = [run.temperature("T") for run in runs]
+        self.both_directions = moves_both_ways(temperatures)
+        self.direction_told = direction_is_told(temperatures)
         self.candidates = (
             candidates_of(features)
             if features
-            else candidates_for(runs, self.rates >= RATES_THAT_TELL, self.both_directions)
+            else candidates_for(runs, self.rates >= RATES_THAT_TELL, self.direction_told)
         )
         union = union_of(self.candidates)
         self._column = {atom.text: column for column, atom in enumerate(union.atoms)}

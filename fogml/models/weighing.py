@@ -37,6 +37,8 @@ from fogml.models.trial import fit_candidate
 from fogml.models.weights import intervals_of, weights_of
 from fogml.runs.run import FloatArray, Run
 
+STATIC = "cubic in T"
+"""The member of temperature alone."""
 CLEARLY = 0.95
 """A network is taken alone where it leaves less than this share of what the others together leave."""
 
@@ -97,7 +99,7 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     hashes = hash_ahead(runs)
     shared = {"mixed effects": offered(runs) if features is None else resolve_features(features, runs)}
     if features is None:
-        shared["cubic in T"] = static_features(runs)
+        shared[STATIC] = static_features(runs)
     simple = fit_candidate(choice, runs, seed) if choice.features else None
     held = [*shared.values(), *([simple.features_] if simple is not None and simple.features_ else [])]
     union: Features = parse_features(reduce(add, held).text)
@@ -113,7 +115,8 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     parts = left_out_parts(table, temperatures_of(table, union))
     lefts = left_out(list(members.values()), union, table, parts)
     both_ways = moves_both_ways([run.temperature("T") for run in runs])
-    weights = weights_of(lefts, len(members), both_ways)
+    beside = list(members).index(STATIC) if STATIC in members else None
+    weights = weights_of(lefts, len(members), both_ways, beside)
     left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)
     if not left**2 < (1.0 - LEAST_WEIGHT) * mean_left**2:
         weights, left = 0.0 * weights, mean_left
@@ -126,9 +129,10 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
     chosen = [
         (member.features, _regressor(member)) for member, weight in zip(members.values(), weights) if weight
     ]
-    chosen = chosen or [(shared.get("cubic in T", union), _still(shared.get("cubic in T", union)))]
-    kept = weights[weights > 0.0] if weights.any() else np.zeros(1)
-    own, linear = combined(chosen, kept, float(table.y.mean()))
+    chosen = chosen or [(shared.get(STATIC, union), _still(shared.get(STATIC, union)))]
+    own, linear = combined(
+        chosen, weights[weights > 0.0] if weights.any() else np.zeros(1), float(table.y.mean())
+    )
     own = parse_features(own.text)
     model = FeatureModel(own.text, kind="combination")
     places = [union.atoms.index(atom) for atom in own.atoms]

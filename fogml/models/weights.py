@@ -10,14 +10,16 @@ rows fitted to, the weights are
 stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn together where members tie, times
 the skill :math:`\sum \overline{pz} / \sum \overline{p^2}` of their sum p within 0 and 1: no compensation is
 its limit 0. Of several runs those left out alone are asked: parts of a run are told by the rest of it
-whatever it is that moved the drift, time included. Of one run blocks of time are asked where its temperature
-moves both ways, as a half or a direction left out says how a fit of the rest goes on, which is not how a fit
-of both does; else halves, which are all that there is.
+whatever it is that moved the drift, time included. There what a member adds to temperature alone must gain
+beyond its standard error (`confirmed`): memory or a rate that one run tells by luck does harm on the next. Of
+one run blocks of time are asked where its temperature moves both ways, as a half or a direction left out says
+how a fit of the rest goes on, which is not how a fit of both does; else halves, which are all that there is.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from statistics import NormalDist
 
 import numpy as np
@@ -26,7 +28,7 @@ from scipy.optimize import minimize
 from fogml.models.combination import LEAST_WEIGHT, LeftOut
 from fogml.models.intervals import LEVELS, Intervals, half_widths_of_runs, quantiles_of_parts
 from fogml.models.table import TrainingTable
-from fogml.runs.run import FloatArray
+from fogml.runs.run import BoolArray, FloatArray
 
 UNSEEN_SHIFT = 2.0**0.5
 """Widening where no run can be left out: how a run is shifted from the next is not seen in one, and is taken
@@ -39,7 +41,9 @@ lie outside the box of the rest are compared with those inside at this ratio (de
 thermal cycle, simulated tactical units)."""
 
 
-def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> FloatArray:
+def weights_of(
+    parts: Sequence[LeftOut], members: int, both_ways: bool, beside: int | None = None
+) -> FloatArray:
     """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none.
 
     Parameters
@@ -50,7 +54,16 @@ def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> Float
         Their number m.
     both_ways
         Whether temperature moves both ways in training.
+    beside
+        Place of the member of temperature alone, which others must improve on (`confirmed`); None: none is.
     """
+    runs = [part for part in parts if part.kind == "runs"]
+    if runs and beside is not None and members > 1:
+        kept = confirmed(runs, beside)
+        parts = [replace(part, predicted=part.predicted[:, kept]) for part in parts]
+        weights = np.zeros(members)
+        weights[kept] = weights_of(parts, int(kept.sum()), both_ways)
+        return weights
     equal = np.full(members, 1.0 / members)
     asked = asked_of(parts, both_ways)
     square, product = DRAWN_TOGETHER * (np.eye(members) - 1.0 / members), np.zeros(members)
@@ -75,6 +88,20 @@ def weights_of(parts: Sequence[LeftOut], members: int, both_ways: bool) -> Float
     return weights * skill_of(asked, weights)
 
 
+def confirmed(runs: Sequence[LeftOut], beside: int) -> BoolArray:
+    """Which members' gains over one of them the K runs left out confirm, shape (m,); that one is among them.
+
+    The mean of the logarithm of the ratio of rms, that one's over a member's, must exceed its standard error:
+    of two runs both must gain.
+    """
+    left = np.array([np.mean((part.told[:, None] - part.predicted) ** 2, axis=0) for part in runs])
+    gains = 0.5 * np.log(np.maximum(left[:, [beside]], 1e-300) / np.maximum(left, 1e-300))
+    error = gains.std(axis=0, ddof=1) / np.sqrt(len(runs)) if len(runs) > 1 else 0.0
+    found = np.asarray(gains.mean(axis=0) > error)
+    found[beside] = True
+    return found
+
+
 def asked_of(parts: Sequence[LeftOut], both_ways: bool) -> list[LeftOut]:
     """Parts that tell what is left on another run: runs left out, else blocks, or halves of one way."""
     runs = [part for part in parts if part.kind == "runs"]
@@ -84,15 +111,22 @@ def asked_of(parts: Sequence[LeftOut], both_ways: bool) -> list[LeftOut]:
 def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
     r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
 
-    With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is
-    :math:`\sum \overline{p z} / \sum \overline{p^2}`: the least-squares factor, each part counting alike.
+    With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is the
+    least-squares factor :math:`k = \sum \overline{p z} / \sum \overline{p^2}`, each part counting alike. A
+    run is shifted as a whole, so K runs left out are K observations of it, and its variance is
+    :math:`s^2 = \sum \overline{(z - k p)^2} / (K \sum \overline{p^2})`; then it is
+    :math:`k\,(1 - s^2/k^2)`, or 0 where that is negative (positive-part shrinkage: James & Stein, 1961).
     """
     sums = [(part.predicted @ weights, part.told) for part in parts]
     product = sum(float(np.mean(predicted * told)) for predicted, told in sums)
     square = sum(float(np.mean(predicted * predicted)) for predicted, _ in sums)
     if not square > 0.0:
         return 1.0
-    skill = float(np.clip(product / square, 0.0, 1.0))
+    skill = product / square
+    if product > 0.0 and all(part.kind == "runs" for part in parts):
+        left = sum(float(np.mean((told - skill * predicted) ** 2)) for predicted, told in sums)
+        skill -= left / (len(parts) * product)
+    skill = float(np.clip(skill, 0.0, 1.0))
     return skill if skill >= LEAST_WEIGHT else 0.0
 
 

@@ -76,7 +76,7 @@ def test_text_stands_for(text: str, names: list[str] | None) -> None:
     assert parse_features(text).names() == wanted
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(features)
 def test_the_text_of_features_parses_to_the_same_features(made: Features) -> None:
     again = parse_features(made.text)
@@ -87,7 +87,7 @@ def test_the_text_of_features_parses_to_the_same_features(made: Features) -> Non
     assert parse_features(made.text.replace(" ", "")) == made
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(
     st.lists(
         st.sampled_from(
@@ -265,7 +265,7 @@ def test_text_without_bounds_is_told_with_its_place(text, told):
 
 
 @given(st.text(st.sampled_from("T12_indof()[]*^.,+-d 0"), max_size=60))
-@settings(max_examples=300)
+@settings(max_examples=120)
 def test_any_text_is_features_or_one_message(text):
     try:
         features = parse_features(text)

@@ -17,6 +17,7 @@ from fogml.models.candidates import STANDARD, Candidate, candidates_for
 from fogml.models.saved import load_model, save_model
 from fogml.models.score import Score, choose
 from fogml.runs.run import Run
+from fogml.runs.shipped import shipped_run
 
 SAMPLE_S = 20.0
 WORLD = World(noise=0.05)
@@ -149,8 +150,8 @@ def test_several_runs_are_left_out_in_turn_and_in_parts() -> None:
 def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
     quiet = World(polynomial=(1.0,), gradient=0.0, rate=0.0, product=0.0, noise=0.1)
     taken = []
-    for seed in range(8):
-        run, _ = world_run(1.0, seed, quiet)
+    for seed in range(4):
+        run, _ = quiet.run(cycle(1.0, 60.0), 60.0, seed, "quiet")
         model = AutoModel().fit(run)
         taken.append(any(model.weighed_.weights.values()))
         assert np.std(model.predict(run)) < 0.1 * run.gyro.std()
@@ -163,7 +164,7 @@ def test_pure_noise_gets_no_compensation(linear_only: None) -> None:
             # It has a box and an interval all the same.
             assert model.features_ is not None and model.intervals_.half_width(0.9) > 0.0
     # A member may gain a little by luck; it must not be the rule.
-    assert taken.count(True) <= 2
+    assert taken.count(True) <= 1
 
 
 def test_it_finds_the_drift_and_holds_at_another_rate(linear_only: None) -> None:
@@ -198,8 +199,8 @@ def test_at_one_rate_a_gradient_well_above_the_noise_is_taken(linear_only: None)
 
 def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
     run, _ = world_run(1.0, 0)
-    few = {c.features for c in candidates_for([run], rates_told=False, both_directions=True)}
-    many = {c.features for c in candidates_for([run], rates_told=True, both_directions=True)}
+    few = {c.features for c in candidates_for([run], rates_told=False, direction_told=True)}
+    many = {c.features for c in candidates_for([run], rates_told=True, direction_told=True)}
     assert not any("sign" in text or "d(T_in-T_out)" in text for text in few)
     assert any("sign" in text for text in many) and any("d(T_in-T_out)" in text for text in many)
     assert few < many
@@ -210,7 +211,7 @@ def test_terms_that_one_rate_cannot_tell_are_not_offered() -> None:
 
 def test_one_way_only_offers_no_rates() -> None:
     run, _ = world_run(1.0, 0)
-    offered = candidates_for([run], rates_told=True, both_directions=False)
+    offered = candidates_for([run], rates_told=True, direction_told=False)
     assert {name for c in offered if c.features for name in parse_features(c.features).sensors} == {"T"}
     assert all(parse_features(c.features).window_s == 0.0 for c in offered if c.features)
 
@@ -239,6 +240,17 @@ def test_left_out_runs_reveal_what_one_run_hides(linear_only: None) -> None:
         runs.append(run.with_columns(gyro=drift + noise))
     assert any(AutoModel().fit(runs[:1]).weighed_.weights.values())
     assert not any(AutoModel().fit(runs).weighed_.weights.values())
+
+
+@pytest.mark.parametrize("axis", ["x", "z"])
+def test_a_run_up_and_a_run_down_do_no_harm_on_a_third(axis: str) -> None:
+    """A MEMS cycle whose legs lie apart in time: their shifts look like an effect of the rate's sign."""
+    up, last_down, down = (shipped_run(f"thermal-cycle-{leg}-{axis}") for leg in "231")
+    model = AutoModel().fit([up, last_down])
+    assert any("shift from run to run looks like" in note for note in model.card_.notes)
+    error = down.error_deg_h
+    left = error - model.predict(down)
+    assert np.sqrt(np.mean(left**2)) < 1.05 * np.sqrt(np.mean((error - model.weighed_.table.y.mean()) ** 2))
 
 
 def test_saving_keeps_choice_and_numbers(linear_only: None, tmp_path) -> None:

@@ -13,7 +13,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.flicker import Flicker
 
-N, STEP_S, REPEATS = 3000, 5.0, 40
+N, STEP_S, REPEATS = 3000, 5.0, 20
 TIME = STEP_S * np.arange(N)
 TEMPERATURE = 20.0 + 30.0 * np.sin(2 * np.pi * TIME / 7000.0)
 COLUMNS = np.column_stack((TEMPERATURE, TEMPERATURE**2, np.gradient(TEMPERATURE, TIME) * 60.0))
@@ -83,7 +83,7 @@ def turning_run(seed: int) -> tuple[Run, np.ndarray]:
 
 def test_joint_scale_factor_and_bias_scatter_as_stated() -> None:
     z, plain = [], []
-    for seed in range(16):
+    for seed in range(8):
         run, noise = turning_run(seed)
         model, clean = JointModel().fit(run), JointModel().fit(run.with_columns(gyro=run.gyro - noise))
         table = model._columns(model._rows(run).atoms)

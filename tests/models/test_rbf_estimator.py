@@ -119,7 +119,7 @@ def test_refit_keeps_the_shape_and_solves_the_weights() -> None:
 
 def test_standard_deviation_covers_the_error_of_the_value() -> None:
     shares = []
-    for seed in range(8):
+    for seed in range(5):
         inputs, target, truth = rows(100 + seed, 2000)
         values, spread = RBFRegressor(centres=16).fit(inputs, target).predict(inputs, return_std=True)
         shares.append(np.mean(np.abs(values - truth) < 2.0 * spread))
@@ -131,7 +131,7 @@ def test_slow_noise_is_fitted_less_than_if_it_were_white(monkeypatch: pytest.Mon
 
     def errors() -> list[float]:
         found = []
-        for seed in range(4):
+        for seed in range(2):
             inputs, target, truth = rows(seed)
             draw = np.random.default_rng(50 + seed).normal(size=len(target))
             slow = lfilter([0.1 * np.sqrt(1.0 - memory**2)], [1.0, -memory], draw)

@@ -106,7 +106,7 @@ def test_trained_at_three_rates_a_network_is_level_with_a_gaussian_process(
 ) -> None:
     monkeypatch.setattr(rbf_rates, "PROCESS_ROWS", 300)
     ratios = []
-    for seed in (11, 12):
+    for seed in (11,):
         train, _ = run_at((0.5, 1.0, 2.0), seed, seed + 50)
         network, process = make_model("rbf", FEATURES).fit(train).predict, gaussian_process(train)
         for rate in (0.7, 1.5):

@@ -33,7 +33,7 @@ def level(inputs: np.ndarray, target: np.ndarray, count: int) -> Level:
     return Level(averaged, Frame.of(inputs, target), np.arange(inputs.shape[1]), "cpu", "float64")
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2])
+@pytest.mark.parametrize("seed", [0, 1])
 def test_the_race_ends_where_the_best_of_all_starts_does(seed: int) -> None:
     inputs, target = rows(seed)
     settings = RBFRegressor(centres=16)._settings()

@@ -30,7 +30,7 @@ def fitted(seed: int, count: int = 400) -> RBFRegressor:
 
 def test_networks_together_are_those_one_by_one():
     # Two lengths of run: networks of other shapes are worked out in batches of their own.
-    lengths = [400, 400, 300, 400, 300]
+    lengths = [400, 400, 300]
     together = fit_together([partial(fitted, seed, count) for seed, count in enumerate(lengths)])
     for seed, count in enumerate(lengths):
         alone = fitted(seed, count)

@@ -6,6 +6,7 @@ import hashlib
 import json
 import os
 import pickle
+import shutil
 import warnings
 
 import numpy as np
@@ -162,7 +163,7 @@ def test_whatever_is_edited_is_told(folder, edit):
 
 
 @given(st.sampled_from(["model.json", "weights.safetensors"]), st.data())
-@settings(max_examples=150, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
 def test_a_flipped_bit_never_gives_another_model(folder, model, train, name, data):
     path = folder / name
     content = path.read_bytes()
@@ -366,10 +367,15 @@ def test_failed_write_leaves_what_was_there(folder, model, train, monkeypatch):
 
 
 class TestScikitLearn:
+    @pytest.fixture(scope="class")
+    def kept(self, train, tmp_path_factory):
+        kept = tmp_path_factory.mktemp("kept") / "model"
+        save_model(make_model("sklearn.linear_model.BayesianRidge").fit(train), kept)
+        return kept
+
     @pytest.fixture
-    def folder(self, train, tmp_path):
-        save_model(make_model("sklearn.linear_model.BayesianRidge").fit(train), tmp_path / "model")
-        return tmp_path / "model"
+    def folder(self, kept, tmp_path):
+        return shutil.copytree(kept, tmp_path / "model")
 
     def swap(self, folder, data):
         assert set(load_file(folder / "weights.safetensors")) == {"skops"}

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from fogml.models.combination import LeftOut
+from fogml.models.directions import direction_is_told
 from fogml.models.table import TrainingTable
-from fogml.models.weights import intervals_of, weights_of
+from fogml.models.weights import intervals_of, skill_of, weights_of
 
 
 def part(predicted, told, kind="runs"):
@@ -21,6 +22,46 @@ def test_of_several_runs_what_is_told_within_a_run_has_no_say():
     np.testing.assert_allclose(weights_of(blocks, 2, True), [0.0, 1.0], atol=0.03)
 
 
+def test_what_a_member_adds_to_temperature_must_gain_on_both_of_two_runs():
+    rng = np.random.default_rng(1)
+    told = rng.normal(size=(2, 300))
+    plain = told + 0.3 * rng.normal(size=told.shape)
+
+    def weight_of(*sizes):
+        other = told + np.array(sizes)[:, None] * rng.normal(size=told.shape)
+        runs = [part(np.column_stack(columns), z) for *columns, z in zip(plain, other, told)]
+        return weights_of(runs, 2, True, beside=0)[1]
+
+    assert weight_of(0.1, 0.1) > 0.8
+    # Far better on one run by luck, a little worse on the other: on both together it would win.
+    assert weight_of(0.02, 0.33) == 0.0
+
+
+def test_skill_is_shrunk_by_its_variance_of_few_runs():
+    # The factor that leaves least risk of an estimate k whose variance is s^2, k s^2 below it; by definition.
+    rng = np.random.default_rng(2)
+    p, own = rng.normal(size=(2, 3, 400))
+    for size in (0.05, 0.5, 3.0):
+        told = 0.8 * p + size * own
+        k = np.sum(p * told) / np.sum(p * p)
+        variance = np.mean((told - k * p) ** 2) / (3 * np.mean(p * p))
+        expected = np.clip(k - variance / k, 0.0, 1.0)
+        found = skill_of([part(a[:, None], b) for a, b in zip(p, told)], np.ones(1))
+        assert found == pytest.approx(expected, abs=1e-9)
+        # Blocks of one run are no observations of another.
+        blocks = skill_of([part(a[:, None], b, "blocks") for a, b in zip(p, told)], np.ones(1))
+        assert blocks == pytest.approx(min(k, 1.0))
+
+
+def test_direction_is_told_by_a_run_both_ways_or_by_two_of_each():
+    up, down = np.linspace(0.0, 50.0, 300), np.linspace(50.0, 0.0, 300)
+    assert direction_is_told([np.concatenate([up, down])])
+    assert direction_is_told([np.concatenate([up, down]), up])
+    assert direction_is_told([up, down, up, down])
+    for runs in ([up], [up, down], [up, up, down]):
+        assert not direction_is_told(runs)
+
+
 @pytest.mark.parametrize(
     ("count", "about"), [(1, 0.0), (2, 0.0), (3, 0.0), (9, 0.0), (30, 0.0), (2, 1.0), (2, 5.0), (3, 2.0)]
 )
@@ -30,12 +71,12 @@ def test_intervals_of_runs_left_out_cover_another_run(count, about):
     rng = np.random.default_rng(count)
     rows = 20
     table = TrainingTable(np.zeros((rows, 1)), rng.normal(size=rows), *[np.zeros(rows, dtype=int)] * 3, 100.0)
-    covered = []
-    for _ in range(800):
-        shifts = rng.normal(size=count + 1)
-        told = shifts[:, None] + about * rng.normal(size=(count + 1, rows))
-        lefts = [part(np.zeros((rows, 1)), left) for left in told[1:]]
+    covered, others = [], 16
+    for _ in range(200):
+        shifts = rng.normal(size=count + others)
+        told = shifts[:, None] + about * rng.normal(size=(count + others, rows))
+        lefts = [part(np.zeros((rows, 1)), left) for left in told[others:]]
         half = intervals_of(lefts, np.ones(1), table, True).half_width(0.9)
-        covered.append(np.mean(np.abs(told[0]) <= half))
-    # Three standard errors of 800 trials; ranks of few runs are coarse, to the safe side.
-    assert 0.9 - 0.032 <= np.mean(covered) <= 0.9 + 0.032 + 1.0 / (count + 1) * (count >= 9)
+        covered.append(np.mean(np.abs(told[:others]) <= half))
+    # Three standard errors of the trials; ranks of few runs are coarse, to the safe side.
+    assert 0.9 - 0.04 <= np.mean(covered) <= 0.9 + 0.04 + 1.0 / (count + 1) * (count >= 9)

@@ -18,6 +18,8 @@ from fogml.validation.leave_one_out import leave_one_run_out
 from fogml.validation.reach import floor_interval
 from tests.validation.known_drift import KnownDrift
 
+pytestmark = pytest.mark.usefixtures("without_noise_terms")
+
 
 def cubic_run(name: str, seed: int, noise: float = 0.1, bias: float = 0.0) -> Run:
     """Up and down over 60 degC in 6000 s, drift cubic in T."""

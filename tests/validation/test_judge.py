@@ -13,6 +13,8 @@ from fogml.runs.run import Run
 from fogml.validation.judge import judge
 from tests.validation.known_drift import KnownDrift
 
+pytestmark = pytest.mark.usefixtures("without_noise_terms")
+
 LATITUDE = 30.0
 EARTH = EARTH_RATE_DEG_H * 0.5
 

@@ -17,6 +17,8 @@ from fogml.validation.leave_one_out import leave_one_run_out
 from fogml.validation.report_json import judgement_json
 from tests.validation.known_drift import KnownDrift
 
+pytestmark = pytest.mark.usefixtures("without_noise_terms")
+
 BIASES = np.array([0.10, -0.04, 0.07, 0.01, 0.12, -0.02])
 SCALE_PPM = np.array([30.0, 10.0, -20.0, 5.0, 0.0, 11.0])
 

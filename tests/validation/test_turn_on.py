@@ -14,6 +14,8 @@ from fogml.validation.report_json import judgement_json
 from fogml.validation.turn_on import turn_on_time
 from tests.validation.known_drift import KnownDrift
 
+pytestmark = pytest.mark.usefixtures("without_noise_terms")
+
 AVERAGING_S = 20.0
 
 
