@@ -366,13 +366,14 @@ def test_failed_write_leaves_what_was_there(folder, model, train, monkeypatch):
     assert {name: (folder / name).read_bytes() for name in os.listdir(folder)} == before
 
 
-class TestScikitLearn:
-    @pytest.fixture(scope="class")
-    def kept(self, train, tmp_path_factory):
-        kept = tmp_path_factory.mktemp("kept") / "model"
-        save_model(make_model("sklearn.linear_model.BayesianRidge").fit(train), kept)
-        return kept
+@pytest.fixture(scope="module")
+def kept(train, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kept") / "model"
+    save_model(make_model("sklearn.linear_model.BayesianRidge").fit(train), folder)
+    return folder
 
+
+class TestScikitLearn:
     @pytest.fixture
     def folder(self, kept, tmp_path):
         return shutil.copytree(kept, tmp_path / "model")
