@@ -13,7 +13,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.signals.flicker import Flicker
 
-N, STEP_S, REPEATS = 3000, 5.0, 20
+N, STEP_S, REPEATS = 3000, 5.0, 30
 TIME = STEP_S * np.arange(N)
 TEMPERATURE = 20.0 + 30.0 * np.sin(2 * np.pi * TIME / 7000.0)
 COLUMNS = np.column_stack((TEMPERATURE, TEMPERATURE**2, np.gradient(TEMPERATURE, TIME) * 60.0))
