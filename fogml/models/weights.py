@@ -112,10 +112,10 @@ def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
     r"""Share of the weighed sum that left-out parts confirm, 0 to 1; all of it where there are none.
 
     With predictions p and outputs z of each part, both less the mean of the rows fitted to, it is the
-    least-squares factor :math:`k = \sum \overline{p z} / \sum \overline{p^2}`, each part counting alike. A
-    run is shifted as a whole, so K runs left out are K observations of it, and its variance is
-    :math:`s^2 = \sum \overline{(z - k p)^2} / (K \sum \overline{p^2})`; then it is
-    :math:`k\,(1 - s^2/k^2)`, or 0 where that is negative (positive-part shrinkage: James & Stein, 1961).
+    least-squares factor :math:`k = \sum \overline{p z}/\sum \overline{p^2}`, each part counting alike. A
+    run is shifted as a whole, so K runs left out are K observations, and k counts where it is beyond its
+    standard error :math:`(\sum \overline{(z - k p)^2} / (K \sum \overline{p^2}))^{1/2}`; else nothing is
+    confirmed.
     """
     sums = [(part.predicted @ weights, part.told) for part in parts]
     product = sum(float(np.mean(predicted * told)) for predicted, told in sums)
@@ -123,9 +123,10 @@ def skill_of(parts: Sequence[LeftOut], weights: FloatArray) -> float:
     if not square > 0.0:
         return 1.0
     skill = product / square
-    if product > 0.0 and all(part.kind == "runs" for part in parts):
+    if all(part.kind == "runs" for part in parts):
         left = sum(float(np.mean((told - skill * predicted) ** 2)) for predicted, told in sums)
-        skill -= left / (len(parts) * product)
+        if skill < (left / (len(parts) * square)) ** 0.5:
+            return 0.0
     skill = float(np.clip(skill, 0.0, 1.0))
     return skill if skill >= LEAST_WEIGHT else 0.0
 

@@ -37,20 +37,22 @@ def test_what_a_member_adds_to_temperature_must_gain_on_both_of_two_runs():
     assert weight_of(0.02, 0.33) == 0.0
 
 
-def test_skill_is_shrunk_by_its_variance_of_few_runs():
-    # The factor that leaves least risk of an estimate k whose variance is s^2, k s^2 below it; by definition.
+def test_skill_of_few_runs_counts_beyond_its_standard_error():
+    # The factor and its error are those of least squares through the origin with a run as one observation.
     rng = np.random.default_rng(2)
     p, own = rng.normal(size=(2, 3, 400))
-    for size in (0.05, 0.5, 3.0):
+    kept = []
+    for size in (0.05, 0.5, 1.3, 1.5, 3.0):
         told = 0.8 * p + size * own
         k = np.sum(p * told) / np.sum(p * p)
-        variance = np.mean((told - k * p) ** 2) / (3 * np.mean(p * p))
-        expected = np.clip(k - variance / k, 0.0, 1.0)
+        error = np.sqrt(np.mean((told - k * p) ** 2) / (3 * np.mean(p * p)))
+        kept.append(k > error)
         found = skill_of([part(a[:, None], b) for a, b in zip(p, told)], np.ones(1))
-        assert found == pytest.approx(expected, abs=1e-9)
+        assert found == pytest.approx(k if kept[-1] else 0.0, abs=1e-9)
         # Blocks of one run are no observations of another.
         blocks = skill_of([part(a[:, None], b, "blocks") for a, b in zip(p, told)], np.ones(1))
         assert blocks == pytest.approx(min(k, 1.0))
+    assert kept == [True, True, True, False, False]
 
 
 def test_direction_is_told_by_a_run_both_ways_or_by_two_of_each():
