@@ -41,12 +41,14 @@ class OperandReader(TokenReader):
         self.next += 1
         self.expect("(", f"after {function}")
         if function == "since_on":
-            atom = Atom("since_on", Signal.of(TIME_ON), memory=self.length())
+            atom = Atom(
+                "since_on", Signal.of(TIME_ON), memory=self.length("time constant", "since_on(400 s)")
+            )
         else:
             signal, following = self.signal(), _FOLLOWING[function]
             self.expect(",", f"before the {following} of {function}")
             if function == "lag":
-                atom = Atom("lag", signal, memory=self.length())
+                atom = Atom("lag", signal, memory=self.length(following, "lag(T, 600 s)"))
             elif function == "play":
                 atom = Atom("play", signal, memory=self.half_width(signal))
             else:
@@ -60,7 +62,10 @@ class OperandReader(TokenReader):
         signal, given = self.signal(), []
         for kind in declared.parameters:
             self.expect(",", f"before a parameter of {declared.name}")
-            given.append(self.length() if kind == "s" else self.number(signal, kind == "x"))
+            if kind == "s":
+                given.append(self.length("parameter", f"{declared.name}(..., 60 s)"))
+            else:
+                given.append(self.number(signal, kind == "x"))
         self.expect(")", f"to close {declared.name}(")
         return Atom(declared.name, signal, parameters=tuple(given))
 
@@ -160,19 +165,20 @@ class OperandReader(TokenReader):
             return token.text, sign * coefficient
         self.fail(f"a column or a function of it expected, found {self.found()}", token.at, self.known())
 
-    def length(self) -> float:
+    def length(self, what: str = "window's length", example: str = "[block, 64 s]") -> float:
+        """A time above 0 with its unit [s]."""
         token = self.token
         if token.kind != "number":
-            self.fail(f"a window's length expected, found {self.found()}", token.at, "e.g. [block, 64 s]")
+            self.fail(f"a {what} above 0 expected, found {self.found()}", token.at, f"e.g. {example}")
         self.next += 1
         unit = self.token
         if unit.kind != "name" or unit.text not in WINDOW_UNITS:
             hint = f"known units: {', '.join(WINDOW_UNITS)}"
-            self.fail(f"the window's unit expected, found {self.found()}", unit.at, hint)
+            self.fail(f"its unit expected, found {self.found()}", unit.at, hint)
         self.next += 1
         length = float(token.text) * WINDOW_UNITS[unit.text]
         if not 0.0 < length < float("inf"):
-            self.fail("the window's length must be more than 0", token.at)
+            self.fail(f"the {what} must be more than 0", token.at)
         return length
 
 
