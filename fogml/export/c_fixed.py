@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.escaping import CCode
 from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
+from fogml.export.c_own import fixed_number, function_atoms, own_constants, own_context
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.fixed_scales import (
     HELD_BITS,
-    LAG_BITS,
     OUTPUT_BITS,
     SIGNAL_SHIFT,
     VALUE_BITS,
@@ -33,6 +33,8 @@ from fogml.export.fixed_scales import (
 from fogml.export.layout import Layout
 from fogml.export.plan import Plan
 from fogml.features.atoms import DEAD_BAND
+from fogml.features.own import Function
+from fogml.features.traced import BITS
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -74,14 +76,13 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     compensated = f"Outputs are whole steps of 2^-{OUTPUT_BITS} deg/h; the units are defined below."
     units = units_of(plan, gyro, f"whole steps of 2^-{bits} degC, in the order of the places below")
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
-    rates = any(o.method not in ("first", "lag") or (not o.lag and o.unit_s) for o in windows.operators)
+    rates = any(o.method not in ("first", "own") or o.unit_s for o in windows.operators)
+    own = own_context(plan, windows, fixed_number, "int64_t")
     return {
         "fixed": fixed,
-        "kernels": [],
-        "curves": [],
-        "recursions": [],
+        **own,
         "rates": rates,
-        "ratios": rates or bool(windows.of_method("lag")) or bool(plan.centres and plan.edge_columns),
+        "ratios": rates or bool(plan.centres and plan.edge_columns) or own["divides"],
         "slice_inputs": slice_inputs(plan, scales.atoms),
         "real": "int64_t",
         "suffix": "",
@@ -102,12 +103,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "evaluate": _evaluations(plan, windows, scales),
         "exponential_arguments": _exponential_arguments(windows),
         "atom_expressions": [_atom(i, plan, windows, scales) for i in range(len(plan.atoms))],
-        "lag_arguments": {
-            i: f"INT64_C({round(operator.window.length_s * 1e6)}), INT64_C({operator.needed_ticks})"
-            for i, operator in windows.of_method("lag")
-        },
         "rule": _thermometer(plan, bits, fixed["temperature_most"]),
-        "half_widths": [f"INT64_C({round(atom.memory * 2.0**HELD_BITS)})" for atom in windows.plays],
         "columns": _columns(plan, scales),
     }
 
@@ -165,9 +161,8 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
         found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"
-    for place, (i, operator) in enumerate(windows.of_method("lag")):
-        behind = f"(int64_t)signal[{operator.signal}] * 4 - state->lag[{place}].behind"
-        found[i] = f"scaled({behind}, {LAG_BITS - bits[i]})"
+    for i, _ in windows.of_method("own"):
+        found[i] = f"scaled(value[{i}], {BITS - bits[i]})"
     for place, (i, operator) in enumerate(windows.of_method("first")):
         difference = f"(int64_t)signal[{operator.signal}] - state->first[{place}]"
         if operator.unit_s is None:
@@ -191,13 +186,10 @@ def _exponential_arguments(windows: Layout) -> dict[int, str]:
 
 def _atom(i: int, plan: Plan, windows: Layout, scales: Scales) -> str:
     place, bits = windows.of_atom[i], int(scales.atoms[i])
-    if plan.atoms[i].operator == "play":
-        value = f"state->play[{windows.plays.index(plan.atoms[i])}].state"
-        return f"(int32_t)clipped(scaled({value}, {HELD_BITS - bits}), INT32_MAX)"
-    if plan.atoms[i].bounds is not None:
-        low, high = (round(end * 2.0**HELD_BITS) for end in plan.atoms[i].bounds or ())
-        value = f"beyond(signal[{windows.signal_of_atom[i]}], INT64_C({low}), INT64_C({high}))"
-        return f"(int32_t)scaled({value}, {HELD_BITS - bits})"
+    if isinstance(plan.atoms[i].declared, Function):
+        signal = f"(int64_t)signal[{windows.signal_of_atom[i]}] * {1 << (BITS - HELD_BITS)}"
+        value = f"function_{function_atoms(plan).index(plan.atoms[i])}({signal})"
+        return f"(int32_t)clipped(scaled({value}, {BITS - bits}), INT32_MAX)"
     if place < 0:
         value = f"scaled(signal[{windows.signal_of_atom[i]}], {HELD_BITS - bits})"
         return f"(int32_t)clipped({value}, INT32_MAX)"
@@ -252,6 +244,9 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
             lines += [f"#define SLICE_{name.upper()} INT64_C({numbers[name]})" for name in ("first", "width")]
             for name in ("low", "high"):
                 lines += array(f"SLICE_{name.upper()}", numbers[name], "int", "[SLICED][SLICES]", "int64_t")
+    lines += own_constants(plan, windows, fixed_number, "int64_t")
+    if windows.binned and windows.lines:
+        lines.append(f"#define WEIGHT_UNITS INT64_C({weight_units(windows)}) /* of a full bin in a slope */")
     arrays = plan.arrays
     constant = round(float(arrays["constant"][0]) * 2.0**scales.drift)
     lines += [
@@ -274,6 +269,11 @@ def _constants(plan: Plan, windows: Layout, scales: Scales, dtype: str) -> list[
     if plan.centres:
         lines += _network_constants(plan, scales, stored)
     return [CCode(line) for line in lines]
+
+
+def weight_units(windows: Layout) -> int:
+    """Weight of a full bin in a slope, so fine that sums over a ring of bins still fit 63 bits."""
+    return 1 << min(12, 18 - (windows.ring - 1).bit_length())
 
 
 def _scale_constants(plan: Plan, scales: Scales) -> list[str]:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
-from fogml.export.c_own import curve_expression, own_constants, own_context
+from fogml.export.c_own import function_atoms, own_constants, own_context
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Limits, Plan
@@ -99,11 +99,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
             for i, operator in enumerate(windows.operators)
         },
-        "atom_expressions": [_atom(i, plan, windows, "0.0" + suffix, number) for i in range(len(plan.atoms))],
-        "lag_arguments": {
-            i: f"{number(operator.window.length_s)}, INT64_C({operator.needed_ticks})"
-            for i, operator in windows.of_method("lag")
-        },
+        "atom_expressions": [_atom(i, plan, windows) for i in range(len(plan.atoms))],
         "rule": {
             "low": number(max(plan.thermometer.low_degC, -(2.0**RANGE_BITS))),
             "high": number(min(plan.thermometer.high_degC, 2.0**RANGE_BITS)),
@@ -113,7 +109,6 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             "spell_us": round(1e6 * plan.thermometer.spell_s),
             "note": "",
         },
-        "half_widths": [number(atom.memory) for atom in windows.plays],
         "columns": column_expressions(plan),
         **own_context(plan, windows, number, real),
     }
@@ -129,21 +124,14 @@ def column_expressions(plan: Plan) -> list[str]:
     ]
 
 
-def _atom(i: int, plan: Plan, windows: Layout, zero: str, number: Any) -> str:
+def _atom(i: int, plan: Plan, windows: Layout) -> str:
     atom, operator = plan.atoms[i], windows.of_atom[i]
     signal = f"signal[{windows.signal_of_atom[i]}]"
-    if atom.operator == "play":
-        return f"state->play[{windows.plays.index(atom)}].state"
-    if atom.operator == "since_on":
-        return f"exp_of_minus({signal} > {zero} ? {signal} / {number(atom.memory)} : {zero})"
-    if isinstance(atom.own, Function):
-        return curve_expression(plan, atom, signal, number)
-    if atom.bounds is not None:
-        return f"beyond({signal}, {', '.join(number(end) for end in atom.bounds)})"
+    if isinstance(atom.declared, Function):
+        return f"function_{function_atoms(plan).index(atom)}({signal})"
     if operator < 0:
         return signal
-    value = f"direction(value[{operator}])" if atom.operator == "sign" else f"value[{operator}]"
-    return value
+    return f"direction(value[{operator}])" if atom.operator == "sign" else f"value[{operator}]"
 
 
 def _signal(signal: Signal, plan: Plan, number: Any) -> str:
@@ -196,13 +184,9 @@ def _evaluations(windows: Layout, number: Any) -> dict[int, str]:
         name, weights = ("slope", "") if own is None else ("kernel", f"KERNEL_{place}, {len(own.weights)}, ")
         value = f"{name}_value(state, &SLOPE[{place}], &sums, bins, {weights}{unit})"
         found[i] = f"told_part({value}, {operator.filling})"
-    for place, (i, operator) in enumerate(windows.of_method("own")):
-        found[i] = f"value_own_{place}(&state->own_{place}, signal[{operator.signal}])"
     for place, (i, operator) in enumerate(windows.of_method("exp")):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         found[i] = f"{number(unit_s)} * state->exponential[{place}].rate"
-    for place, (i, operator) in enumerate(windows.of_method("lag")):
-        found[i] = f"signal[{operator.signal}] - state->lag[{place}].behind"
     for place, (i, operator) in enumerate(windows.of_method("first")):
         difference = f"(signal[{operator.signal}] - state->first[{place}])"
         rate = "" if operator.unit_s is None else f" * {number(operator.unit_s)} / interval"

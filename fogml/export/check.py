@@ -175,6 +175,6 @@ def expected_outputs(
     temperatures = first + rise * phase[:, None]
     temperatures[test.checks[-1] :] += jump
     time = step * np.int64(test.interval_us) - np.int64(test.before_wrap_us)
-    out, flags = program.steps(time, temperatures, np.full(len(step), np.asarray(test.gyro).astype(kind)))
+    out, told = program.steps(time, temperatures, np.full(len(step), np.asarray(test.gyro).astype(kind)))
     checks = list(test.checks)
-    return [float(value) for value in out[checks]], [int(flag) for flag in flags[checks]]
+    return [float(value) for value in out[checks]], [int(flag) for flag in told[checks]]

@@ -146,7 +146,11 @@ def _vectors(plan: Plan) -> list[str]:
     held = {sensor: low + shares * (high - low) for sensor, (low, high, _) in ends.items()}
     atoms = np.empty((len(shares), len(names)))
     for i, atom in enumerate(plan.atoms):
-        if atom.window is None and atom.operator != "since_on" and not isinstance(atom.own, Recursion):
+        if (
+            atom.window is None
+            and atom.operator != "since_on"
+            and (not isinstance(atom.declared, Recursion) or atom.declared.follows)
+        ):
             atoms[:, i] = at_rest(atom, held)
         else:
             low, high = plan.limits.box_low[i], plan.limits.box_high[i]

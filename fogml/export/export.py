@@ -24,7 +24,7 @@ from fogml.export.check import (
 )
 from fogml.export.documentation import DOCUMENTATION_FILE, documentation
 from fogml.export.false_readings import false_reading_lines, false_readings
-from fogml.export.fixed_bound import fixed_point_error
+from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.instructions import instructions_per_sample
 from fogml.export.layout import layout
 from fogml.export.loss import TrainingRows, accuracy_loss, training_rows
@@ -153,7 +153,11 @@ def _write_c(
     plan: Plan, folder: Path, dtype: str, card: dict[str, Any], seed: int
 ) -> tuple[dict[str, Any], Plan]:
     false = false_readings(plan, seed)
-    source = c_source(plan, dtype, [*card_lines(card, plan, dtype), *false_reading_lines(false)])
+    proven, lines = None, [*card_lines(card, plan, dtype), *false_reading_lines(false)]
+    if number_of(dtype) == "fixed":
+        proven = fixed_point_error(plan, layout(plan, "fixed"), dtype)
+        lines += fixed_point_lines(proven)
+    source = c_source(plan, dtype, lines)
     with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
         source = source.with_expected(*expected_outputs(source, Path(scratch)))
         program = CProgram(source, Path(scratch))
@@ -182,7 +186,7 @@ def _write_c(
             "temperature_unit_degc": fixed["temperature_value"],
             "gyro_unit": fixed["gyro_value"],
             "compensated_unit_deg_h": fixed["compensated_value"],
-            "largest_difference_proven": fixed_point_error(plan, windows, dtype),
+            "largest_difference_proven": proven,
         }
     return report, plan
 

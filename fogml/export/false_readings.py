@@ -104,7 +104,7 @@ def atom_gain(atom: Atom, sample_s: float, spell: bool) -> float:
         return 2.0 * float(np.sign(moved))
     if atom.operator == "lag" and not spell:
         return moved * min(1.0, sample_s / atom.memory)
-    if (own := atom.own) is not None:
+    if (own := atom.declared) is not None and atom.operator not in ("beyond", "since_on"):
         # Of a curve it is not asked: what flag 0 lets through is its bound.
         most = own.gain if isinstance(own, Recursion) else float("inf")
         return most * moved if moved else 0.0

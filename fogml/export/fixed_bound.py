@@ -12,11 +12,10 @@ from math import exp
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.export.c_fixed import EXP_ERROR
+from fogml.export.c_fixed import EXP_ERROR, weight_units
 from fogml.export.false_readings import atom_gain
 from fogml.export.fixed_scales import (
     HELD_BITS,
-    LAG_BITS,
     OUTPUT_BITS,
     SIGNAL_SHIFT,
     VALUE_BITS,
@@ -29,11 +28,13 @@ from fogml.export.fixed_scales import (
 from fogml.export.layout import RANGE_BITS, Layout, Operator
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
+from fogml.features.memories import BEYOND, LAG, PLAY
+from fogml.features.traced import BITS
 from fogml.signals.clock import LEAST_SHARE, told_share
 
 FloatArray = NDArray[np.float64]
 _GYRO_DEG_H = 20.0
-_HELD = 2.0**-HELD_BITS
+_HELD, _OWN = 2.0**-HELD_BITS, 2.0**-BITS
 _SHARES = np.linspace(0.01, 1.0, 1000)
 _FILLING = float(np.max(told_share(_SHARES, LEAST_SHARE) / _SHARES)) * (1.0 + 2.0**-8)
 """How much more the rounding of its samples can move a window that fills than a full one."""
@@ -45,11 +46,11 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
     """Largest difference of C in ``q31`` or ``q15`` from the plan in the trained box [deg/h], or None.
 
     For outputs up to 20 deg/h of a model with a scale factor. A direction within a rounding of its dead band
-    is not in it, and slopes over bins are not followed.
+    is not in it. Slopes over bins are bounded at even intervals, for signals whose rate stays in its trained
+    range and whose readings jump by no more than the rule of readings lets pass. None where an operator of
+    one's own computes.
     """
     scales = Scales(plan, dtype)
-    if any(o.method == "slope" for o in windows.operators) and windows.binned:
-        return None
     atoms = np.array([_atom_error(i, plan, windows, scales) for i in range(len(plan.atoms))])
     columns = _column_errors(plan, scales, atoms)
     unit, arrays = 0.5 * 2.0**-scales.drift, plan.arrays
@@ -82,20 +83,32 @@ def _atom_error(i: int, plan: Plan, windows: Layout, scales: Scales) -> float:
     signal = read + float(stored.sum()) * 2.0**RANGE_BITS + 0.5 * _HELD
     # The box's ends and what levels off beyond are rounded, too.
     own *= 3.0
+    if atom.declared is not None:
+        return own + _declared_error(atom, signal, plan)
     if place < 0:
-        return signal + own + {"play": _HELD, "beyond": 4.0 * _HELD}.get(atom.operator, 0.0)
+        return signal + own
     operator = windows.operators[place]
     return own + _operator_error(atom, operator, signal / float(coefficients.sum()), plan, windows)
 
 
+def _declared_error(atom: Atom, signal: float, plan: Plan) -> float:
+    """Bound of a declared operator's error, its signal being off by `signal`; infinite where none is proven.
+
+    A lag's share forgotten is off by a factor, at even intervals the same at each step: its distance from
+    the signal is then off by that factor of how far it is from its own mean, at most twice the span.
+    """
+    if atom.declared is not LAG:
+        return signal + 4.0 * _OWN if atom.declared in (PLAY, BEYOND) else float("inf")
+    share = plan.sample_s / atom.memory
+    off = 5.0 * _OWN + (EXP_ERROR if share > 2.0**-10.5 else share**4 / 24.0)
+    gone, span = 1.0 - exp(-share), _span(atom, plan)
+    return 2.0 * signal + 2.0 * span * (off / gone + _OWN) + 2.0 * _OWN / gone
+
+
 def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, windows: Layout) -> float:
-    """Bound of a window's or a lag's error, its signal being off by `read` for each unit of its weights."""
+    """Bound of a window's error, its signal being off by `read` for each unit of its weights."""
     length, step = operator.window.length_s, plan.sample_s
     span = _span(atom, plan)
-    if operator.lag:
-        steps = max(1.0, length / step)
-        per_step = 2.0**-LAG_BITS + (EXP_ERROR + 2.0**-28) * span
-        return float(read * 2.0 * sum(abs(w) for _, w in atom.signal.parts) + steps * per_step)
     gain = atom_gain(atom, step, spell=True)
     if operator.window.held:
         gain *= _FILLING
@@ -111,7 +124,9 @@ def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, win
     if operator.method == "slope":
         unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
         rounding = unit * 2.0 ** -(HELD_BITS + divide_bits(unit))
-        return gain * (read + 3.0 * _HELD) + 24.0 * 2.0**-17 * span * unit_s / length + rounding
+        binned = _FILLING * _binned_slope_error(atom, operator, plan, windows) if windows.binned else 0.0
+        ages = 24.0 * 2.0**-17 * span + binned
+        return gain * (read + held + 3.0 * _HELD) + ages * unit_s / length + rounding
     if operator.method == "first":
         if operator.unit_s is None:
             return gain * read
@@ -120,6 +135,28 @@ def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, win
     unit, steps = round(unit_s * 1e6), max(1.0, length / step)
     rounding = unit * 2.0 ** -(HELD_BITS + divide_bits(unit)) + 2.0**-24 + steps * 2.0**-25
     return gain * read + rounding + 3.0 * span * steps * (EXP_ERROR + 2.0**-30) * unit_s / length
+
+
+def _binned_slope_error(atom: Atom, operator: Operator, plan: Plan, windows: Layout) -> float:
+    """Bound of what weights, times and rises of bins lose by rounding, over a slope's whole window [degC].
+
+    With n bins of weight w, ages a about their mean and deviations e from the line, a change dw of weights
+    moves the slope by ``sum(dw a e)/sum(w a^2)``, at most ``3 |dw| |e|/w`` per window.
+    """
+    length, i = operator.window.length_s, plan.atoms.index(atom)
+    low, high = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
+    per_window = length / (length if operator.unit_s is None else operator.unit_s)
+    jump = plan.thermometer.jump_degC * sum(abs(weight) for _, weight in atom.signal.parts)
+    count = length / (windows.bin_samples * plan.sample_s)
+    off_line = 0.25 * (high - low) * per_window + jump
+    change = max(abs(low), abs(high)) * per_window
+    rise = 2.0 * jump + change / count
+    step = 0.5 / (2.0**22 * plan.sample_s / length)
+    return (
+        1.5 * off_line / weight_units(windows)
+        + step * (rise / count + 2.0 * change / count**2)
+        + 3.0 * _HELD / count
+    )
 
 
 def _span(atom: Atom, plan: Plan) -> float:
@@ -194,3 +231,13 @@ def _drawn(plan: Plan, scales: Scales, columns: FloatArray) -> tuple[FloatArray,
             off[d] += scales.most[k] * share + 0.5 * 2.0 ** -int(scales.columns[k])
             moved[d] = scales.most[k] * (1.0 - least)
     return off, moved
+
+
+def fixed_point_lines(proven: float | None) -> list[str]:
+    """The proven worst case as lines of text."""
+    if proven is None:
+        return [
+            "worst case    of fixed point not proven, as the model takes an operator of one's own;",
+            "              export.json has what was measured",
+        ]
+    return [f"worst case    fixed point is at most {proven:.3g} deg/h off in the trained box, by proof"]

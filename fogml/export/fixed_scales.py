@@ -17,8 +17,6 @@ OUTPUT_BITS = 12
 VALUE_BITS = 30
 HELD_BITS = 20
 SIGNAL_SHIFT = 24
-LAG_BITS = HELD_BITS + 2
-# A lag's distance from its signal: up to 2**9 degC times a decay of 30 bits fits.
 _SUM_BITS = 60
 _MOST_DRIFT_BITS = 36
 _TEMPERATURE_MARGIN = 1.1

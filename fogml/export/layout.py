@@ -27,10 +27,6 @@ from fogml.signals.clock import (
 )
 
 Number = Literal["float64", "float32", "fixed"]
-OPERATORS = frozenset(("value", "lag", "play", "since_on", "beyond", "diff", "d", "sign"))
-"""Operators that there is C for, beside one's own: each has its lines in the templates."""
-_UNTIMED_S = 3600.0
-# Of recursions that know no time: what their clock must reach over.
 
 TEMPERATURE_BITS = {"float64": 32, "float32": 22, "fixed": 20}
 """Held temperatures are multiples of 2**-bits degC."""
@@ -43,7 +39,7 @@ NOISE_TICKS = 2
 
 @dataclass(frozen=True)
 class Operator:
-    """One running difference, rate or lag.
+    """One running difference or rate, or a declared operator with a state.
 
     Attributes
     ----------
@@ -61,10 +57,8 @@ class Operator:
         Age at which a sample leaves the newest window, both windows; time until full.
     counting_ticks, span_ticks
         Time until what the window holds counts; what it reaches over.
-    lag
-        Whether it is a first-order lag, with the window's length as its time constant.
     own
-        The atom of a recursion of one's own, likewise.
+        The atom of a declared operator, with the window's length as its time constant.
     """
 
     window: Window
@@ -77,7 +71,6 @@ class Operator:
     needed_ticks: int
     counting_ticks: int
     span_ticks: int
-    lag: bool = False
     own: Atom | None = None
 
     @property
@@ -87,8 +80,8 @@ class Operator:
 
     @property
     def method(self) -> str:
-        """``block``, ``slope``, ``exp``, ``first``, a window of one's own; ``lag`` or ``own``."""
-        return "own" if self.own is not None else "lag" if self.lag else self.window.method
+        """``block``, ``slope``, ``exp``, ``first``, a window of one's own; ``own`` of an operator."""
+        return "own" if self.own is not None else self.window.method
 
 
 @dataclass(frozen=True)
@@ -116,9 +109,7 @@ class Layout:
     bin_samples
         Samples that a bin holds at the nominal interval; 1 where each is kept by itself.
     longest_gap_s
-        An interval longer than this restarts everything but plays, which know no time.
-    plays
-        The distinct play operators.
+        An interval longer than this restarts everything but operators that know no time.
     """
 
     tick_us: int
@@ -131,7 +122,6 @@ class Layout:
     ring: int
     bin_samples: int
     longest_gap_s: float
-    plays: tuple[Atom, ...] = ()
 
     @property
     def binned(self) -> bool:
@@ -171,6 +161,10 @@ def layout(plan: Plan, number: Number) -> Layout:
     held = tuple(dict.fromkeys(signals.index(s) for s, w, _, _ in keys if w.held))
     ring, bin_samples = ring_of([window for _, window, _, _ in keys], plan.sample_s)
     gaps = [_gap_s(window, plan.sample_s) for _, window, _, _ in keys]
+    longest_gap = max(gaps, default=0.0)
+    # What knows no time has no say in how often samples must come.
+    timeless = [atom is not None and window.method == "first" for _, window, _, atom in keys]
+    gaps = [longest_gap if without else gap for without, gap in zip(timeless, gaps)]
     held_s = [w.span_s for _, w, _, _ in keys if w.held]
     tick_us = _tick_us(plan.sample_s, max(held_s, default=0.0))
     tick_s = tick_us * 1e-6
@@ -178,10 +172,8 @@ def layout(plan: Plan, number: Number) -> Layout:
     for (signal, window, unit_s, memory), gap_s in zip(keys, gaps):
         place = signals.index(signal)
         operator = _operator(plan.sample_s, tick_s, place, held, window, unit_s, gap_s)
-        own = memory if memory is not None and memory.operator != "lag" else None
-        operators.append(replace(operator, lag=memory is not None and own is None, own=own))
+        operators.append(replace(operator, own=memory))
     of_atom = tuple(keys.index(key) if (key := _key(atom)) is not None else -1 for atom in plan.atoms)
-    longest_gap = max(gaps, default=0.0)
     return Layout(
         tick_us,
         TEMPERATURE_BITS[number],
@@ -193,22 +185,15 @@ def layout(plan: Plan, number: Number) -> Layout:
         ring,
         bin_samples,
         longest_gap,
-        tuple(dict.fromkeys(atom for atom in plan.atoms if atom.operator == "play")),
     )
 
 
 def _check_held(atom: Atom, number: Number) -> None:
-    """Refuse what C code can't hold: what it has no lines for, columns whose range it can't know."""
-    own = atom.own if atom.window is None else atom.window.own
-    if isinstance(own, Recursion) and own.c is None:
+    """Refuse what C code can't hold: own windows in fixed point, columns whose range it can't know."""
+    if number == "fixed" and atom.window is not None and atom.window.own is not None:
         raise InputError(
-            f"export: the model takes {atom.text}, which is declared without its C; state it in the `c` of "
-            "its Recursion. Or export it --to onnx or json, which take features"
-        )
-    if own is not None and number == "fixed":
-        raise InputError(
-            f"export: the model takes {atom.text}; what is declared as one's own is computed in floating "
-            "point: use --dtype float32 or float64"
+            f"export: the model takes {atom.text}; a window of one's own is computed in floating point: use "
+            "--dtype float32 or float64"
         )
     if all(is_temperature(name) for name in atom.signal.sensors):
         return
@@ -226,17 +211,16 @@ def _check_held(atom: Atom, number: Number) -> None:
 
 def _key(atom: Atom) -> tuple[Signal, Window, float | None, Atom | None] | None:
     """What tells running operators apart: a rate and its direction share one."""
-    if atom.operator == "lag":
-        return atom.signal, Window("exp", atom.memory), None, atom
-    if isinstance(own := atom.own, Recursion):
-        return atom.signal, Window("exp", own.time_s(atom.parameters) or _UNTIMED_S), None, atom
+    if isinstance(declared := atom.declared, Recursion):
+        time_s = declared.time_s(atom.given)
+        return atom.signal, Window("exp", time_s) if time_s else Window("first"), None, atom
     if atom.window is None:
         return None
     return atom.signal, atom.window, None if atom.operator == "diff" else RATE_UNIT_S, None
 
 
 def _check(window: Window, sample_s: float, memory: Atom | None) -> None:
-    if memory is not None:
+    if memory is not None and window.length_s:
         check_window(window.length_s, sample_s, 1, f"the time constant of {memory.text}")
     elif window.method == "block":
         check_window(window.length_s, sample_s, 1, "a block window")

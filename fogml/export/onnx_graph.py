@@ -13,7 +13,7 @@ from fogml.errors import InputError, first_line
 from fogml.export.onnx_slices import beyond_slice
 from fogml.export.plan import Plan
 from fogml.export.storage import Stored
-from fogml.features.atoms import DEAD_BAND, MEMORIES, Atom, evaluate
+from fogml.features.atoms import DEAD_BAND, Atom, evaluate
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 
@@ -150,9 +150,7 @@ def window_weights(plan: Plan) -> FloatArray:
         If the windows look back too far, or something remembers more than any window holds.
     """
     for atom in plan.atoms:
-        if atom.operator in (*MEMORIES, "beyond") or not all(
-            is_temperature(name) for name in atom.signal.sensors
-        ):
+        if atom.declared is not None or not all(is_temperature(name) for name in atom.signal.sensors):
             raise InputError(
                 f"export: the model takes {atom.text}; a graph from a window holds windows of "
                 "temperatures alone; leave out --with-pipeline, or export --to c"

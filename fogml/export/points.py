@@ -84,11 +84,10 @@ def history(plan: Plan, seed: int, least: int = _LEAST_SAMPLES) -> History:
     """Ramps and soaks through the trained box and a little out of it, with gaps of all lengths."""
     rng = np.random.default_rng([seed, 2])
     spans = [atom.window.span_s for atom in plan.atoms if atom.window]
-    spans += [EXPONENTIAL_SPAN * atom.memory for atom in plan.atoms if atom.operator == "lag"]
     spans += [
-        EXPONENTIAL_SPAN * (own.time_s(atom.parameters) or 0.0)
+        EXPONENTIAL_SPAN * (declared.time_s(atom.given) or 0.0)
         for atom in plan.atoms
-        if isinstance(own := atom.own, Recursion)
+        if isinstance(declared := atom.declared, Recursion)
     ]
     longest = max(spans, default=0.0)
     count = int(np.clip(12.0 * longest / plan.sample_s, _LEAST_SAMPLES, _MOST_SAMPLES))

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.export.layout import OPERATORS
 from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
-from fogml.features.own import Function
+from fogml.features.own import Function, Recursion
 from fogml.runs.columns import is_temperature
 
 FloatArray = NDArray[np.float64]
@@ -113,9 +112,10 @@ def _static(plan: Plan, column: int | None, atoms: tuple[int, ...]) -> bool:
 
 def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
     """Trained range of a column's own value, else of what follows it; None where the box tells none."""
-    for operators in (("value",), ("lag", "play")):
+    for followed in (False, True):
         for i, atom in enumerate(plan.atoms):
-            if atom.operator in operators and atom.signal.is_sensor and atom.signal.sensors == (sensor,):
+            follows = _follows(atom) if followed else atom.operator == "value"
+            if follows and atom.signal.is_sensor and atom.signal.sensors == (sensor,):
                 return float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
     return None
 
@@ -123,8 +123,8 @@ def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
 def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     """An atom's values (n,) where nothing moves, from those of the columns that it is of, each (n,)."""
     count = len(next(iter(held.values())))
-    curve = isinstance(atom.own, Function)
-    if atom.operator not in OPERATORS and not curve:
+    declared = atom.declared
+    if isinstance(declared, Recursion) and not declared.follows:
         raise InputError(
             f"export: the model takes {atom.text}, of which it is not known what it is where nothing moves; "
             "export it --to onnx or json"
@@ -132,8 +132,11 @@ def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     if atom.window is not None or atom.operator == "since_on":
         return np.zeros(count)
     value = np.sum([weight * held[name] for name, weight in atom.signal.parts], axis=0)
-    if atom.bounds is not None or curve:
-        operator = atom.memory_operator(1.0)
-        assert operator is not None
-        value, _ = operator.push(np.arange(float(count)), value)
+    if isinstance(declared, Function):
+        value, _ = declared.operator(atom.given, 1.0).push(np.arange(float(count)), value)
     return np.asarray(value)
+
+
+def _follows(atom: Atom) -> bool:
+    """Whether an atom comes to its signal's value where nothing moves."""
+    return isinstance(atom.declared, Recursion) and atom.declared.follows

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.features.memories import MEMORY_OPERATORS
 from fogml.features.own import Function, Recursion, own_operator
 from fogml.features.signal import TIME_ON, Signal, number_text
 from fogml.features.windows import DEFAULT_WINDOW, Window, windowed_values
 from fogml.runs.columns import is_temperature
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
-from fogml.signals.memory import Beyond, Decay, Lag, MemoryOperator, Play
+from fogml.signals.memory import MemoryOperator
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -98,6 +99,16 @@ class Atom:
         return None if self.operator in OPERATORS else own_operator(self.operator)
 
     @property
+    def declared(self) -> Function | Recursion | None:
+        """The declaration of an operator that ships or of one's own; None for values and windows."""
+        return MEMORY_OPERATORS.get(self.operator) or self.own
+
+    @property
+    def given(self) -> tuple[float, ...]:
+        """What the declaration's parameters are."""
+        return self.parameters or self.bounds or ((self.memory,) if self.memory else ())
+
+    @property
     def text(self) -> str:
         """Text form, e.g. ``dT[slope, 60 s]``."""
         signal = self.signal.text
@@ -151,15 +162,7 @@ class Atom:
         InputError
             If a time constant is shorter than the sample interval.
         """
-        if self.operator == "lag":
-            return Lag(self.memory, sample_s)
-        if self.operator == "play":
-            return Play(self.memory)
-        if self.bounds is not None:
-            return Beyond(*self.bounds)
-        if (own := self.own) is not None:
-            return own.operator(self.parameters, sample_s)
-        return Decay(self.memory) if self.operator == "since_on" else None
+        return None if (declared := self.declared) is None else declared.operator(self.given, sample_s)
 
 
 def direction(rate: FloatArray) -> FloatArray:

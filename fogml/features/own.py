@@ -2,9 +2,12 @@
 
 Three forms, by what they need to know:
 
-- `Function`: of the input's present value alone. Its C is a table.
-- `Recursion`: a state that goes on from sample to sample. Its C stands beside its Python.
-- `fogml.signals.kernel_windows.Kernel`: weights over a window. Its C follows from them.
+- `Function`: of the input's present value alone.
+- `Recursion`: a state that goes on from sample to sample.
+- `fogml.signals.kernel_windows.Kernel`: weights over a window.
+
+Their C, in floating and fixed point, follows from what they do: functions are called with symbols
+(`fogml.features.traced`). A function that can't be written so becomes a table; a window's weights are one.
 
 `declare` makes one known; so does a package's entry point in the group ``fogml.operators`` that names it.
 """
@@ -22,6 +25,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
+from fogml.signals.memory import MemoryOperator
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -43,11 +47,14 @@ class _Named:
         A kind of `KINDS` for each parameter.
     unit
         Unit of its values; None for that of its input.
+    operations
+        Additions, multiplications and divisions at a sample; 0 where it isn't counted.
     """
 
     name: str
     parameters: tuple[str, ...] = ()
     unit: str | None = None
+    operations: int = 0
 
     def __post_init__(self) -> None:
         if not (self.name.isidentifier() and self.name.isascii()):
@@ -75,32 +82,11 @@ class Function(_Named):
         return FunctionOperator(self, parameters)
 
 
-@dataclass(frozen=True)
-class RecursionC:
-    """The C of a recursion, for float and double alike: write ``REAL`` for the type, ``R(1.5)`` for a number.
-
-    Known are ``x``, ``last`` (the input at the sample before), ``dt`` [s], ``p[0]`` ... the parameters, and
-    the state ``s[0]`` ...
-
-    Attributes
-    ----------
-    start, step
-        Statements that set the state at a first sample, and at each later one.
-    value
-        The operator's value, an expression.
-    settled
-        Whether what was before no longer matters, an expression; empty where the time constant tells.
-    """
-
-    start: str
-    step: str
-    value: str
-    settled: str = ""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Recursion(_Named):
     """An operator with a state: begun at the first sample, and again after a gap that its time does not span.
+
+    Its functions are written with what `fogml.features.traced` takes, so that they are C as well.
 
     Attributes
     ----------
@@ -117,8 +103,10 @@ class Recursion(_Named):
         begins anew after a gap that a window as long may not span; None for one that knows no time.
     gain
         How far its value moves at most where its inputs are each off by 1.
-    c
-        The same in C; None for none.
+    follows
+        Whether its value is its input's where nothing moves.
+    quicker
+        ``quicker(*parameters, sample_s)``: an operator with the same numbers for whole recordings.
     """
 
     start: Callable[..., State]
@@ -127,10 +115,13 @@ class Recursion(_Named):
     settled: Callable[..., bool] | None = None
     time_constant: int | None = None
     gain: float = float("inf")
-    c: RecursionC | None = None
+    follows: bool = False
+    quicker: Callable[..., MemoryOperator] | None = None
 
-    def operator(self, parameters: State, sample_s: float) -> RecursionOperator:
+    def operator(self, parameters: State, sample_s: float) -> MemoryOperator:
         """What takes samples in order."""
+        if self.quicker is not None:
+            return self.quicker(*parameters, sample_s)
         return RecursionOperator(self, parameters, sample_s)
 
     def time_s(self, parameters: State) -> float | None:

@@ -9,8 +9,8 @@ import numpy as np
 
 from fogml.features.box import Box
 from fogml.features.features import Features
+from fogml.features.memories import most_beyond
 from fogml.runs.run import BoolArray, FloatArray
-from fogml.signals.memory import Beyond
 
 
 def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
@@ -22,7 +22,7 @@ def learn_box(features: Features, atoms: Iterable[FloatArray]) -> None:
     spans = dict(features.box)
     for atom in features.atoms:
         if atom.bounds is not None:
-            most = Beyond.most(*atom.bounds)
+            most = most_beyond(*atom.bounds)
             spans[atom.text] = (-most, most)
     features.set_box(spans, slices_of(features))
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from fogml.features.atoms import Atom
 from fogml.features.features import Features
+from fogml.features.memories import beyond
 from fogml.features.parse import parse_features
 from fogml.features.terms import Term
 from fogml.models.box import distance_outside, learn_box
@@ -25,7 +26,6 @@ from fogml.models.mixed_effects import MixedEffects, linear_regressor
 from fogml.models.regressors import goes_on_linearly, predict_rows, refit
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
-from fogml.signals.memory import Beyond
 
 LEAST_WEIGHT = 0.02
 """Weight below which a member is left out: it costs windows and operations, and tells next to nothing."""
@@ -178,9 +178,8 @@ def _bounded(
         if not low < high:
             continue
         moved[atom] = Atom("beyond", atom.signal, bounds=(low, high))
-        beyond = Beyond(low, high)
         for values_of in (rest, part):
-            values_of[:, i] = beyond.push(values_of[:, values], values_of[:, values])[0]
+            values_of[:, i] = beyond(values_of[:, values], low, high)
     terms = [Term(tuple((moved.get(a, a), power) for a, power in t.factors)) for t in features.terms]
     return Features.from_terms(terms) if moved else parse_features(features.text), rest, part
 

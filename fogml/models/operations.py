@@ -14,14 +14,12 @@ WINDOW_OPERATIONS = {"block": 8, "slope": 10, "exp": 6, "first": 4}
 HELD_OPERATIONS = {"block": 14, "slope": 26}
 """Those for each sample, or bin of samples, that a window holds; of one's own as many as a slope's."""
 EXPONENTIAL_OPERATIONS = 20
-MEMORY_OPERATIONS = {"lag": 6, "play": 8, "beyond": 9, "since_on": EXPONENTIAL_OPERATIONS + 1}
-"""The same of a memory's step, at a steady sample interval."""
 
 
 def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_s: float) -> int:
     """Additions, multiplications and divisions from a sample to feature columns, windows full.
 
-    Operators of one's own count for nothing.
+    Operators of one's own count for what they state.
 
     Parameters
     ----------
@@ -37,7 +35,7 @@ def operations_of_features(atoms: Sequence[Atom], steps: Sequence[Step], sample_
         alike = "slope" if window.own is not None else window.method
         count += WINDOW_OPERATIONS[alike]
         count += HELD_OPERATIONS.get(alike, 0) * ring_of([window], sample_s)[0]
-    count += sum(MEMORY_OPERATIONS.get(atom.operator, 0) for atom in atoms)
+    count += sum(declared.operations for atom in atoms if (declared := atom.declared))
     count += sum(2 * len(atom.signal.parts) - 1 for atom in atoms)
     count += 4 * len(atoms)
     return count + sum(len(step.atoms) - (step.column is None) for step in steps)

@@ -1,4 +1,4 @@
-"""Operators that take samples in order: a lag, a play, the decay since power-on, and the way beyond bounds.
+"""Operators that take samples in order: a lag and a play.
 
 Each is an object that takes samples in order by `push`: a whole recording, blocks of it or one sample at a
 time give the same numbers, because the state goes on between calls. Beside its values it tells where it is
@@ -109,66 +109,3 @@ class Play:
         if len(x):
             self._low, self._high = low[-1], high[-1]
         return values, np.asarray(high - low >= 2.0 * self._half_width)
-
-
-class Decay:
-    r"""Decay since power-on, :math:`e^{-x/\tau}` of the time x since then; always settled.
-
-    Parameters
-    ----------
-    time_constant_s
-        Time constant [s].
-
-    Raises
-    ------
-    InputError
-        If the time constant is not a positive number.
-    """
-
-    def __init__(self, time_constant_s: float) -> None:
-        if not 0.0 < time_constant_s < float("inf"):
-            raise InputError(f"a decay over {time_constant_s:g} s: a positive number of seconds was expected")
-        self._tau = time_constant_s
-
-    def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Values at the next samples, and where they are settled; both of shape (n,)."""
-        return np.exp(np.maximum(x, 0.0) / -self._tau), np.ones(len(x), dtype=np.bool_)
-
-
-class Beyond:
-    r"""How far x is beyond bounds, levelled off within half their distance s; 0 between them; always settled.
-
-    A distance e becomes :math:`m e/(m + e) - k e/(k + e)` with m = s/2 and k = s/20: what a value that is
-    levelled off within a twentieth lacks of one that is levelled off within half (`fogml.features.box`). So
-    it begins without a corner, and never exceeds 0.45 s.
-
-    Parameters
-    ----------
-    low, high
-        The bounds, in the unit of x.
-
-    Raises
-    ------
-    InputError
-        If the upper bound is not above the lower one.
-    """
-
-    REACH, TAKEN = 0.5, 0.05
-
-    def __init__(self, low: float, high: float) -> None:
-        if not low < high:
-            raise InputError(f"beyond {low:g} and {high:g}: the upper bound must be above the lower one")
-        self._low, self._high = low, high
-
-    @classmethod
-    def most(cls, low: float, high: float) -> float:
-        """What its values stay below, either way."""
-        return (cls.REACH - cls.TAKEN) * (high - low)
-
-    def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """Values at the next samples, and where they are settled; both of shape (n,)."""
-        signed = x - np.clip(x, self._low, self._high)
-        away, span = np.abs(signed), self._high - self._low
-        reach, taken = self.REACH * span, self.TAKEN * span
-        value = reach * away / (reach + away) - taken * away / (taken + away)
-        return np.copysign(value, signed), np.ones(len(x), dtype=np.bool_)

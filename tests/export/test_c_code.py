@@ -123,7 +123,7 @@ def test_true_times_are_heeded(model_of, tmp_path):
     np.testing.assert_array_equal(flag, expected.flag)
 
 
-@pytest.mark.parametrize("dtype", ["float64", "float32", "q31", "q15"])
+@pytest.mark.parametrize("dtype", ["float32", "q15"])
 @pytest.mark.parametrize("name", ["mean", "rich", "memory", "rbf", "joint"])
 def test_no_undefined_behaviour_and_the_self_test_holds(model_of, tmp_path, name, dtype):
     source = c_source(Plan.of(model_of(name)), dtype, ["a card with a */ in it".replace("*/", "* /")])
@@ -323,7 +323,7 @@ def fast_run(sample_s: float) -> Run:
 
 @pytest.mark.parametrize(
     ("name", "dtype", "rate_hz"),
-    [("polynomial", "float64", 100.0), ("polynomial", "q15", 500.0), ("rich", "q31", 20.0)],
+    [("polynomial", "float64", 100.0), ("polynomial", "q15", 200.0), ("rich", "q31", 20.0)],
 )
 def test_bins_of_samples_are_the_windows_at_any_rate(model_of, tmp_path, name, dtype, rate_hz):
     run = fast_run(1.0 / rate_hz)

@@ -9,7 +9,7 @@ from fogml.export.c_program import CProgram
 from fogml.export.c_source import c_source
 from fogml.export.check import c_difference
 from fogml.export.false_readings import false_reading_error, false_readings
-from fogml.export.fixed_bound import fixed_point_error
+from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
 from fogml.models.compensation import compensate_blocks
 from fogml.models.names import make_model
@@ -17,7 +17,8 @@ from fogml.models.saved import load_model, save_model
 from fogml.runs.dropouts import RULE, read_thermometer
 from fogml.runs.run import Run
 from fogml.runs.thermometer_limits import LIMITS, trained_limits
-from tests.export.test_c_code import QUICK, disturbed, needs_cc, outputs
+from tests.export.conftest import training_run
+from tests.export.test_c_code import QUICK, disturbed, fast_run, needs_cc, outputs
 
 RATE = 4.0 / 60.0
 
@@ -117,3 +118,18 @@ def test_fixed_point_stays_within_its_proven_bound(model_of, tmp_path, name, dty
     program = CProgram(source, tmp_path, flags=QUICK)
     measured = [c_difference(plan, source, program, seed).inside for seed in (0, 1)]
     assert max(measured) <= proven < factor * max(measured)
+
+
+@needs_cc
+def test_slopes_over_bins_stay_within_their_proven_bound(tmp_path):
+    model = make_model("polynomial", features="T_in, dT_in[slope, 60 s], diff(T_in)[slope, 40 s]")
+    plan = Plan.of(model.fit(training_run()), 0.05)
+    run, found = fast_run(0.05), {}
+    for dtype in ("float64", "q31"):
+        source = c_source(plan, dtype, [])
+        assert source.layout.binned
+        found[dtype], flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+    off = np.abs(found["q31"] - found["float64"])[flag == 0].max()
+    proven = fixed_point_error(plan, source.layout, "q31")
+    assert off <= proven < 100.0 * off
+    assert f"at most {proven:.3g} deg/h" in fixed_point_lines(proven)[0]

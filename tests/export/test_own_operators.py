@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.export.c_program import CProgram
+from fogml.export.c_program import CProgram, compiled_output
 from fogml.export.c_source import c_source
 from fogml.export.plan import Plan
 from fogml.features import own
-from fogml.features.own import Function, Recursion, RecursionC, declare
+from fogml.features.memories import LAG, PLAY
+from fogml.features.own import Function, Recursion, RecursionOperator, declare
 from fogml.features.parse import parse_features
+from fogml.features.traced import larger, smaller, where
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
@@ -27,6 +29,7 @@ LINE = Kernel("line", (1.0, 0.0))
 """Weights that fall with age in a straight line: those of the least-squares slope."""
 HANN = Kernel("hann", tuple(np.cos(np.linspace(0.0, np.pi, 33))))
 BEND = Function(name="bend", parameters=("x", "1"), function=lambda x, w, k: k * w * np.tanh(x / w))
+FOLD = Function(name="fold", parameters=("x",), function=lambda x, a: where(x < a, 0.5 * (a - x), abs(a - x)))
 CREEP = Recursion(
     name="creep",
     parameters=("s",),
@@ -35,32 +38,23 @@ CREEP = Recursion(
     value=lambda s, x, tau: x - s[0],
     time_constant=0,
     gain=1.0,
-    c=RecursionC("s[0] = R(0);", "s[0] = (s[0] + x - last) / (R(1) + dt / p[0]);", "x - s[0]"),
 )
 PEAK = Recursion(
     name="peak",
     start=lambda x: (x, x),
-    step=lambda s, x, last, dt: (max(s[0], x), min(s[1], x)),
+    step=lambda s, x, last, dt: (larger(s[0], x), smaller(s[1], x)),
     value=lambda s, x: s[0],
     settled=lambda s, x: s[0] - s[1] > 5.0,
     gain=1.0,
-    c=RecursionC(
-        "s[0] = x; s[1] = x;",
-        "s[0] = x > s[0] ? x : s[0]; s[1] = x < s[1] ? x : s[1];",
-        "s[0]",
-        "s[0] - s[1] > R(5)",
-    ),
 )
-TEXT = (
-    "T_in, dT_in[hann, 60 s], diff(T_out)[line, 40 s], bend(T_in, 30 degC, 2), creep(T_in-T_out, 300 s), "
-    "peak(T_out)"
-)
+OPERATORS = "T_in, bend(T_in, 30 degC, 2), fold(T_out, 15 degC), creep(T_in-T_out, 300 s), peak(T_out)"
+TEXT = f"{OPERATORS}, dT_in[hann, 60 s], diff(T_out)[line, 40 s]"
 
 
 @pytest.fixture(autouse=True, scope="module")
 def declared():
     held = dict(own._declared)
-    for operator in (LINE, HANN, BEND, CREEP, PEAK):
+    for operator in (LINE, HANN, BEND, FOLD, CREEP, PEAK):
         declare(operator)
     yield
     own._declared.clear()
@@ -87,9 +81,12 @@ def test_a_kernel_that_falls_in_a_line_is_the_least_squares_slope(jitter):
 
 
 @needs_cc
-@pytest.mark.parametrize(("dtype", "bound"), [("float64", 2e-6), ("float32", 2e-3)])
-def test_their_c_gives_what_compensate_gives(tmp_path, dtype, bound):
-    model = make_model("polynomial", features=TEXT).fit(training_run())
+@pytest.mark.parametrize(
+    ("text", "dtype", "bound"),
+    [(TEXT, "float64", 2e-6), (TEXT, "float32", 2e-3), (OPERATORS, "q31", 2e-3), (OPERATORS, "q15", 1e-2)],
+)
+def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
+    model = make_model("polynomial", features=text).fit(training_run())
     source = c_source(Plan.of(model), dtype, [])
     run = disturbed(5, jitter=0.3)
     out, flag = outputs(CProgram(source, tmp_path, flags=SANITIZERS, running=WITH_SHADOW), source, run)
@@ -112,14 +109,14 @@ def test_bins_hold_a_window_of_ones_own(tmp_path):
 
 
 def test_what_can_not_be_written_is_named():
-    silent = replace(CREEP, name="silent", c=None)
+    branching = replace(CREEP, name="branching", step=lambda s, x, last, dt, tau: (max(s[0], x),))
     step = Function(name="step", function=lambda x: np.where(x > 20.0, 1.0, 0.0))
-    declare(silent), declare(step)
+    declare(branching), declare(step)
     for text, dtype, told in (
-        ("T_in, silent(T_in, 300 s)", "float64", r"silent\(T_in, 300 s\).*`c`"),
+        ("T_in, branching(T_in, 300 s)", "float64", r"branching\(T_in, 300 s\).*larger\(a, b\)"),
         ("T_in, step(T_in)", "float64", r"step\(T_in\).*corners"),
         ("T_in, bend(T_in-T_out, 2 degC, 1)", "float64", "range of T_in-T_out"),
-        ("T_in, peak(T_in)", "q31", r"peak\(T_in\).*float32"),
+        ("T_in, creep(T_in, 1e9 s)", "q31", r"is 1e\+09.*float32"),
         ("T_in, dT_in[hann, 64 s]", "q15", "hann.*float32"),
     ):
         model = make_model("polynomial", features=text).fit(training_run())
@@ -136,3 +133,40 @@ def test_what_can_not_be_written_is_named():
 def test_columns_may_be_named_like_an_operator():
     run = Run("r", {"time": np.arange(9.0), "gyro": np.zeros(9), "peak": np.arange(9.0)})
     np.testing.assert_array_equal(parse_features("peak").transform(run)[:, 0], np.arange(9.0))
+
+
+@pytest.mark.parametrize(("declared", "given"), [(LAG, (300.0,)), (PLAY, (6.0,))])
+def test_the_quicker_way_is_the_declaration(declared, given):
+    run = disturbed(5, jitter=0.3)
+    x = run.columns["T_in"]
+    quick, settled = declared.operator(given, 2.0).push(run.time, x)
+    found, told = RecursionOperator(declared, given, 2.0).push(run.time, x)
+    np.testing.assert_allclose(found, quick, atol=1e-10)
+    np.testing.assert_array_equal(told, settled)
+
+
+def test_products_and_quotients_of_fixed_point_are_those_of_whole_numbers(tmp_path):
+    model = make_model("polynomial", features="T_in, lag(T_in, 300 s)").fit(training_run())
+    code = c_source(Plan.of(model), "q31", []).files
+    main = """#include "fogml_model.c"
+#include <stdio.h>
+int main(void)
+{
+    int64_t pair[2];
+    while (fread(pair, sizeof pair, 1, stdin) == 1) {
+        const int64_t made[2] = { times(pair[0], pair[1]), divided(pair[0], pair[1]) };
+        fwrite(made, sizeof made, 1, stdout);
+    }
+    return 0;
+}
+"""
+    rng = np.random.default_rng(1)
+    sizes = 2.0 ** rng.uniform(0.0, 57.9, (500, 2))
+    pairs = (sizes * rng.choice([-1.0, 1.0], sizes.shape)).astype(np.int64)
+    pairs[:3] = [(0, 5), (5, 0), (-5, 0)]
+    told = compiled_output({**code, "main.c": main}, "main.c", tmp_path, pairs.tobytes())
+    most = 1 << 58
+    for (a, b), (product, quotient) in zip(pairs.tolist(), np.frombuffer(told, dtype="<i8").reshape(-1, 2)):
+        assert abs(product - max(-most, min(most, a * b / 2**32))) <= 1.0 + abs(product) * 1e-15
+        exact = (a << 32) / b if b else most if a > 0 else -most if a < 0 else product + most
+        assert b == 0 or abs(quotient - max(-most, min(most, exact))) <= 1.0 + abs(quotient) * 1e-15

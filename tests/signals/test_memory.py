@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from fogml.errors import InputError
-from fogml.signals.memory import Decay, Lag, Play
+from fogml.features.memories import SINCE_ON
+from fogml.signals.memory import Lag, Play
 
 
 def test_a_lag_behind_a_ramp_is_its_rate_times_the_time_constant() -> None:
@@ -73,7 +74,7 @@ def test_a_settled_play_has_forgotten_where_it_began(path: list[float], width: f
 
 
 def test_a_decay_is_the_exponential_of_the_time_on() -> None:
-    values, settled = Decay(400.0).push(np.arange(3.0), np.array([0.0, 400.0, np.inf]))
+    values, settled = SINCE_ON.operator((400.0,), 1.0).push(np.arange(3.0), np.array([0.0, 400.0, np.inf]))
     np.testing.assert_allclose(values, [1.0, np.exp(-1.0), 0.0], rtol=1e-15)
     assert settled.all()
 
@@ -85,7 +86,7 @@ def test_pieces_give_the_very_numbers_of_the_whole(seed: int, sizes: list[int]) 
     count = sum(sizes)
     time = np.cumsum(rng.choice([1.0, 1.1, 0.9, 40.0], count, p=[0.5, 0.2, 0.28, 0.02]))
     x = np.cumsum(rng.normal(size=count))
-    for make in (lambda: Lag(20.0, 1.0), lambda: Play(1.5), lambda: Decay(30.0)):
+    for make in (lambda: Lag(20.0, 1.0), lambda: Play(1.5)):
         whole, whole_settled = make().push(time, x)
         operator, ends = make(), np.cumsum(sizes)
         pieces = [operator.push(time[end - n : end], x[end - n : end]) for n, end in zip(sizes, ends)]
@@ -93,9 +94,7 @@ def test_pieces_give_the_very_numbers_of_the_whole(seed: int, sizes: list[int]) 
         np.testing.assert_array_equal(whole_settled, np.concatenate([piece[1] for piece in pieces]))
 
 
-@pytest.mark.parametrize(
-    "make", [lambda: Lag(0.5, 1.0), lambda: Lag(np.nan, 1.0), lambda: Play(0.0), lambda: Decay(-1.0)]
-)
+@pytest.mark.parametrize("make", [lambda: Lag(0.5, 1.0), lambda: Lag(np.nan, 1.0), lambda: Play(0.0)])
 def test_sizes_that_mean_nothing_are_refused(make) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(InputError):
         make()
