@@ -145,7 +145,7 @@ def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
         total = abs(sum(weights.values()))
         if atom.operator == "since_on" and sensor in weights:
             high, low = (-atom.memory * np.log(np.clip(end, 1e-3, 1.0)) for end in ends)
-        elif atom.operator in ("value", "lag", "play") and atom.signal.is_sensor and sensor in weights:
+        elif atom.follows and atom.signal.is_sensor and sensor in weights:
             low, high = ends
         elif atom.window and atom.operator in ("d", "diff") and sensor in weights and total > 1e-9:
             seconds = atom.window.length_s or plan.sample_s

@@ -112,11 +112,10 @@ def _static(plan: Plan, column: int | None, atoms: tuple[int, ...]) -> bool:
 
 def _range(plan: Plan, sensor: str) -> tuple[float, float] | None:
     """Trained range of a column's own value, else of what follows it; None where the box tells none."""
-    for followed in (False, True):
-        for i, atom in enumerate(plan.atoms):
-            follows = _follows(atom) if followed else atom.operator == "value"
-            if follows and atom.signal.is_sensor and atom.signal.sensors == (sensor,):
-                return float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
+    following = [i for i, atom in enumerate(plan.atoms) if atom.follows and atom.signal.sensors == (sensor,)]
+    for i in sorted(following, key=lambda i: plan.atoms[i].operator != "value"):
+        if plan.atoms[i].signal.is_sensor:
+            return float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
     return None
 
 
@@ -124,7 +123,7 @@ def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     """An atom's values (n,) where nothing moves, from those of the columns that it is of, each (n,)."""
     count = len(next(iter(held.values())))
     declared = atom.declared
-    if isinstance(declared, Recursion) and not declared.follows:
+    if isinstance(declared, Recursion) and not atom.follows:
         raise InputError(
             f"export: the model takes {atom.text}, of which it is not known what it is where nothing moves; "
             "export it --to onnx or json"
@@ -135,8 +134,3 @@ def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
     if isinstance(declared, Function):
         value, _ = declared.operator(atom.given, 1.0).push(np.arange(float(count)), value)
     return np.asarray(value)
-
-
-def _follows(atom: Atom) -> bool:
-    """Whether an atom comes to its signal's value where nothing moves."""
-    return isinstance(atom.declared, Recursion) and atom.declared.follows

@@ -109,6 +109,12 @@ class Atom:
         return self.parameters or self.bounds or ((self.memory,) if self.memory else ())
 
     @property
+    def follows(self) -> bool:
+        """Whether its value is its signal's where nothing moves."""
+        declared = self.declared
+        return declared.follows if isinstance(declared, Recursion) else self.operator == "value"
+
+    @property
     def text(self) -> str:
         """Text form, e.g. ``dT[slope, 60 s]``."""
         signal = self.signal.text
