@@ -170,9 +170,10 @@ Data: the shipped thermal cycle of a **MEMS** unit (no fibre-optic gyro), 52 →
 `down`, `up` and `last down`, three axes. Each model is fitted on one leg, or on two, and judged on another.
 Averages over {ROWS_PER_AVERAGE} rows ({averaging_s:.1f} s); all in deg/h. Earth rate is not known here, so
 biases are relative to the training legs' mean, and no compensation gives the same figures as `mean`. All
-models of a line are judged on the same rows. `auto` and `mixed effects` were developed with axes x and y in
-view; axis z was looked at twice: when `auto` became a combination, and when its weights and intervals came to
-be asked of runs left out. fogml {__version__}; `python -m experiments.thermal_cycle`.
+models of a line are judged on the same rows. `auto` and `mixed effects` were developed with these legs in
+view, first x and y, then all: that a rate needs a run both ways, and that gains and skill count beyond their
+standard error, was set on the nine pairings of two legs. fogml {__version__};
+`python -m experiments.thermal_cycle`.
 
 ## In short
 
@@ -201,8 +202,10 @@ come back on another branch, so what was learned there does harm, whichever mode
 of the one leg can tell. `auto` says so in its report ("trained on temperature moving one way only"), and its
 interval is as wide as the drift then.
 
-With a leg down **and** a leg up in training, runs left out tell what a fit is worth on another run, and
-memory can be told from temperature; `down` and `last down` together are one way still.
+With a leg down **and** a leg up in training, runs left out tell what a fit is worth on another run. A shift
+from run to run looks like an effect of the direction there, so `auto` takes no simple form in the rate, and
+takes memory only where it gains on both; where neither run confirms a fit, nothing is compensated. `down` and
+`last down` together are one way still.
 """
 
 
