@@ -43,14 +43,14 @@ def export_and_write(settings: ExportJobSettings, terminal: Terminal) -> dict[st
             settings.seed,
         )
         with terminal.work(f"exporting {models[0].kind} to {settings.to}"):
+            matrix = None if settings.matrix is None else Path(settings.matrix)
             if settings.to in TABLE_TARGETS:
-                matrix = None if settings.matrix is None else Path(settings.matrix)
                 tables = TableSettings(
                     settings.to, settings.dtype, settings.breakpoints, settings.tolerance, matrix
                 )
                 report = export_tables(models, folder, tables, train)
             elif len(models) > 1:
-                report = export_axes(models, folder, wanted, train)
+                report = export_axes(models, folder, wanted, train, matrix)
             else:
                 report = export_model(models[0], folder, wanted, train)
         write_json(folder / "export.json", report)
@@ -85,17 +85,20 @@ def _check_form(settings: ExportJobSettings, models: int) -> None:
 
     of_tables = settings.to in TABLE_TARGETS
     if not of_tables and settings.to != "c" and models > 1:
-        several = ", ".join(("c", *TABLE_TARGETS))
-        raise InputError(f"--to {settings.to} takes one model; several axes go to {several}")
+        forms = ", ".join(("c", *TABLE_TARGETS))
+        raise InputError(f"--to {settings.to} takes one model; several axes go to {forms}")
     given = {
         "--bytes": settings.bytes is not None,
         "--with-pipeline": settings.with_pipeline,
         "--sample-s": settings.sample_s is not None,
     }
-    others = {"--breakpoints": settings.breakpoints is not None, "--matrix": settings.matrix is not None}
+    several = settings.to == "c" and models > 1
+    matrix = settings.matrix is not None and not several
+    others = {"--breakpoints": settings.breakpoints is not None, "--matrix": matrix}
     for name, stated in (given if of_tables else others).items():
         if stated:
-            raise InputError(f"{name} is not for --to {settings.to}; leave it out")
+            of_one = " of one axis" if name == "--matrix" and settings.to == "c" else ""
+            raise InputError(f"{name} is not for --to {settings.to}{of_one}; leave it out")
     if settings.breakpoints is not None and settings.to != "segments":
         raise InputError(f"--breakpoints is for --to segments; {settings.to} takes a cubic")
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from fogml.errors import InputError
 from fogml.escaping import CCode
-from fogml.export.c_float import sensor_identifier
+from fogml.export.c_float import literal, sensor_identifier
 from fogml.export.c_program import run_self_test, write_files
 from fogml.export.c_source import HEADER, SOURCE, templates
 from fogml.export.documentation import DOCUMENTATION_FILE
@@ -19,7 +19,7 @@ from fogml.export.export import export_model
 from fogml.export.plan import Plan
 from fogml.export.project_files import project_files
 from fogml.export.settings import SCHEMA, ExportSettings, report_tail
-from fogml.export.tables import by_axis
+from fogml.export.tables import by_axis, read_matrix
 from fogml.models.base import DriftModel
 from fogml.runs.run import Run
 
@@ -45,7 +45,11 @@ class AxisCode:
 
 
 def export_axes(
-    models: Sequence[DriftModel], folder: Path, settings: ExportSettings, train: Sequence[Run] = ()
+    models: Sequence[DriftModel],
+    folder: Path,
+    settings: ExportSettings,
+    train: Sequence[Run] = (),
+    matrix: Path | None = None,
 ) -> dict[str, Any]:
     """Write the models of two or three axes of one unit as one C file, once each has been checked alone.
 
@@ -59,6 +63,8 @@ def export_axes(
         What is wanted; ``to`` is ``c``.
     train
         Training runs of the models; may be left out.
+    matrix
+        File with a 3 x 3 matrix that takes compensated outputs to the body's axes; None for none.
 
     Returns
     -------
@@ -71,6 +77,13 @@ def export_axes(
         As `export_model`, and if the models are not of different axes of one unit.
     """
     named = by_axis(models)
+    fixed = settings.dtype in ("q15", "q31")
+    if matrix is not None and fixed:
+        raise InputError(
+            "--matrix: in fixed point each axis is a call of its own, which knows no other; use --dtype "
+            "float32 or float64"
+        )
+    rows = None if matrix is None else read_matrix(matrix, len(named)).tolist()
     reports, codes, sensors = {}, [], []
     for axis, model in named.items():
         runs = [run for run in train if run.facts.axis == axis]
@@ -81,7 +94,7 @@ def export_axes(
             inputs = Plan.of(model, settings.sample_s).sensors
             codes.append(_code_of(axis, alone, inputs))
         sensors += [name for name in inputs if name not in sensors]
-    files = axes_source(codes, sensors, fixed=settings.dtype in ("q15", "q31"), dtype=settings.dtype)
+    files = axes_source(codes, sensors, rows, fixed=fixed, dtype=settings.dtype)
     with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
         if run_self_test(files, f"{NAME}.h", f"{NAME}_self_test", f"{NAME}.c", Path(scratch)) != 0:
             raise InputError("export: the generated C of all axes fails its own self-test on this machine")
@@ -92,6 +105,7 @@ def export_axes(
         "dtype": next(iter(reports.values()))["dtype"],
         "unit": "deg/h",
         "inputs": sensors,
+        **({} if rows is None else {"matrix": rows}),
         "axes": {axis: {k: v for k, v in told.items() if k != "files"} for axis, told in reports.items()},
         **report_tail(folder),
     }
@@ -125,10 +139,17 @@ def of_axes(sensor: str) -> str:
 
 
 def axes_source(
-    codes: Sequence[AxisCode], sensors: Sequence[str], *, fixed: bool, dtype: str | None
+    codes: Sequence[AxisCode],
+    sensors: Sequence[str],
+    matrix: Sequence[Sequence[float]] | None = None,
+    *,
+    fixed: bool,
+    dtype: str | None,
 ) -> Mapping[str, str]:
     """Header and source of all axes, by file name."""
+    kind = dtype or "float32"
     context = {
+        "matrix": [", ".join(literal(value, kind) for value in row) for row in matrix or ()],
         "axes": [code.axis for code in codes],
         "codes": [CCode(code.header) for code in codes],
         "sources": [CCode(code.source) for code in codes],
@@ -136,5 +157,6 @@ def axes_source(
         "sensors": [CCode(of_axes(name)) for name in sensors],
         "fixed": fixed,
         "real": CCode("double" if dtype == "float64" else "float"),
+        "zero": literal(0.0, kind) if not fixed else "0",
     }
     return {f"{NAME}.{end}": templates().get_template(f"axes.{end}.j2").render(context) for end in ("h", "c")}

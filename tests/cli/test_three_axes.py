@@ -120,8 +120,13 @@ def test_compensate_takes_the_model_of_each_axis(home, trained, invoke, tmp_path
 def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invoke, tmp_path, monkeypatch):
     # Sizes and cycles on another machine are told of each axis alone elsewhere.
     monkeypatch.setattr("fogml.export.export.cortex_m4_size", lambda *_: None)
-    out = tmp_path / "c"
-    values = invoke_json("export", trained[0], "--dtype", "float64", "-o", out)
+    out, matrix = tmp_path / "c", np.array([[1.0, 1e-3, 0.0], [0.0, 1.0, -2e-3], [5e-4, 0.0, 0.999]])
+    (tmp_path / "matrix.yaml").write_text(json.dumps({"matrix": matrix.tolist()}))
+    by = ("--matrix", tmp_path / "matrix.yaml")
+    told = invoke("export", trained[0], "--dtype", "q31", *by, "-o", out, status=2).stderr
+    assert "each axis is a call of its own" in told
+    values = invoke_json("export", trained[0], "--dtype", "float64", *by, "-o", out)
+    assert values["matrix"] == matrix.tolist()
     assert list(values["axes"]) == list(AXES) and "fogml_axes.c" in values["files"]
     library = tmp_path / "axes.so"
     words = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
@@ -143,10 +148,10 @@ def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invo
         left.append(list(got))
         flags.append(list(flag))
     invoke("compensate", home / "b.csv", "--model", trained[0], "-o", tmp_path / "comp.csv")
-    for place, axis in enumerate(AXES):
-        table = np.genfromtxt(tmp_path / f"comp-{axis}.csv", delimiter=",", names=True)
-        np.testing.assert_array_equal(np.array(flags)[:, place], table["flag"])
-        np.testing.assert_allclose(np.array(left)[:, place], table["gyro_compensated_degh"], atol=1e-5)
+    tables = [np.genfromtxt(tmp_path / f"comp-{axis}.csv", delimiter=",", names=True) for axis in AXES]
+    np.testing.assert_array_equal(flags, np.column_stack([table["flag"] for table in tables]))
+    alone = np.column_stack([table["gyro_compensated_degh"] for table in tables])
+    np.testing.assert_allclose(left, alone @ matrix.T, atol=1e-5)
 
 
 def test_a_fleet_takes_the_axis_that_its_manifest_names(home, tmp_path):
