@@ -150,10 +150,10 @@ class Whitening:
         )
 
 
-def reading_errors(rows: Rows, constants: Mapping[str, float], white_deg_h: float) -> FloatArray:
+def reading_errors(rows: Rows, constants: Mapping[str, float], noise_deg_h: float) -> FloatArray:
     """What errors of the smoothed readings make of the replay, columns of unit priors, shape (m, k).
 
-    Those far under the white noise of the rows are left out.
+    Those far under the noise of a row given those before it, `noise_deg_h`, are left out.
     """
     told = slopes(rows, constants)
     steepest = sum(float(np.abs(slope).max()) * (2.0 if n == DELTA else 1.0) for n, slope in told.items())
@@ -162,10 +162,10 @@ def reading_errors(rows: Rows, constants: Mapping[str, float], white_deg_h: floa
         if name not in ("T", "T_in", "T_out"):
             continue
         # The waves are of length 1: none makes more than the steepest slope of it.
-        if smoothness.noise * steepest < LEAST_ERROR * white_deg_h:
+        if smoothness.noise * steepest < LEAST_ERROR * noise_deg_h:
             continue
         found = through_nominal(rows, told, {name: smoothness.errors(len(rows.kept))})
-        columns.append(found[:, np.sum(found**2, axis=0) > (LEAST_ERROR * white_deg_h) ** 2])
+        columns.append(found[:, np.sum(found**2, axis=0) > (LEAST_ERROR * noise_deg_h) ** 2])
     return np.concatenate([np.zeros((len(rows), 0)), *columns], axis=1)
 
 

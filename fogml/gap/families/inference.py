@@ -17,6 +17,7 @@ from fogml.gap.families.frame import (
     Whitening,
     fixed_columns,
     reading_errors,
+    whitener_of,
     with_form_errors,
 )
 from fogml.gap.families.linear_gaussian import LinearGaussian, Posterior, log_evidence
@@ -212,7 +213,7 @@ def _setting(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: 
     widened: dict[str, float] = {}
     for _ in range(3):
         errors = [
-            reading_errors(r, values, float(np.sqrt(noise.white_density / r.row_s)))
+            reading_errors(r, values, float(np.median(whitener_of(noise, r).deviation)))
             for r in scene.runs[: scene.fitted]
         ]
         ends = np.cumsum([0, *(e.shape[1] for e in errors)])
