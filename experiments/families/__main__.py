@@ -1,35 +1,33 @@
 """The diagnosis on development cases: every wanted figure, by reality.
 
 ``python -m experiments.families DIR...`` reads the suites in the folders, made by ``fogml blind make`` and
-answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``, and the rates that pages of
-diagnoses tell. ``record.md`` holds the figures of the diagnosis before this one on some of these cases.
+answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``. ``record.md`` holds the
+figures of the diagnosis before this one on some of these cases.
 
-With ``--calibrate`` it prints the trust and the doubt of `fogml.gap.families.priors.Priors` that what is
-listed asks for: the one monotone map between evidence and probability, fitted by likelihood.
+With ``--calibrate`` it prints the trust of `fogml.gap.families.priors.Priors` that what is listed asks for:
+the one monotone map between evidence and probability, fitted by likelihood.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize
+from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
 from experiments.gap_blind.by_reality import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
 from fogml.blind.realities import SAME_TWIN
-from fogml.blind.scoring.by_reality import ALL, by_reality
+from fogml.blind.scoring.by_reality import by_reality
 from fogml.blind.scoring.marks import Mark
-from fogml.outputs import whole_file
 from fogml.report.blind_words import figure_text, wanted_text
-from fogml.report.error_rates import ERROR_RATES, error_rates
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
@@ -43,14 +41,14 @@ def main() -> None:
     parser.add_argument("suites", type=Path, nargs="+", help="folders of blind suites")
     parser.add_argument("--answers", default=DIAGNOSIS, help="name of the answers (diagnosis)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
-    parser.add_argument("--calibrate", action="store_true", help="print trust and doubt; no page")
+    parser.add_argument("--calibrate", action="store_true", help="print the trust; no page")
     given = parser.parse_args()
     suites = [BlindFolder(path) for path in given.suites]
     marks = [x for s in suites for x in answered_marks(s, given.answers, given.workers)]
     seeds = sorted({x.truth.seed for x in marks})
     if given.calibrate:
-        trust, doubt, count = fitted_map(names_of(suites, given.answers))
-        print(f"trust {trust:.2f}, doubt {doubt:.2f}, of {count} names of seeds {seeds}")
+        trust, count = fitted_trust(names_of(suites, given.answers))
+        print(f"trust {trust:.2f}, of {count} names of seeds {seeds}")
         return
     drawn = [x for x in marks if x.truth.reality != SAME_TWIN]
     counts = Counter(x.truth.reality for x in drawn)
@@ -62,9 +60,6 @@ def main() -> None:
         "same_twin": list(same_twin(marks)),
     }
     write_results(HERE, values, page(values))
-    rates = error_rates(values["by_reality"][ALL], values["cases"], seeds, final=False)
-    with whole_file(ERROR_RATES) as partial:
-        partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
 
 
 def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, float, bool]]:
@@ -81,25 +76,22 @@ def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, f
     return found
 
 
-def fitted_map(names: Sequence[tuple[float, float, bool]]) -> tuple[float, float, int]:
-    """Trust and doubt by penalised likelihood of what was listed, and how many names that were.
+def fitted_trust(names: Sequence[tuple[float, float, bool]]) -> tuple[float, int]:
+    """Trust by penalised likelihood of what was listed, and how many names that were.
 
     Of `LAPSES` of the names nothing can be told by odds: no straight line bears one name that is false for
-    certain. The penalty holds the trust near 1 and the doubt near 0, a standard deviation of 1 and of 3,
-    where names are few.
+    certain. The penalty holds the trust near 1, a standard deviation of a factor e, where names are few.
     """
     told = np.array([(known, among) for known, among, _ in names])
     right = np.array([r for *_, r in names], dtype=bool)
 
-    def loss(given: np.ndarray) -> float:
-        trust, doubt = np.exp(given[0]), given[1]
-        chances = expit(trust * told[:, 0] - doubt) * expit(trust * told[:, 1])
+    def loss(log_trust: float) -> float:
+        chances = expit(math.exp(log_trust) * told).prod(axis=1)
         chances = 0.5 * LAPSES + (1.0 - LAPSES) * chances
-        lost = -np.log(np.where(right, chances, 1.0 - chances)).sum()
-        return float(lost + 0.5 * (given[0] ** 2 + doubt**2 / 9.0))
+        return float(-np.log(np.where(right, chances, 1.0 - chances)).sum() + 0.5 * log_trust**2)
 
-    found = minimize(loss, np.zeros(2), method="Nelder-Mead").x
-    return float(np.exp(found[0])), float(found[1]), len(right)
+    found = minimize_scalar(loss, bounds=(-4.0, 2.0), method="bounded").x
+    return math.exp(float(found)), len(right)
 
 
 def _fit_runs(marks: Sequence[Mark]) -> dict[str, int]:

@@ -31,6 +31,7 @@ from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.outputs import whole_file
 from fogml.report.blind_words import figure_text, value_text, wanted_text
+from fogml.report.error_rates import ERROR_RATES, error_rates
 from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
 
@@ -71,6 +72,10 @@ def main() -> None:
         hashes = "\n".join(one.truth for one in found)
         figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
         digest = hashlib.sha256(hashes.encode()).hexdigest()
+        own = {name: count for name, count in values["cases"].items() if name != SAME_TWIN}
+        with whole_file(ERROR_RATES) as partial:
+            rates = error_rates(values["by_reality"][ALL], own, [config["seed"]], final=True)
+            partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
         # The same figures of the same cases are no second look.
         if not any(u["truth"] == digest and u["figures"].get(given.method) == figures for u in uses(ledger)):
             record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})

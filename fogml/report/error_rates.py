@@ -1,7 +1,7 @@
 """How often a diagnosis is right: what the check on withheld effects found, told beside each diagnosis.
 
-``error_rates.json`` holds the rates. ``python -m experiments.families DIR...`` writes them of development
-cases, ``python -m experiments.gap_blind DIR --final`` of cases that nothing was developed on.
+``error_rates.json`` holds the rates: ``python -m experiments.gap_blind.by_reality DIR --final`` writes them
+of cases that nothing was developed on.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ class Cause:
     ids
         Effects that these runs don't tell from it, itself first.
     probability
-        That one of them acts, trust and doubt in it.
+        That one of them acts, as far as evidence is trusted.
     evidence
         The same by the evidence alone.
     carried
@@ -83,8 +83,7 @@ def judge(found: Inference) -> Judgement:
 
     The odds of a cause are those of all sets that hold a member of its class; where runs foretell each other
     worse with it than with the best of what is unknown in its place, less so. Forms are never quite known, so
-    that all odds count less (`Priors.trust`); and those of any known cause against something unknown are
-    doubted, since what is unknown has more forms than families of it.
+    that all odds count less (`Priors.trust`).
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
     first = sorted(found.with_others(found.explanations), key=lambda e: -e.score)
