@@ -120,7 +120,10 @@ def violated(folder: Path) -> set[str]:
     return set(re.findall(r"misra-c2012-([0-9.]+)", done.stderr))
 
 
-@pytest.mark.parametrize(("name", "dtype", "sample_s"), [("memory", "float32", 0.1), ("rich", "q15", None)])
+@pytest.mark.parametrize(
+    ("name", "dtype", "sample_s"),
+    [("memory", "float32", 0.1), ("memory", "q31", None), ("rich", "q15", None)],
+)
 def test_misra_rules_hold_save_those_listed(model_of, tmp_path, name, dtype, sample_s):
     needs("cppcheck")
     source = c_source(Plan.of(model_of(name), sample_s), dtype, [])
