@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,8 @@ from fogml.report.words import number, plural
 
 _COLUMNS = 2
 _LABELS = 24
+_LONGEST_LABEL = 16
+"""Characters of a serial number on an axis."""
 
 
 def distribution(fleet: Mapping[str, Any]) -> Drawing:
@@ -129,6 +132,8 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
         title = "constant<br>[deg/h]" if name == "1" else f"{name}<br>[deg/h per its unit]"
         figure.update_yaxes(title_text=title, title_font_size=12, tickformat=".3~g", row=row, col=column)
     serial_axis(figure, labels)
+    for row in range(1, rows):
+        figure.update_xaxes(title_text="", row=row)
     style.styled(figure, 90 + 170 * rows)
     moving = [trend["name"] for trend in found["trends"] if trend["seen"]]
     told = f"Drift over serial numbers is seen in {', '.join(moving)}." if moving else "No drift is seen."
@@ -144,15 +149,29 @@ def constants(fleet: Mapping[str, Any]) -> Drawing:
 
 
 def serial_axis(figure: go.Figure, labels: Sequence[str]) -> None:
-    """An axis of serial numbers, of which as many are written as there is room for."""
+    """An axis of serial numbers, of which as many are written as there is room for.
+
+    Of long ones what all begin with is written once, beside the axis, and of the rest the end.
+    """
     step = max(1, -(-len(labels) // _LABELS))
+    ends = min(labels, default=""), max(labels, default="")
+    shared = "".join(a for a, _ in takewhile(lambda pair: pair[0] == pair[1], zip(*ends)))
+    shared = shared.rstrip("0123456789") if len(labels) > 1 else ""
+    if max(map(len, labels), default=0) <= _LONGEST_LABEL:
+        shared = ""
+    rest = [label.removeprefix(shared) for label in labels]
+    words = [label if len(label) <= _LONGEST_LABEL else "…" + label[1 - _LONGEST_LABEL :] for label in rest]
+    if shared:
+        begins = shared if len(shared) <= 3 * _LONGEST_LABEL else shared[: 3 * _LONGEST_LABEL] + "…"
+        figure.update_xaxes(title_text=f"unit, behind {begins}")
     figure.update_xaxes(
         type="category",
         categoryorder="array",
         categoryarray=list(labels),
         tickmode="array",
         tickvals=list(labels)[::step],
-        tickangle=-60 if len(labels) > 8 else 0,
+        ticktext=words[::step],
+        tickangle=-90 if len(labels) > 8 or max(map(len, words), default=0) > _LONGEST_LABEL // 2 else 0,
     )
 
 

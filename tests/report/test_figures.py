@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import plotly.graph_objects as go
 import pytest
 
 from fogml.report.figures_compare import residuals_in_time, rms_bars
@@ -198,3 +199,23 @@ def test_a_wide_band_does_not_flatten_what_is_left() -> None:
     assert high - low < 6.0 * np.abs(run.series.after).max()
     assert "reaches beyond the panel" in drawing.caption
     assert "beyond" not in drift_in_time(run).caption
+
+
+def test_long_serial_numbers_are_written_by_where_they_differ() -> None:
+    from fogml.report.figures_fleet import serial_axis
+
+    for labels, texts, title in (
+        ([f"FOG-{n} x" for n in range(4)], ["FOG-0 x", "FOG-1 x", "FOG-2 x", "FOG-3 x"], None),
+        (
+            [f"FOG-70-A-BATCH-17-{n:04d} z" for n in range(98, 102)],
+            ["0098 z", "0099 z", "0100 z", "0101 z"],
+            "unit, behind FOG-70-A-BATCH-17-",
+        ),
+        (["A" * 40, "B" * 40], ["…" + "A" * 15, "…" + "B" * 15], None),
+        (["A" * 40], ["…" + "A" * 15], None),
+    ):
+        figure = go.Figure()
+        serial_axis(figure, labels)
+        axis = figure.layout.xaxis
+        assert list(axis.ticktext) == texts and list(axis.tickvals) == labels
+        assert axis.title.text == title
