@@ -1,4 +1,4 @@
-"""A batch of acceptance reports: yield, distribution, links, order; pages with 200 units and long names."""
+"""A batch of acceptance reports: yield, distribution, links, order."""
 
 from __future__ import annotations
 
@@ -13,10 +13,6 @@ from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.lab.acceptance_rows import QUANTITIES
 from fogml.lab.batch import batch_json, read_reports
-from fogml.report.acceptance_page import acceptance_page
-from fogml.report.batch_page import batch_page
-from fogml.report.words import number
-from tests.report.chromium import CHROMIUM, open_page
 
 SERIAL = "FOG-70-A-2026-BATCH-17-OF-THE-SECOND-LINE-{:04d}"
 LIMIT = {"from": -0.05, "to": 0.05}
@@ -126,35 +122,3 @@ def test_command(folders, tmp_path):
     sheet = openpyxl.load_workbook(tmp_path / "batch" / "batch.xlsx")["Units"]
     lines = list(sheet.iter_rows(min_row=2, values_only=True))
     assert len(lines) == 10 and lines[0][2] == "rejected"
-
-
-MEASURE = """
-<script>
-var wide = Array.from(document.querySelectorAll("main *")).filter(function (e) {
-  var block = e instanceof HTMLElement && getComputedStyle(e).display !== "inline" && e.clientWidth;
-  return block && e.scrollWidth > e.clientWidth + 1;
-}).map(function (e) { return e.tagName + "." + e.className; });
-document.title = "wide:" + wide.join(",") + " rows:" + document.querySelectorAll("tbody tr").length;
-var sort = document.querySelectorAll("th button")[2];
-if (sort) { sort.click(); sort.click();
-  document.title += " first:" + document.querySelector(".sortable tbody td.figure").textContent; }
-</script></main>
-"""
-
-
-@pytest.mark.browser
-@pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no Chromium at {CHROMIUM}")
-@pytest.mark.parametrize("kind", ["acceptance", "batch"])
-def test_nothing_is_wider_than_its_place(kind, tmp_path):
-    if kind == "batch":
-        biases = np.random.default_rng(0).normal(0, 0.03, 200).tolist()
-        reports = [(tmp_path / f"{n}.json", report(n, bias)) for n, bias in enumerate(biases)]
-        html = batch_page(batch_json(reports, tmp_path))
-    else:
-        html = acceptance_page(report(1, 0.01, runs=6))
-    page = tmp_path / "page.html"
-    page.write_text(html.replace("</main>", MEASURE), encoding="utf-8")
-    dom = open_page(page, tmp_path / "profile").dom
-    assert "<title>wide: rows:" in dom, dom[dom.index("<title>") :][:300]
-    if kind == "batch":
-        assert f"first:{number(max(biases, key=abs))} ✗" in dom

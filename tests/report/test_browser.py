@@ -1,73 +1,134 @@
-"""Pages as a browser shows them: figures drawn, silent console, no request to the outside."""
+"""Pages as a browser shows them: drawn in silence, nothing from outside, nothing cut or covered."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
 
 import pytest
 
-from tests.report.chromium import CHROMIUM, open_page, print_page
+from fogml.report.words import number
+from tests.report.chromium import CHROMIUM, Browser, Opened
+from tests.report.many_units import batch_biases, pages_of_many
 from tests.report.pages import Page, every_page
 
 pytestmark = [
     pytest.mark.browser,
     pytest.mark.skipif(not CHROMIUM.exists(), reason=f"no Chromium at {CHROMIUM}"),
 ]
-KINDS = ("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate")
 NAMED_BUTTONS = {"Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes", "Download plot"}
-pages = cache(every_page)
+KINDS = (
+    *("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate"),
+    *("acceptance", "batch", "fleet", "monitor", "monitored unit"),
+)
+LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 
 
-def written(html: str, folder: Path) -> Path:
-    page = folder / "page.html"
-    page.write_text(html, encoding="utf-8")
-    return page
+@cache
+def pages() -> dict[str, str]:
+    """Every kind of page."""
+    return every_page() | pages_of_many()
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Callable[[str], Opened]]:
+    """Opens the HTML of a page."""
+    folder = tmp_path_factory.mktemp("browser")
+    one = Browser(folder / "profile")
+
+    def open_html(html: str) -> Opened:
+        page = folder / "page.html"
+        page.write_text(html, encoding="utf-8")
+        return one.open(page)
+
+    yield open_html
+    one.close()
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_figures_are_drawn_in_silence(kind: str, tmp_path: Path) -> None:
-    html = pages()[kind]
-    opened = open_page(written(html, tmp_path), tmp_path / "profile")
-    assert opened.console == []
-    figures = len(Page(html).figures)
-    if kind == "certificate":
-        assert figures == 0 and "<svg" in opened.dom
-        return
-    assert f'data-drawn="{figures}"' in opened.dom
-    for number in range(1, figures + 1):
-        start = opened.dom.index(f'id="figure-{number}"')
-        stop = opened.dom.index(f'id="figure-{number}-data"')
-        drawing = opened.dom[start:stop]
-        assert 'class="main-svg"' in drawing
+def test_a_page_is_drawn_in_silence_and_nothing_is_cut_or_covered(browser, kind) -> None:
+    opened = browser(pages()[kind])
+    faults = [f"console: {line}" for line in opened.console]
+    for figure in opened.tell(FIGURES):
         # plotly's own choice of buttons holds one that sends the chart away.
-        assert set(re.findall(r'class="modebar-btn[^>]*data-title="([^"]+)"', drawing)) <= NAMED_BUTTONS
-        assert re.search(r'class="(js-line|point|trace bars|points)', drawing), "axes without any curve"
+        if not figure["curves"] or not set(figure["buttons"]) <= NAMED_BUTTONS:
+            faults.append(f"figure {figure}")
+    for paper in (False, True):
+        opened.on_paper(paper)
+        told = opened.tell(f"({LAYOUT})({str(paper).lower()})")
+        faults += [f"{'on paper' if paper else 'on screen'}: {fault}" for fault in told]
+    opened.close()
+    assert not faults, "\n".join(faults)
 
 
-def test_a_request_to_the_outside_would_be_noticed(tmp_path: Path) -> None:
+FIGURES = """Array.from(document.querySelectorAll(".plot")).map(function (plot) {
+  return {
+    curves: plot.querySelectorAll(".main-svg .js-line, .main-svg .point, .main-svg .trace.bars, .main-svg .points").length,
+    buttons: Array.from(plot.querySelectorAll(".modebar-btn")).map(function (e) { return e.dataset.title; })
+  };
+})"""  # noqa: E501
+
+
+def test_what_is_cut_or_covered_would_be_noticed(browser) -> None:
+    spoiled = (
+        '<p style="width:60px;overflow:hidden;white-space:nowrap">a line that is far too long for it</p>'
+        '<p style="margin:0">one</p><p style="margin:-20px 0 0 0">another</p>'
+        '<div style="width:3000px">wide</div></main>'
+    )
+    opened = browser(pages()["certificate"].replace("</main>", spoiled))
+    faults = " ".join(opened.tell(f"({LAYOUT})(false)"))
+    assert "'a line that is far too long" in faults and "'one' and 'another'" in faults
+    assert "the page is" in faults
+    opened.close()
+
+
+def test_headings_sort_and_names_lead_to_the_units_pages(browser) -> None:
+    opened = browser(pages()["batch"])
+    first = opened.tell(
+        'var head = document.querySelectorAll(".sortable th button")[2]; head.click(); head.click();'
+        'document.querySelector(".sortable tbody td.figure").textContent'
+    )
+    assert first == f"{number(max(batch_biases(), key=abs))} ✗"
+    opened.close()
+    opened = browser(pages()["fleet"])
+    links = opened.tell(
+        'document.querySelectorAll(".sortable th button")[4].click();'
+        'Array.from(document.querySelectorAll(".sortable tbody tr")).slice(0, 200).map(function (row) {'
+        ' var a = row.querySelector("a"); return a ? a.getAttribute("href") : ""; })'
+    )
+    assert len([link for link in links if link.endswith(("/report.html", "/acceptance.html"))]) == 199
+    # The one without a figure is last.
+    assert links[-1].endswith("/acceptance.html") or not links[-1]
+    opened.close()
+
+
+def test_a_request_to_the_outside_would_be_noticed(browser) -> None:
     lure = '<img src="https://example.org/x.png"><script src="http://example.org/x.js"></script>'
-    html = pages()["certificate"].replace("</main>", lure + "</main>")
-    opened = open_page(written(html, tmp_path), tmp_path / "profile")
+    opened = browser(pages()["certificate"].replace("</main>", lure + "</main>"))
     assert len([line for line in opened.console if "Content Security Policy" in line]) == 2
+    opened.close()
 
 
-def test_an_error_in_a_script_would_be_noticed(tmp_path: Path) -> None:
-    html = pages()["certificate"].replace("</main>", "<script>nothing()</script></main>")
-    opened = open_page(written(html, tmp_path), tmp_path / "profile")
+def test_an_error_in_a_script_would_be_noticed(browser) -> None:
+    opened = browser(pages()["certificate"].replace("</main>", "<script>nothing()</script></main>"))
     assert any("nothing is not defined" in line for line in opened.console)
+    opened.close()
 
 
-def test_a_certificate_prints_on_one_a4_sheet(tmp_path: Path) -> None:
-    pdf, _ = print_page(written(pages()["certificate"], tmp_path), tmp_path / "profile")
+def test_a_certificate_prints_on_one_a4_sheet(browser) -> None:
+    opened = browser(pages()["certificate"])
+    assert "<svg" in opened.tell("document.documentElement.outerHTML")
+    pdf = opened.printed()
     assert len(re.findall(rb"/Type\s*/Page[^s]", pdf)) == 1
     box = re.search(rb"/MediaBox\s*\[\s*0\s+0\s+([\d.]+)\s+([\d.]+)", pdf)
     assert box is not None
     assert [round(float(side) / 72 * 25.4) for side in box.groups()] == [210, 297]
+    opened.close()
 
 
-def test_figures_are_printed_as_wide_as_the_sheet(tmp_path: Path) -> None:
+def test_figures_are_printed_as_wide_as_the_sheet(browser) -> None:
     probe = (
         "<script>addEventListener('beforeprint', function () {"
         "document.querySelectorAll('.plot').forEach(function (plot) {"
@@ -75,5 +136,7 @@ def test_figures_are_printed_as_wide_as_the_sheet(tmp_path: Path) -> None:
         "});</script></body>"
     )
     html = pages()["train"].replace("</body>", probe)
-    _, console = print_page(written(html, tmp_path), tmp_path / "profile")
-    assert [line.split('"')[1] for line in console] == ["figure 672"] * len(Page(html).figures)
+    opened = browser(html)
+    opened.printed()
+    assert opened.console == ["figure 672"] * len(Page(html).figures)
+    opened.close()
