@@ -7,12 +7,14 @@ import io
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from random import Random
 from typing import Any
 
 from experiments.faults import mutate
 from experiments.faults import world as sound
 from experiments.faults.case import Case
+from experiments.faults.containers import FOLDER, NAMES, recording
 from experiments.faults.models import spoiled_model
 
 World = Mapping[str, bytes]
@@ -722,5 +724,6 @@ KINDS = (
     Kind("misalignment table", 4, misalignment),
     Kind("positions for north", 10, positions),
     Kind("blind suite", 3, blind_json, "suite/"),
+    *(Kind(name, 2, partial(recording, file), f"{FOLDER}/{file}") for name, (*_, file) in NAMES.items()),
 )
 """Every kind, and its share of about a thousand: what costs a whole job or a process is rarer."""

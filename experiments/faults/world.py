@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.faults.containers import FOLDER, write_recordings
 from experiments.faults.sandbox import Limits, Sandbox
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
@@ -138,6 +139,8 @@ def make_world(home: Path, *, quick: bool = False) -> dict[str, bytes]:
         ("log.txt", logger_rows(), "\t"),
     ):
         (folder / name).write_bytes(joined(rows, separator))
+    if not quick:
+        write_recordings(folder)
     manifest = "unit,job,train,test,axis\nFOG-1,train,a.csv,b.csv,x\nFOG-2,train,c.csv,b.csv,x\n"
     (folder / "fleet.csv").write_text(manifest, encoding="utf-8")
     for name, values in (("simulation.yaml", SIMULATION), ("profile.yaml", PROFILE), ("sweep.yaml", sweep())):
@@ -155,7 +158,7 @@ def make_world(home: Path, *, quick: bool = False) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))
-        if path.is_file() and path.suffix not in (".html", ".xlsx")
+        if path.is_file() and (path.suffix not in (".html", ".xlsx") or path.parent.name == FOLDER)
     }
 
 
