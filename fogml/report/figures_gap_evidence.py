@@ -87,7 +87,7 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
     room = 0.04 * (high - low)
     ticks = [t for t in _GAIN_TICKS if low - room <= _folded(t) <= high + room]
     figure.update_xaxes(
-        title_text="gain in log evidence,<br>alone [nats]",
+        title_text="log evidence gained [nats]",
         tickvals=[_folded(t) for t in ticks],
         ticktext=[str(t).replace("-", "−") for t in ticks],
         range=[low - room, high + room],
@@ -95,7 +95,7 @@ def evidence_bars(evidence: Sequence[CandidateEvidence]) -> Drawing:
         col=1,
     )
     figure.update_xaxes(
-        title_text="length at its<br>usual size [1]",
+        title_text="usual length [1]",
         row=1,
         col=2,
         **log_axis(min(1.0, *lengths), max(10.0, *lengths)),
