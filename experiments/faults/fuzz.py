@@ -16,10 +16,11 @@ from typing import Any
 
 from experiments.faults.batches import outcomes, sandbox
 from experiments.faults.case import Case
+from experiments.faults.containers import FOLDER
 from experiments.faults.independent import compare
 from experiments.faults.inputs import KINDS, Kind
 from experiments.faults.sandbox import Limits, Outcome
-from experiments.faults.world import make_world
+from experiments.faults.world import make_world, recordings_alone
 
 _SHOWN_EVERY_S = 20.0
 _MOST_KEPT = 5
@@ -71,11 +72,11 @@ def fuzz(
     limits = limits or Limits()
     began = time.monotonic()
     with tempfile.TemporaryDirectory(prefix="fogml-faults-") as name:
-        world = make_world(Path(name) / "sound", quick=quick)
-        kinds = [
-            kind for kind in KINDS
-            if any(file.startswith(kind.needs) for file in world) and (not only or kind.name in only)
-        ]  # fmt: skip
+        sound = Path(name) / "sound"
+        kinds = [kind for kind in KINDS if not only or kind.name in only]
+        alone = all(kind.needs.startswith(FOLDER) for kind in kinds)
+        world = recordings_alone(sound) if alone else make_world(sound, quick=quick)
+        kinds = [kind for kind in kinds if any(file.startswith(kind.needs) for file in world)]
         tally = Tally(limits, seed)
         do = functools.partial(_one, seed, world, kinds, limits)
         shown = began

@@ -155,6 +155,18 @@ def make_world(home: Path, *, quick: bool = False) -> dict[str, bytes]:
                     raise RuntimeError(f"fogml {' '.join(arguments)}: {status}: {stderr}")
     finally:
         os.chdir(was)
+    return _contents(folder)
+
+
+def recordings_alone(home: Path) -> dict[str, bytes]:
+    """Sound recordings by their names, without the rest of the world."""
+    folder = home / "world"
+    folder.mkdir(parents=True)
+    write_recordings(folder)
+    return _contents(folder)
+
+
+def _contents(folder: Path) -> dict[str, bytes]:
     return {
         str(path.relative_to(folder)): path.read_bytes()
         for path in sorted(folder.rglob("*"))

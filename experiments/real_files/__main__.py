@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import asdict
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 from experiments.real_files.section import Section
 from experiments.results import write_results
@@ -33,9 +35,9 @@ PARTS = {
 """Module with ``section(quick: bool) -> Section`` to what it is about, in the page's order."""
 
 
-def run_part(name: str, quick: bool) -> Section:
-    """Compute one part."""
-    found: Section = import_module(f"experiments.real_files.{name}").section(quick)
+def run_part(name: str, quick: bool, **limits: Any) -> Section:
+    """Compute one part; limits are what its ``section`` takes beside."""
+    found: Section = import_module(f"experiments.real_files.{name}").section(quick, **limits)
     return found
 
 
@@ -67,11 +69,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments.real_files", description=__doc__)
     parser.add_argument("parts", nargs="*", metavar="PART", help=", ".join(PARTS))
     parser.add_argument("--quick", action="store_true", help="few cases, to see that it runs; writes nothing")
+    parser.add_argument("--hours", type=float, default=math.inf, help="of memory: no longer logs [h]")
+    parser.add_argument("--formats", nargs="+", default=[], help="of memory: only these formats")
     options = parser.parse_args(arguments)
     if unknown := sorted(set(options.parts) - set(PARTS)):
         parser.error(f"no part '{unknown[0]}'; there are {', '.join(PARTS)}")
     for name in options.parts or PARTS:
-        part = run_part(name, options.quick)
+        limits = {"most_hours": options.hours, "formats": options.formats} if name == "memory" else {}
+        part = run_part(name, options.quick, **limits)
         if options.quick:
             print(part.markdown)
         else:
