@@ -29,6 +29,8 @@ NAMES = {
 }
 """Kind of input to the tests' writer of it, the reader, and the file's name."""
 _PACKED = (".npz", ".xlsx")
+_OF_THREE_AXES = (".ulg", ".bin", ".bag", ".db3", ".mcap")
+"""Of these the tests' recordings hold three gyros."""
 
 
 def write_recordings(folder: Path) -> None:
@@ -63,7 +65,9 @@ def recording(name: str, rng: Random, world: Mapping[str, bytes]) -> Case:
         if rng.random() < 0.2:
             metadata = mutate.text(rng, metadata.decode()).encode("utf-8", errors="replace")
         files = {place: content, "bag/metadata.yaml": metadata}
-    command = ("import", place, "--draft", "--quiet") if rng.random() < 0.2 else ("only", "read", place)
+    axis = ("--axis", "x") if suffix in _OF_THREE_AXES else ()
+    draft = rng.random() < 0.2
+    command = ("import", place, "--draft", "--quiet") if draft else ("only", "read", place, *axis)
     return Case(command, files, place)
 
 

@@ -17,6 +17,7 @@ class ReadSettings(Settings):
     job: ClassVar[str] = "experiments.faults.entries:read"
     path: Annotated[str, argument("RUN", "The run.")]
     repair: Annotated[bool, option("Repair it.", "--repair")] = False
+    axis: Annotated[str | None, option("The axis of several.", "--axis")] = None
 
 
 class LoadSettings(Settings):
@@ -40,7 +41,7 @@ def read(settings: ReadSettings, _: Any) -> None:
     """Read a run."""
     from fogml.cli.runs import open_run
 
-    open_run(settings.path, repair=settings.repair)
+    open_run(settings.path, repair=settings.repair, axis=settings.axis)
 
 
 def load(settings: LoadSettings, _: Any) -> None:
