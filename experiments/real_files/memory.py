@@ -8,8 +8,9 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from experiments.real_files import long_logs
 from experiments.real_files.section import Section, table
@@ -42,9 +43,10 @@ def section(quick: bool, most_hours: float = math.inf, formats: Sequence[str] = 
     formats
         Only these; all by default.
     """
-    rows, data = [], []
-    measured = {kind: lengths for kind, lengths in HOURS.items() if not formats or kind in formats}
-    for kind, lengths in measured.items():
+    data = []
+    for kind, lengths in HOURS.items():
+        if formats and kind not in formats:
+            continue
         for hours in sorted({min(length, most_hours) for length in lengths}):
             with tempfile.TemporaryDirectory(dir="/tmp") as folder:
                 suffix = next(reader.suffixes[0] for reader in READERS if reader.name == kind)
@@ -53,20 +55,26 @@ def section(quick: bool, most_hours: float = math.inf, formats: Sequence[str] = 
                 found = _measured(path)
             print(kind, hours, found, file=sys.stderr, flush=True)
             data.append({"format": kind, "hours": hours, **found})
-            rows.append(
-                [
-                    kind,
-                    f"{hours:.3g}",
-                    f"{found['rows']:,}",
-                    f"{found['size_mb']:.0f}",
-                    f"{found['peak_mb']:.0f}",
-                    f"{found['reader_peak_mb']:.0f}",
-                    f"{found['cpu_s']:.0f}",
-                    f"{found['error']:.1g}",
-                ]
-            )
+    return told(data)
+
+
+def told(data: Sequence[Mapping[str, Any]]) -> Section:
+    """The section of logs that were measured."""
+    rows = [
+        [
+            found["format"],
+            f"{found['hours']:.3g}",
+            f"{found['rows']:,}",
+            f"{found['size_mb']:.0f}",
+            f"{found['peak_mb']:.0f}",
+            f"{found['reader_peak_mb']:.0f}",
+            f"{found['cpu_s']:.0f}",
+            f"{found['error']:.1g}",
+        ]
+        for found in data
+    ]
+    left = [kind for kind in HOURS if kind not in {found["format"] for found in data}]
     heads = ["format", "log [h]", "rows", "file [MB]", "peak [MB]", "reader's peak [MB]", "CPU [s]", "error"]
-    left = [kind for kind in HOURS if kind not in measured]
     markdown = "\n\n".join(
         [
             "## Memory",
@@ -78,7 +86,7 @@ def section(quick: bool, most_hours: float = math.inf, formats: Sequence[str] = 
             table(heads, rows),
         ]
     )
-    return Section(markdown, {"logs": data})
+    return Section(markdown, {"logs": list(data)})
 
 
 def _measured(path: Path) -> dict[str, float]:
