@@ -153,7 +153,7 @@ def _why_again(unit: Mapping[str, Any]) -> str:
         return f"{unit['outside_training']:.0%} of the test run lie outside what was trained: train over more"
     one_way = [note for note in unit["notes"] if "moving one way only" in note]
     if one_way:
-        return "trained on temperature moving one way only: train on a run up and a run down"
+        return "trained on temperature moving one way only: train on a run that goes up and down"
     if unit["floor"] and unit["after"] > _FLOORS * unit["floor"] and unit["model"] == "mean":
         return "no model beats the mean, and what is left is far above the noise"
     return ""

@@ -112,7 +112,7 @@ class AutoModel(DriftModel):
             notes.append(
                 "trained on temperature moving one way only: temperature, its rate, time and direction "
                 f"can't be told apart, {only}and hysteresis is not seen: what holds on the way back is not "
-                "verifiable, and the interval is as wide as the drift; train on a run up and a run down"
+                "verifiable, and the interval is as wide as the drift; train on a run that goes up and down"
             )
         return notes
 

@@ -142,7 +142,7 @@ def _one_way(judgement: Judgement) -> Iterator[Reason]:
         f"Trained on temperature going {way} only: what follows temperature, its rate and time can't be told "
         f"apart, and what holds going {back} "
         + ("is not in the model, though the test run goes there." if gone_back else "was not tested either."),
-        "Train on a run up and a run down.",
+        "Train on a run that goes up and down.",
     )
 
 

@@ -61,4 +61,4 @@ def test_axis_x_is_not_to_be_used(demo):
     assert told in (out / "x" / "report.html").read_text()
     assert told in (out / "index.html").read_text()
     report = json.loads((out / "x" / "report.json").read_text())
-    assert (report["verdict"], report["next_step"]) == ("do_not_use", "Train on a run up and a run down.")
+    assert (report["verdict"], report["next_step"]) == ("do_not_use", "Train on a run that goes up and down.")
