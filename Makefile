@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 # All that the tests use but 'dataflash': its package unpacks to 93 MB, most of the time of an installation.
 EXTRAS := xlsx,tdms,mdf,ulog,ros,mcap,miniseed,sweep,cluster,export,test
+# Two workers share two cores: threads of their own would wait for each other.
+TESTED := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1
 PIP := $(BIN)/python -m pip --disable-pip-version-check
 
 .PHONY: demo test oldest newest docs lint format benchmarks clean
@@ -22,7 +24,7 @@ demo: $(READY)
 
 ## The whole test suite.
 test: $(READY)
-	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(TESTED) $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## The suite with the oldest versions that pyproject.toml allows, and with the newest there are; each in a virtual
 ## environment of its own. PYTHON=python3.13 takes another Python.
@@ -30,7 +32,7 @@ oldest newest:
 	test -x .venv-$@/bin/python || $(PYTHON) -m venv .venv-$@
 	if [ $@ = oldest ]; then $(PYTHON) .ci/oldest.py > .venv-$@/constraints.txt; else : > .venv-$@/constraints.txt; fi
 	.venv-$@/bin/python -m pip install --quiet --upgrade -c .venv-$@/constraints.txt -e '.[readers,export,sweep,cluster,test]'
-	.venv-$@/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+	$(TESTED) .venv-$@/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## The documentation as a site and as a zip, warnings as errors; both work without a network.
 docs: $(READY)
