@@ -133,7 +133,7 @@ class StoredFile:
                 f"more ({told['room']}); make room there, or let TMPDIR name another folder"
             )
         if "fault" in told:
-            raise _Fault(str(told["fault"]))
+            raise _Fault(_one_line(told["fault"]))
         return told
 
     @property
@@ -179,6 +179,11 @@ def stored_file(path: Path, kind: str, keys: Sequence[str], limits: ReadingLimit
                 stored.ask({"do": "close"})
 
 
+def _one_line(told: object) -> str:
+    """What a library says, some of it over several lines, in one."""
+    return " ".join(str(told).split())
+
+
 def _array(index: int, told: Mapping[str, Any]) -> StoredArray:
     unit = told["unit"]
     return StoredArray(
@@ -188,7 +193,7 @@ def _array(index: int, told: Mapping[str, Any]) -> StoredArray:
         str(told.get("kind", "O")),
         str(told.get("type", "")),
         tuple(int(size) for size in told.get("shape", ())),
-        told["fault"],
+        None if told["fault"] is None else _one_line(told["fault"]),
         str(told.get("group", "")),
     )
 
