@@ -20,15 +20,13 @@ from fogml.gap.model import EffectValue
 from fogml.gap.result import NAMED, Found, SeparatingRun
 from fogml.gap.separating import separating_run
 from fogml.gap.shapes import corners
-from fogml.gap.showing import showing_run
+from fogml.gap.showing import MOST_PROGRAMMES, showing_run
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
 
 MOST_MEMBERS = 4
 """Members of a class that a programme is looked for."""
-MOST_PROGRAMMES = 80
-"""Programmes that are tried, half of the time that all else takes; `fogml plan` tries 600."""
 FORMS = ("usual", "low", "high")
 """Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
 

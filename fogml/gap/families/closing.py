@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.gap.families.inference import Inference
 from fogml.gap.families.linear_gaussian import Posterior
-from fogml.gap.families.noise_points import NOISELESS, white_noise
+from fogml.gap.families.noise_points import white_noise
 from fogml.gap.families.rows import Rows
 from fogml.gap.families.search import Member
 from fogml.gap.how_far import averages
@@ -19,6 +19,7 @@ from fogml.gap.noise import UNIT_FACTOR
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
+from fogml.signals.noise_fit import NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
 AVERAGING_S = 100.0
@@ -117,7 +118,7 @@ class HeldOut:
         self.run, self.rows = run, found.setting.scene.runs[run]
         self._rng = np.random.default_rng([seed, run])
         self._windows = windows = averages(self.rows)
-        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise, found.points.prior.centre.N)
+        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise, found.points.prior)
         self._before = _square(windows.of(self.rows.gap))
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
@@ -178,9 +179,9 @@ class HeldOut:
         )
 
 
-def _own_noise(rows: Rows, model: NoiseModel, expected: float) -> tuple[NoiseModel, str]:
+def _own_noise(rows: Rows, model: NoiseModel, prior: NoisePrior) -> tuple[NoiseModel, str]:
     """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
-    own, usual = max(white_noise(rows), NOISELESS * expected), model.N
+    own, usual = white_noise(rows, prior), model.N
     # The median of second differences of m rows is told to about 1.4 over the root of m.
     chance = 3.0 * 1.4 / math.sqrt(len(rows))
     if abs(math.log(own / usual)) < max(chance, math.log(UNIT_FACTOR)):

@@ -211,11 +211,9 @@ def _setting(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: 
     constants = model.constants
     values = {c.name: c.mean for c in constants}
     widened: dict[str, float] = {}
+    noises = [float(np.median(whitener_of(noise, r).deviation)) for r in scene.runs[: scene.fitted]]
     for _ in range(3):
-        errors = [
-            reading_errors(r, values, float(np.median(whitener_of(noise, r).deviation)))
-            for r in scene.runs[: scene.fitted]
-        ]
+        errors = [reading_errors(r, values, by) for r, by in zip(scene.runs[: scene.fitted], noises)]
         ends = np.cumsum([0, *(e.shape[1] for e in errors)])
         blocks = []
         for i, r in enumerate(scene.runs):

@@ -118,14 +118,15 @@ def noise_points(
 
 def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
     """White noise as second differences of neighbouring rows show it, slow noise as expected."""
-    found = [white_noise(rows) for rows in setting.scene.runs[: setting.scene.fitted]]
-    return replace(prior.centre, N=max(float(np.median(found)), NOISELESS * prior.centre.N))
+    found = [white_noise(rows, prior) for rows in setting.scene.runs[: setting.scene.fitted]]
+    return replace(prior.centre, N=float(np.median(found)))
 
 
-def white_noise(rows: Rows) -> float:
-    """Coefficient N of one run from second differences of neighbouring rows, by their median."""
+def white_noise(rows: Rows, prior: NoisePrior) -> float:
+    """Coefficient N of one run from second differences of neighbouring rows, by median, or the least."""
     second = np.abs(np.diff(rows.gap, 2))
-    return float(np.median(second)) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
+    found = float(np.median(second)) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
+    return max(found, NOISELESS * prior.centre.N)
 
 
 def _score(setting: Setting, columns: Columns, noise: NoiseModel) -> float:
