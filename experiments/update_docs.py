@@ -18,9 +18,9 @@ SECTIONS = {
     "leakage": ("leakage/results.md", "# What a random split promises"),
     "strata": ("strata/results.md", "# `auto` beside a fit"),
     "known-floor": ("known_floor/results.md", "# Residual over a known floor"),
-    "by-reality": ("gap_blind/by_reality.md", "# The diagnosis by reality"),
-    "by-form": ("gap_blind/by_reality.md", "## Single effects by distance of form"),
-    "gap-blind": ("gap_blind/results.md", "# The diagnosis on withheld effects"),
+    "by-reality": ("gap_blind/results.md", "# The diagnosis by reality"),
+    "by-form": ("gap_blind/results.md", "## Single effects by distance of form"),
+    "gap-blind": ("gap_blind/results-before-families.md", "# The diagnosis on withheld effects"),
     "default-rates": ("default_rates/results.md", "# The default at other ramp rates"),
 }
 

@@ -1,4 +1,7 @@
-"""Diagnosis: figures of the blind suite, time of one diagnosis and its growth, and other ways to name."""
+"""Diagnosis: time of one and its growth, and other ways to name.
+
+Figures of many blind cases are those of ``python -m experiments.gap_blind``.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,6 @@ from experiments.benchmarks.needs import needs
 from experiments.benchmarks.study import Study
 from fogml.runs.run import Run
 
-SUITE = Path(__file__).parents[1] / "gap_blind" / "score.json"
 STEPS = (
     "soak at 25 degC for 1 h",
     "ramp to -40 degC at 1 degC/min",
@@ -57,17 +59,6 @@ def one_diagnosis(sample_s: float) -> float:
     begin = time.perf_counter()
     diagnose(twin, fit, [held_out], seed=1)
     return time.perf_counter() - begin
-
-
-def suite_figures() -> dict[str, Any] | None:
-    """Figures of the full blind suite, where it has been scored: method to figure to value."""
-    if not SUITE.is_file():
-        return None
-    values = json.loads(SUITE.read_text(encoding="utf-8"))
-    methods = {
-        name: {row["key"]: row["value"] for row in found["rows"]} for name, found in values["methods"].items()
-    }
-    return {"cases": values["cases"], "seed": values["seed"], "final": values["final"], "methods": methods}
 
 
 def subset(folder: Path, quick: bool) -> dict[str, Any]:
@@ -142,7 +133,6 @@ def measure(quick: bool, repeats: int, folder: Path) -> dict[str, Any]:
         "ten_hours": [one_diagnosis(30.0 if quick else 1.0) for _ in range(repeats)],
         "sizes": list(sizes),
         "seconds": [spent[size] for size in sizes],
-        "suite": suite_figures(),
         "subset": subset(folder / "blind", quick),
     }
 
@@ -185,16 +175,6 @@ def page(found: Mapping[str, Any]) -> str:
         "Runs are averaged before effects are compared, so most of the time does not grow.",
         "",
     ]
-    suite = found["suite"]
-    if suite is None:
-        lines += [
-            "The blind suite has not been scored here: `python -m experiments.gap_blind DIR` writes its "
-            "figures, and this section shows them.",
-        ]
-    else:
-        kind = "final" if suite["final"] else "development"
-        lines += [f"Blind suite, {suite['cases']} cases, {kind} seed {suite['seed']}:", ""]
-        lines += _figure_table(suite["methods"], {})
     part = found["subset"]
     lines += [
         "",

@@ -21,7 +21,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.special import expit
 
-from experiments.gap_blind.by_reality import answered_marks, same_twin, twin_lines
+from experiments.gap_blind.__main__ import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
 from fogml.blind.realities import SAME_TWIN

@@ -1,154 +1,277 @@
-"""The check on withheld effects in full: make the cases, answer them by every method, score.
+"""The diagnosis on a small suite of each reality: every wanted figure by reality, and by distance of form.
 
-``python -m experiments.gap_blind DIR`` makes, answers and scores each part of the suite in DIR/NAME, where
-DIR may be on another disk, and writes ``score.json`` and ``score.html`` of all parts into DIR. An
-interrupted call goes on where it was. With ``--final`` it uses the seed that is kept for final figures,
-records that, and writes beside itself instead: the score, and each part's marks as
-``marks-NAME.json.gz``. Reports of the worst cases lie in DIR; the page is there, too, with links to them.
-How often the diagnosis was right goes to ``fogml/report/error_rates.json``, which its pages tell.
-
-Parts may be done on different days or on machines that share nothing, each with ``--part NAME``: wherever
-one is scored, the score is made of all marks of the seed that are there. On a cluster with a shared disk:
-once ``--stage make``, then on each of n machines ``--stage run --shard i/n``, then once ``--stage score``.
+``python -m experiments.gap_blind DIR`` makes, answers and scores the parts of ``config.yaml``
+in DIR and writes ``results.json`` and ``results.md`` of all that are there; an interrupted call goes on
+where it was. Each reality alone: ``--reality NAME``; the others then stand as they were found before. With
+``--answered`` the page is of those cases alone that have an answer by now. ``--beside NAME`` has another
+method answer the same cases, for a column beside.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
-import shutil
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from fogml.blind.folders import DIAGNOSIS
-from fogml.blind.scoring.by_reality import ALL
-from fogml.blind.scoring.marks_file import MARKS, read_marks
-from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
-from fogml.cli.blind_job import (
-    make_and_tell,
-    merge_and_write,
-    run_and_tell,
-    score_and_write,
-)
-from fogml.cli.blind_reports import link_reports
+from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
+from fogml.blind.methods import BASELINES
+from fogml.blind.realities import SAME_TWIN
+from fogml.blind.score import gather, marks_of
+from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
+from fogml.blind.scoring.marks import Mark
+from fogml.blind.scoring.marks_file import MARKS, Marks, read_marks, write_marks
+from fogml.blind.scoring.statistics import proportion
+from fogml.blind.seeds import record_use, uses
+from fogml.blind.truth import read_truth
+from fogml.cli.blind import MakeSettings, RunSettings
+from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.outputs import whole_file
-from fogml.report import blind_page
+from fogml.report.blind_words import figure_text, value_text, wanted_text
 from fogml.report.error_rates import ERROR_RATES, error_rates
+from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent
-STAGES = ("make", "run", "score")
-LEDGER = str(HERE / "final_uses.json")
-PART_MARKS = "marks-{}.json.gz"
 
 
 def main() -> None:
-    """All stages of all parts, or some."""
-    config = read_yaml(HERE / "config.yaml")
-    given = _parser(part["name"] for part in config["final"]["parts"]).parse_args()
-    suite = config["final" if given.final else "development"]
-    stages = (given.stage,) if given.stage else STAGES
-    terminal = Terminal()
-    # What a final seed gave is kept beside the experiment.
-    home = HERE if given.final else Path(given.directory)
-    for part in suite["parts"]:
-        if given.part and part["name"] not in given.part:
-            continue
-        terminal.say(f"part {part['name']}")
-        _do(given, config, suite["seed"], part, stages, terminal)
-        if "score" in stages:
-            with whole_file(home / PART_MARKS.format(part["name"])) as partial:
-                shutil.copyfile(Path(given.directory) / part["name"] / MARKS, partial)
-    if "score" in stages:
-        _merge(home, suite["seed"], given.final, terminal)
-        if given.final:
-            _tell_elsewhere(home, Path(given.directory), terminal)
-
-
-def _parser(names: Any) -> argparse.ArgumentParser:
+    """Make, answer and score what is asked for; write the page of all that there is."""
+    config = dict(read_yaml(HERE / "config.yaml"))
+    choices = [*config["realities"], SAME_TWIN]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("directory", help="where the suite lies or is made")
-    parser.add_argument("--final", action="store_true", help="the seed kept for final figures")
+    parser.add_argument("directory", type=Path, help="where the suites lie or are made")
+    parser.add_argument("--reality", action="append", choices=choices, help="this one alone; may be repeated")
+    parser.add_argument("--method", default=DIAGNOSIS, help="what answers (diagnosis)")
     parser.add_argument(
-        "--part", action="append", choices=list(names), help="this part alone; may be repeated"
+        "--beside", action="append", default=[], choices=BASELINES, help="another method, too"
     )
-    parser.add_argument("--stage", choices=STAGES, help="one stage alone")
-    parser.add_argument("--shard", default="1/1", help="every n-th case from the i-th on, i/n")
+    parser.add_argument("--share", type=float, help="how much of each part (1; with --final 9)")
+    parser.add_argument("--page", action="store_true", help="the page of what is there alone")
+    parser.add_argument("--answered", action="store_true", help="the page of the cases answered by now alone")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
-    parser.add_argument("--count", type=int, help="at most so many cases of each part, to try it")
-    return parser
+    parser.add_argument("--final", action="store_true", help="the seed and numbers kept for final figures")
+    given = parser.parse_args()
+    ledger = HERE / "final_uses.json" if given.final else None
+    if given.final:
+        config |= config["final"]
+    given.share = given.share or config.get("share", 1.0)
+    for reality in () if given.page or given.answered else given.reality or choices:
+        for part in _parts(config, reality):
+            _do(given, config, reality, part, ledger)
+    found, marks = _found(given.directory, given.method)
+    if given.answered:
+        suites = [BlindFolder(path.parent) for path in sorted(given.directory.glob("*/*/cases"))]
+        marks = [mark for suite in suites for mark in answered_marks(suite, given.method, given.workers)]
+    others = {name: _found(given.directory, name)[1] for name in BASELINES}
+    values = told(marks, choices, config["seed"], given.method, given.final, others)
+    if ledger is not None:
+        hashes = "\n".join(one.truth for one in found)
+        figures = {row["key"]: row["value"] for row in values["by_reality"][ALL]}
+        digest = hashlib.sha256(hashes.encode()).hexdigest()
+        own = {name: count for name, count in values["cases"].items() if name != SAME_TWIN}
+        with whole_file(ERROR_RATES) as partial:
+            rates = error_rates(values["by_reality"][ALL], own, [config["seed"]], final=True)
+            partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
+        # The same figures of the same cases are no second look.
+        if not any(u["truth"] == digest and u["figures"].get(given.method) == figures for u in uses(ledger)):
+            record_use(ledger, config["seed"], len(marks), digest, {given.method: figures})
+    with whole_file(HERE / "results.md") as partial:
+        partial.write_text(page(values), encoding="utf-8")
+    with (HERE / "results.json").open("w", encoding="utf-8") as file:
+        json.dump(values, file, indent=1)
+        file.write("\n")
+
+
+def _found(directory: Path, method: str) -> tuple[list[Marks], list[Mark]]:
+    """The scored parts of a method, and their marks."""
+    found = [read_marks(path) for path in sorted(directory.glob(f"*/*/{method}-{MARKS}"))]
+    return found, [mark for one in found for mark in one.methods[method]]
+
+
+def answered_marks(folder: BlindFolder, method: str, workers: int = 1) -> list[Mark]:
+    """Marks of the cases of a suite that a method has answered by now, failures among them."""
+    answers = folder.answers(method)
+    names = [name for name in folder.names() if (answers / name / OUTCOME).is_file()]
+    truths = [read_truth(folder.truth / f"{name}.json") for name in names]
+    return marks_of(folder, [method], truths, workers=workers)[method] if truths else []
+
+
+def told(
+    marks: Sequence[Mark],
+    realities: Sequence[str],
+    seed: int,
+    method: str,
+    final: bool,
+    others: Mapping[str, Sequence[Mark]] | None = None,
+) -> dict[str, Any]:
+    """What ``results.json`` holds of some marks; `others` are those of other methods on the same cases."""
+    drawn = _drawn(marks)
+    asked = {(m.truth.reality, m.truth.kind, m.truth.case) for m in drawn}
+    beside = {
+        name: [m for m in _drawn(held) if (m.truth.reality, m.truth.kind, m.truth.case) in asked]
+        for name, held in (others or {}).items()
+    }
+    return {
+        "seed": seed,
+        "final": final,
+        "method": method,
+        "by_reality": by_reality(drawn),
+        "by_form": by_form(drawn),
+        "beside": {name: by_reality(held)[ALL] for name, held in beside.items() if held},
+        "same_twin": list(same_twin(marks)),
+        "cases": {name: sum(m.truth.reality == name for m in marks) for name in realities},
+    }
+
+
+def _drawn(marks: Sequence[Mark]) -> list[Mark]:
+    return [m for m in marks if m.truth.reality != SAME_TWIN]
+
+
+def _parts(config: Mapping[str, Any], reality: str) -> list[dict[str, Any]]:
+    return list(config["same_twin"] if reality == SAME_TWIN else config["parts"])
 
 
 def _do(
     given: argparse.Namespace,
     config: Mapping[str, Any],
-    seed: int,
+    reality: str,
     part: Mapping[str, Any],
-    stages: Sequence[str],
-    terminal: Terminal,
+    ledger: Path | None,
 ) -> None:
-    """The stages of one part."""
-    directory = str(Path(given.directory) / part["name"])
-    if "make" in stages:
-        keys = ("first", "kinds", "least_d_prime", "d_prime", "reality")
-        drawn = {key: part[key] for key in keys if key in part}
-        make_and_tell(
-            MakeSettings(
-                directory=directory,
-                count=min(part["count"], given.count or part["count"]),
-                seed=seed,
-                sample=config["sample"],
-                workers=given.workers,
-                **drawn,
-            ),
-            terminal,
-        )
-    if "run" in stages:
-        run_and_tell(
-            RunSettings(
-                directory=directory,
-                methods=part.get("methods", config["methods"]),
-                workers=given.workers,
-                limit=config["limit"],
-                shard=given.shard,
-            ),
-            terminal,
-        )
-    if "score" in stages:
-        settings = ScoreSettings(directory=directory, final=given.final, ledger=LEDGER, workers=given.workers)
-        score_and_write(settings, terminal)
+    """Make, answer and score one part."""
+    folder = BlindFolder(given.directory / reality / part["name"])
+    terminal = Terminal()
+    terminal.say(f"{reality}, {part['name']}")
+    drawn = {key: part[key] for key in ("kinds", "d_prime") if key in part}
+    made = MakeSettings(
+        directory=str(folder.path),
+        count=max(round(given.share * part["count"]), 1),
+        seed=config["seed"],
+        sample=part.get("sample", config["sample"]),
+        reality=reality,
+        workers=given.workers,
+        **drawn,
+    )
+    make_and_tell(made, terminal)
+    methods = [given.method, *(given.beside if reality != SAME_TWIN else [])]
+    answered = RunSettings(
+        directory=str(folder.path), methods=methods, workers=given.workers, limit=config["limit"]
+    )
+    run_and_tell(answered, terminal)
+    for name in methods:
+        marks = gather(folder, [name], ledger, workers=given.workers)
+        write_marks(folder.path / f"{name}-{MARKS}", marks)
 
 
-def _merge(home: Path, seed: int, final: bool, terminal: Terminal) -> None:
-    """One score of all marks of the seed."""
-    found = []
-    for path in sorted(home.glob(PART_MARKS.format("*"))):
-        held = read_marks(path).seed
-        if held == seed:
-            found.append(str(path))
-        else:
-            terminal.say(f"{path.name} is left out: it is of seed {held}, not {seed}")
-    merge_and_write(MergeSettings(marks=found, final=final, ledger=LEDGER, out=str(home)), terminal)
-    # The parts' own marks lie there already, and the configuration that made this one is `config.yaml`.
-    (home / MARKS).unlink()
-    (home / "score.yaml").unlink()
+def same_twin(marks: Sequence[Mark]) -> Iterator[dict[str, Any]]:
+    """Of a shipped twin's own runs, by interval: how many answers 'no gap', and what was named instead."""
+    own = [m for m in marks if m.truth.reality == SAME_TWIN]
+    for sample_s in sorted({m.truth.sample_s for m in own}):
+        here = [m for m in own if m.truth.sample_s == sample_s]
+        right = proportion([m.verdict == "no_gap" for m in here])
+        yield {
+            "sample_s": sample_s,
+            "cases": len(here),
+            "no_gap": right.value,
+            "low": right.low,
+            "high": right.high,
+            "named": sorted(item.effect for m in here for item in m.named),
+            "verdicts": sorted(m.verdict for m in here if m.verdict != "no_gap"),
+        }
 
 
-def _tell_elsewhere(home: Path, directory: Path, terminal: Terminal) -> None:
-    """The page where the cases lie, linked to their reports; error rates for pages of diagnoses."""
-    values = json.loads((home / "score.json").read_text(encoding="utf-8"))
-    if DIAGNOSIS in values["methods"]:
-        tables = values["methods"][DIAGNOSIS]["by_reality"]
-        cases = {name: max(row["cases"] for row in rows) for name, rows in tables.items() if name != ALL}
-        rates = error_rates(tables[ALL], cases, [values["seed"]], final=True)
-        with whole_file(ERROR_RATES) as partial:
-            partial.write_text(json.dumps(rates, indent=1) + "\n", encoding="utf-8")
-    link_reports(values, sorted(path.parent for path in directory.glob(f"*/{MARKS}")), directory)
-    with whole_file(directory / "score.html") as partial:
-        partial.write_text(blind_page(values), encoding="utf-8")
-    terminal.say(f"Linked to the reports of the worst cases that lie there: {directory / 'score.html'}")
+def page(values: Mapping[str, Any]) -> str:
+    """``results.md`` of what ``results.json`` holds."""
+    names = list(values["by_reality"])
+    places = range(len(values["by_reality"][names[0]]))
+    kept = "kept for final figures" if values["final"] else "one to develop on: no final figures"
+    counted = ", ".join(f"{name} {count}" for name, count in values["cases"].items())
+    return "\n".join(
+        [
+            "# The diagnosis by reality",
+            "",
+            f"Synthetic cases at 10 s, method {values['method']}, seed {values['seed']}, which is {kept}. "
+            f"Cases: {counted}. Each figure with its 95 % interval "
+            "(Wilson's for shares) and what it rests on; wanted figures ask for 400 cases each, and none "
+            "rests on as many here. Forms of the first reality lie near the catalogue's, those of the others "
+            "were drawn without asking how near. A far form that is called by its name is right; called "
+            "unknown it is a miss.",
+            "",
+            f"| figure | wanted | {' | '.join(names)} |",
+            f"|---|---:|{'---:|' * len(names)}",
+            *(_line(values["by_reality"], place, names) for place in places),
+            "",
+            *_beside_lines(values),
+            "## Single effects by distance of form",
+            "",
+            "Cosine of the true effect with the best member of the catalogue's form, whitened and beside "
+            "the nominal constants.",
+            "",
+            "| reality | cosine | d′ | cases | class right | exact | called unknown |",
+            "|---|---|---|---:|---:|---:|---:|",
+            *(_form_line(cell) for cell in values["by_form"]),
+            "",
+            *twin_lines(values["same_twin"]),
+        ]
+    )
+
+
+def _beside_lines(values: Mapping[str, Any]) -> list[str]:
+    """The section of other methods on the same cases; none where there are none."""
+    if not values.get("beside"):
+        return []
+    columns = {values["method"]: values["by_reality"][ALL], **values["beside"]}
+    places = range(len(values["by_reality"][ALL]))
+    return [
+        "## Other ways on the same cases",
+        "",
+        "All realities together. The oracle is told which effects act, and fits their catalogue's forms: "
+        "what the data allow to one who knows.",
+        "",
+        f"| figure | wanted | {' | '.join(columns)} |",
+        f"|---|---:|{'---:|' * len(columns)}",
+        *(_line(columns, place, list(columns)) for place in places),
+        "",
+    ]
+
+
+def _line(parts: Mapping[str, Sequence[Mapping[str, Any]]], place: int, names: Sequence[str]) -> str:
+    row = parts[names[0]][place]
+    cells = (parts[name][place] for name in names)
+    told = (MISSING if c["value"] is None else f"{figure_text(c)}; {c['n']}" for c in cells)
+    return f"| {row['words']} | {wanted_text(row)} | {' | '.join(told)} |"
+
+
+def _form_line(cell: Mapping[str, Any]) -> str:
+    low, high = cell["d_prime"]
+    told = (value_text(cell[key]["value"], "percent") for key in ("right", "exact", "unknown"))
+    window = f"{low:g}–{high:g}"
+    rest = f"{window} | {cell['right']['n']} | {' | '.join(told)}"
+    return f"| {cell['reality']} | {cell['form'] or MISSING} | {rest} |"
+
+
+def twin_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """The section on a shipped twin's own runs."""
+    return [
+        "## A shipped twin's own runs, diagnosed against it",
+        "",
+        "Thermometers as shipped, nothing missing: wanted is 'no gap' at every interval.",
+        "",
+        "| interval | cases | 'no gap' | named instead | other verdicts |",
+        "|---|---:|---:|---|---|",
+        *map(_twin_line, rows),
+        "",
+    ]
+
+
+def _twin_line(row: Mapping[str, Any]) -> str:
+    share = figure_text({"value": row["no_gap"], "low": row["low"], "high": row["high"], "format": "percent"})
+    named, verdicts = (", ".join(row[key]) or MISSING for key in ("named", "verdicts"))
+    return f"| {row['sample_s']:g} s | {plural(row['cases'], 'case')} | {share} | {named} | {verdicts} |"
 
 
 if __name__ == "__main__":

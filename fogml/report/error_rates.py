@@ -1,6 +1,6 @@
 """How often a diagnosis is right: what the check on withheld effects found, told beside each diagnosis.
 
-``error_rates.json`` holds the rates: ``python -m experiments.gap_blind.by_reality DIR --final`` writes them
+``error_rates.json`` holds the rates: ``python -m experiments.gap_blind DIR --final`` writes them
 of cases that nothing was developed on.
 """
 

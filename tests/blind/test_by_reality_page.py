@@ -6,13 +6,13 @@ import json
 
 import yaml
 
-from experiments.gap_blind import by_reality as experiment
+from experiments.gap_blind import __main__ as experiment
 from fogml.blind.realities import REALITIES, SAME_TWIN
 from fogml.blind.seeds import is_final
 from tests.blind.test_by_reality import MARKS, marked
 from tests.blind.test_marks import answer
 
-CONFIG = yaml.safe_load((experiment.HERE / "by_reality.yaml").read_text(encoding="utf-8"))
+CONFIG = yaml.safe_load((experiment.HERE / "config.yaml").read_text(encoding="utf-8"))
 
 
 def test_the_suites_are_of_every_reality_and_the_seeds_are_apart() -> None:

@@ -14,7 +14,7 @@ from fogml.report.words import percent
 from tests.report.diagnoses import every_diagnosis
 from tests.report.pages import Page
 
-HELD = json.loads((Path(gap_blind.__file__).parent / "by_reality.json").read_text(encoding="utf-8"))
+HELD = json.loads((Path(gap_blind.__file__).parent / "results.json").read_text(encoding="utf-8"))
 RATES = json.loads(ERROR_RATES.read_text(encoding="utf-8"))
 """What the pages tell, and the table that it is of."""
 
