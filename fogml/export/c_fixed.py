@@ -152,12 +152,13 @@ def _evaluations(plan: Plan, windows: Layout, scales: Scales) -> dict[int, str]:
             whole = f"block_value(&newest, &before, 0, 0, {HELD_BITS - bits[i]})"
             value = f"known < INT64_C({operator.needed_ticks}) ? {value} : {whole}"
         found[i] = f"told_part({value}, {operator.filling})"
-    for place, (i, operator) in enumerate(windows.of_method("slope")):
+    for place, (i, operator) in enumerate(windows.lines):
         unit_s = operator.window.length_s if operator.unit_s is None else operator.unit_s
         unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
-        divide = divide_bits(unit)
-        arguments = f"state, &SLOPE[{place}], &sums, bins, INT64_C({unit}), {divide}"
-        value = f"slope_value({arguments}, {HELD_BITS + divide - bits[i]})"
+        divide, own = divide_bits(unit), operator.window.own
+        name, weights = ("slope", "") if own is None else ("kernel", f"KERNEL_{place}, {len(own.weights)}, ")
+        arguments = f"state, &SLOPE[{place}], &sums, bins, {weights}INT64_C({unit}), {divide}"
+        value = f"{name}_value({arguments}, {HELD_BITS + divide - bits[i]})"
         found[i] = f"told_part({value}, {operator.filling})"
     for place, (i, _) in enumerate(windows.of_method("exp")):
         found[i] = f"scaled(state->exponential[{place}].rate, {24 - bits[i]})"

@@ -19,8 +19,10 @@ from fogml.features.atoms import Atom
 from fogml.features.own import Function, Recursion
 from fogml.features.traced import Symbol, Writer
 from fogml.runs.columns import is_temperature
+from fogml.signals.kernel_windows import Kernel
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
 Number = Callable[[float], str]
 CURVE_ERROR = 1e-7
 """How far a table may be from its curve, as a share of the curve's span."""
@@ -29,6 +31,8 @@ _BEYOND = 0.5
 # Spans of the trained range that a table goes on for beyond it: values there are flagged.
 _HELD_TO = 1e-3
 # As a share: what fixed point may lose of a constant.
+KERNEL_BITS = 17
+"""In fixed point a window's weights lie within 2**17 either way: their sums with temperatures fit 63 bits."""
 
 
 def fixed_number(value: float) -> str:
@@ -75,9 +79,13 @@ def own_constants(plan: Plan, windows: Layout, number: Number, real: str) -> lis
     lines = []
     for place, (_, operator) in enumerate(windows.lines):
         if operator.window.own is not None:
-            weights = ", ".join(number(weight) for weight in operator.window.own.weights)
-            size = len(operator.window.own.weights)
-            lines.append(f"static const {real} KERNEL_{place}[{size}] = {{ {weights} }}; /* by age */")
+            kernel, kind = operator.window.own, real
+            if real == "int64_t":
+                kind, weights = "int32_t", [f"INT32_C({weight})" for weight in kernel_steps(kernel).tolist()]
+            else:
+                weights = [number(weight) for weight in kernel.weights]
+            held = f"[{len(weights)}] = {{ {', '.join(weights)} }}"
+            lines.append(f"static const {kind} KERNEL_{place}{held}; /* by age */")
     for k, atom in enumerate(function_atoms(plan)):
         if _traced(atom, Writer(real, number, False)) is None:
             first, step, knots = _curve(plan, atom)
@@ -87,6 +95,13 @@ def own_constants(plan: Plan, windows: Layout, number: Number, real: str) -> lis
                 f"static const {real} CURVE_{k}[{len(knots)}][2] = {{ {rows} }};",
             ]
     return lines
+
+
+def kernel_steps(kernel: Kernel) -> IntArray:
+    """Weights for fixed point, about the middle of their range: a rate knows neither it nor scale."""
+    weights = np.array(kernel.weights)
+    low, high = weights.min(), weights.max()
+    return np.round((2.0 * weights - high - low) / (high - low) * 2.0**KERNEL_BITS).astype(np.int64)
 
 
 def function_atoms(plan: Plan) -> list[Atom]:

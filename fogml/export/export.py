@@ -156,7 +156,7 @@ def _write_c(
     proven, lines = None, [*card_lines(card, plan, dtype), *false_reading_lines(false)]
     if number_of(dtype) == "fixed":
         proven = fixed_point_error(plan, layout(plan, "fixed"), dtype)
-        lines += fixed_point_lines(proven)
+        lines += fixed_point_lines(proven, plan)
     source = c_source(plan, dtype, lines)
     with tempfile.TemporaryDirectory(prefix="fogml-export-") as scratch:
         source = source.with_expected(*expected_outputs(source, Path(scratch)))

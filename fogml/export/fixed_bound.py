@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.export.c_fixed import EXP_ERROR, weight_units
+from fogml.export.c_own import KERNEL_BITS, kernel_steps
 from fogml.export.false_readings import atom_gain
 from fogml.export.fixed_scales import (
     HELD_BITS,
@@ -30,7 +31,8 @@ from fogml.export.plan import Plan
 from fogml.features.atoms import Atom
 from fogml.features.memories import BEYOND, LAG, PLAY
 from fogml.features.traced import BITS
-from fogml.signals.clock import LEAST_SHARE, told_share
+from fogml.signals.clock import EDGE_TOLERANCE, LEAST_SHARE, told_share
+from fogml.signals.kernel_windows import Kernel
 
 FloatArray = NDArray[np.float64]
 _GYRO_DEG_H = 20.0
@@ -46,12 +48,15 @@ def fixed_point_error(plan: Plan, windows: Layout, dtype: str) -> float | None:
     """Largest difference of C in ``q31`` or ``q15`` from the plan in the trained box [deg/h], or None.
 
     For outputs up to 20 deg/h of a model with a scale factor. A direction within a rounding of its dead band
-    is not in it. Slopes over bins are bounded at even intervals, for signals whose rate stays in its trained
-    range and whose readings jump by no more than the rule of readings lets pass. None where an operator of
-    one's own computes.
+    is not in it. Slopes over bins and windows of one's own are bounded at even intervals, for signals whose
+    rate stays in its trained range and whose readings jump by no more than the rule of readings lets pass;
+    the latter where they are full. None where an operator of one's own computes, or a window of one's own
+    tells no rate of the few samples that it holds.
     """
     scales = Scales(plan, dtype)
     atoms = np.array([_atom_error(i, plan, windows, scales) for i in range(len(plan.atoms))])
+    if not np.all(np.isfinite(atoms)):
+        return None
     columns = _column_errors(plan, scales, atoms)
     unit, arrays = 0.5 * 2.0**-scales.drift, plan.arrays
     total = unit + 0.5 * 2.0**-OUTPUT_BITS
@@ -127,6 +132,11 @@ def _operator_error(atom: Atom, operator: Operator, read: float, plan: Plan, win
         binned = _FILLING * _binned_slope_error(atom, operator, plan, windows) if windows.binned else 0.0
         ages = 24.0 * 2.0**-17 * span + binned
         return gain * (read + held + 3.0 * _HELD) + ages * unit_s / length + rounding
+    if (kernel := operator.window.own) is not None:
+        unit = round(2.0**18 * unit_s / (windows.tick_s * operator.window_ticks))
+        rounding = unit * 2.0 ** -(HELD_BITS + divide_bits(unit))
+        read = read * sum(abs(weight) for _, weight in atom.signal.parts) + held
+        return _kernel_error(kernel, read, atom, operator, plan, windows) * unit_s / length + rounding
     if operator.method == "first":
         if operator.unit_s is None:
             return gain * read
@@ -143,13 +153,10 @@ def _binned_slope_error(atom: Atom, operator: Operator, plan: Plan, windows: Lay
     With n bins of weight w, ages a about their mean and deviations e from the line, a change dw of weights
     moves the slope by ``sum(dw a e)/sum(w a^2)``, at most ``3 |dw| |e|/w`` per window.
     """
-    length, i = operator.window.length_s, plan.atoms.index(atom)
-    low, high = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
-    per_window = length / (length if operator.unit_s is None else operator.unit_s)
-    jump = plan.thermometer.jump_degC * sum(abs(weight) for _, weight in atom.signal.parts)
+    length = operator.window.length_s
+    jump, varies, change = _moves(atom, operator, plan)
     count = length / (windows.bin_samples * plan.sample_s)
-    off_line = 0.25 * (high - low) * per_window + jump
-    change = max(abs(low), abs(high)) * per_window
+    off_line = 0.25 * varies + jump
     rise = 2.0 * jump + change / count
     step = 0.5 / (2.0**22 * plan.sample_s / length)
     return (
@@ -157,6 +164,51 @@ def _binned_slope_error(atom: Atom, operator: Operator, plan: Plan, windows: Lay
         + step * (rise / count + 2.0 * change / count**2)
         + 3.0 * _HELD / count
     )
+
+
+def _kernel_error(
+    kernel: Kernel, read: float, atom: Atom, operator: Operator, plan: Plan, windows: Layout
+) -> float:
+    """Bound of what a full window of one's own is off [degC per window], values held being off by `read`.
+
+    Of weights w, ages a about their mean and deviations e from the line of the rate r, errors dw, da and dx
+    move the rate by ``sum(dw e + w (r da + dx))/sum(w a)``. A bin of length A, in which weights fall by
+    F and readings rise by R, adds up to a quarter of ``F R`` and ``F A``.
+    """
+    length, step = operator.window.length_s, plan.sample_s
+    knots = kernel_steps(kernel) * 2.0**-KERNEL_BITS
+    age = np.arange(np.ceil(length / step - EDGE_TOLERANCE)) * step / length
+    weight = np.interp(age, np.linspace(0.0, 1.0, len(knots)), knots)
+    moment = -float(np.mean(weight * (age - age.mean())))
+    if moment <= 0.0:
+        return float("inf")
+    size, mean = float(np.mean(np.abs(weight))), abs(float(weight.mean()))
+    steepest = float(np.abs(np.diff(knots)).max()) * (len(knots) - 1)
+    jump, varies, change = _moves(atom, operator, plan)
+    off_line = 0.5 * varies + jump
+    tick = 1.0 / operator.window_ticks
+    placed, unit = 0.25 * tick + 2.0**-19, 2.0**-KERNEL_BITS
+    # The edge is drawn in by two ticks, by which weights are off, too.
+    weighed = unit + steepest * (placed + 2.0 * tick)
+    centred = float(np.mean(np.abs(weight - weight.mean())))
+    off = centred * read + weighed * off_line + (size + mean) * (placed * change + 0.5 * _HELD)
+    if windows.binned:
+        bins = length / (windows.bin_samples * step)
+        falls = float(np.abs(np.diff(knots)).sum()) / bins
+        shares = (0.5 + 0.5 / bins) / weight_units(windows)
+        falling = unit + steepest * (placed + 2.0**-18)
+        off += (shares * (size + 0.5 * falls) + falling) * off_line + 2.0**-35 * (change + 1.0)
+        off += 0.25 * falls * (2.0**-22 * change + 3.5 * _HELD) + 1.5 * _HELD / bins
+    return off / moment
+
+
+def _moves(atom: Atom, operator: Operator, plan: Plan) -> tuple[float, float, float]:
+    """Largest jump of readings [degC], spread and largest of the trained rates [degC per window]."""
+    i, length = plan.atoms.index(atom), operator.window.length_s
+    per_window = length / (length if operator.unit_s is None else operator.unit_s)
+    low, high = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
+    jump = plan.thermometer.jump_degC * sum(abs(weight) for _, weight in atom.signal.parts)
+    return jump, (high - low) * per_window, max(abs(low), abs(high)) * per_window
 
 
 def _span(atom: Atom, plan: Plan) -> float:
@@ -233,11 +285,14 @@ def _drawn(plan: Plan, scales: Scales, columns: FloatArray) -> tuple[FloatArray,
     return off, moved
 
 
-def fixed_point_lines(proven: float | None) -> list[str]:
+def fixed_point_lines(proven: float | None, plan: Plan) -> list[str]:
     """The proven worst case as lines of text."""
+    filling = any(atom.window is not None and atom.window.own is not None for atom in plan.atoms)
     if proven is None:
         return [
-            "worst case    of fixed point not proven, as the model takes an operator of one's own;",
+            "worst case    of fixed point not proven, as the model takes an operator of one's own, or a",
+            "              window of one's own that tells no rate of the few samples that it holds;",
             "              export.json has what was measured",
         ]
-    return [f"worst case    fixed point is at most {proven:.3g} deg/h off in the trained box, by proof"]
+    told = f"worst case    fixed point is at most {proven:.3g} deg/h off in the trained box, by proof"
+    return [told, "              where its windows of one's own are full"] if filling else [told]

@@ -189,12 +189,7 @@ def layout(plan: Plan, number: Number) -> Layout:
 
 
 def _check_held(atom: Atom, number: Number) -> None:
-    """Refuse what C code can't hold: own windows in fixed point, columns whose range it can't know."""
-    if number == "fixed" and atom.window is not None and atom.window.own is not None:
-        raise InputError(
-            f"export: the model takes {atom.text}; a window of one's own is computed in floating point: use "
-            "--dtype float32 or float64"
-        )
+    """Refuse what C code can't hold: columns whose range it can't know."""
     if all(is_temperature(name) for name in atom.signal.sensors):
         return
     if number == "fixed":

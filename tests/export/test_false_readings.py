@@ -132,4 +132,4 @@ def test_slopes_over_bins_stay_within_their_proven_bound(tmp_path):
     off = np.abs(found["q31"] - found["float64"])[flag == 0].max()
     proven = fixed_point_error(plan, source.layout, "q31")
     assert off <= proven < 100.0 * off
-    assert f"at most {proven:.3g} deg/h" in fixed_point_lines(proven)[0]
+    assert f"at most {proven:.3g} deg/h" in fixed_point_lines(proven, plan)[0]

@@ -10,6 +10,7 @@ import pytest
 from fogml.errors import InputError
 from fogml.export.c_program import CProgram, compiled_output
 from fogml.export.c_source import c_source
+from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
 from fogml.features import own
 from fogml.features.memories import LAG, PLAY
@@ -28,6 +29,7 @@ from tests.export.test_c_code import QUICK, SANITIZERS, WITH_SHADOW, disturbed, 
 LINE = Kernel("line", (1.0, 0.0))
 """Weights that fall with age in a straight line: those of the least-squares slope."""
 HANN = Kernel("hann", tuple(np.cos(np.linspace(0.0, np.pi, 33))))
+BELL = Kernel("bell", tuple(np.cos(np.linspace(0.0, 0.5 * np.pi, 20)) ** 4))
 BEND = Function(name="bend", parameters=("x", "1"), function=lambda x, w, k: k * w * np.tanh(x / w))
 FOLD = Function(name="fold", parameters=("x",), function=lambda x, a: where(x < a, 0.5 * (a - x), abs(a - x)))
 CREEP = Recursion(
@@ -54,7 +56,7 @@ TEXT = f"{OPERATORS}, dT_in[hann, 60 s], diff(T_out)[line, 40 s]"
 @pytest.fixture(autouse=True, scope="module")
 def declared():
     held = dict(own._declared)
-    for operator in (LINE, HANN, BEND, FOLD, CREEP, PEAK):
+    for operator in (LINE, HANN, BELL, BEND, FOLD, CREEP, PEAK):
         declare(operator)
     yield
     own._declared.clear()
@@ -83,7 +85,7 @@ def test_a_kernel_that_falls_in_a_line_is_the_least_squares_slope(jitter):
 @needs_cc
 @pytest.mark.parametrize(
     ("text", "dtype", "bound"),
-    [(TEXT, "float64", 2e-6), (TEXT, "float32", 2e-3), (OPERATORS, "q31", 2e-3), (OPERATORS, "q15", 1e-2)],
+    [(TEXT, "float64", 2e-6), (TEXT, "float32", 2e-3), (TEXT, "q31", 2e-3), (TEXT, "q15", 1e-2)],
 )
 def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
     model = make_model("polynomial", features=text).fit(training_run())
@@ -97,15 +99,34 @@ def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
 
 
 @needs_cc
-def test_bins_hold_a_window_of_ones_own(tmp_path):
-    model = make_model("polynomial", features="T_in, dT_in[hann, 64 s]").fit(training_run())
-    run = fast_run(0.1)
-    source = c_source(Plan.of(model, run.sample_s), "float64", [])
-    assert source.layout.binned
-    out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+@pytest.mark.parametrize("sample_s", [0.1, 2.0])
+def test_bins_and_fixed_point_hold_a_window_of_ones_own(tmp_path, sample_s):
+    text = "T_in, dT_in[hann, 64 s], diff(T_out)[bell, 40 s]"
+    model = make_model("polynomial", features=text).fit(training_run())
+    plan, run, found = Plan.of(model, sample_s), fast_run(sample_s), {}
     expected = model.compensate(run)
-    np.testing.assert_array_equal(flag, expected.flag)
-    assert np.abs(out - expected.compensated)[flag == 0].max() < 1e-4
+    for dtype in ("float64", "q31", "q15"):
+        source = c_source(plan, dtype, [])
+        assert source.layout.binned == (sample_s < 1.0)
+        out, flag = outputs(CProgram(source, tmp_path, flags=QUICK), source, run)
+        assert np.count_nonzero(flag != expected.flag) <= 2
+        found[dtype] = out[expected.flag == 0]
+    assert len(out) > len(found["q31"]) > 100
+    assert np.abs(found["float64"] - expected.compensated[expected.flag == 0]).max() < 1e-4
+    for dtype in ("q31", "q15"):
+        off = np.abs(found[dtype] - found["float64"]).max()
+        proven = fixed_point_error(plan, source.layout, dtype)
+        assert off <= proven < 30.0 * off
+        first, more = fixed_point_lines(proven, plan)
+        assert f"at most {proven:.3g} deg/h" in first and "are full" in more
+
+
+def test_what_no_rate_is_told_of_has_no_proven_bound():
+    late = declare(Kernel("late", (1.0, 1.0, 1.0, 0.0)))
+    model = make_model("polynomial", features=f"T_in, dT_in[{late.name}, 4 s]").fit(training_run())
+    plan = Plan.of(model)
+    assert fixed_point_error(plan, c_source(plan, "q31", []).layout, "q31") is None
+    assert "not proven" in fixed_point_lines(None, plan)[0]
 
 
 def test_what_can_not_be_written_is_named():
@@ -117,7 +138,6 @@ def test_what_can_not_be_written_is_named():
         ("T_in, step(T_in)", "float64", r"step\(T_in\).*corners"),
         ("T_in, bend(T_in-T_out, 2 degC, 1)", "float64", "range of T_in-T_out"),
         ("T_in, creep(T_in, 1e9 s)", "q31", r"is 1e\+09.*float32"),
-        ("T_in, dT_in[hann, 64 s]", "q15", "hann.*float32"),
     ):
         model = make_model("polynomial", features=text).fit(training_run())
         with pytest.raises(InputError, match=told):
