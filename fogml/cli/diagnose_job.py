@@ -9,6 +9,7 @@ from typing import Any
 
 from fogml.cli.diagnose import DiagnoseSettings
 from fogml.cli.diagnose_units import diagnose_several, of_several_units, print_several, write_several
+from fogml.cli.from_diagnosis import not_compensated, with_brought
 from fogml.cli.runs import open_run, open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
@@ -60,6 +61,8 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 cost_of_false_name=settings.cost_of_false_name,
                 progress=work.doing,
             )
+            work.doing("compensating")
+            found = with_brought(found, runs, held_out, noise)
             work.doing("writing")
             write_gap(folder, found)
             settings.write_into(folder, "diagnose")
@@ -126,6 +129,7 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
     if rows:
         title = f"Rms of {found.how_far[0].averaging_s:g} s averages, held out [deg/h]"
         terminal.table(title, ["run", "before", "recalibrated", "after", "floor", "closed"], rows)
+    _print_brought(found, terminal)
     if (run := found.separating_run) is not None:
         verb = "would show" if run.aim == "show" else "would tell apart"
         terminal.say(f"Next: a programme of {run.hours:.1f} h {verb} {', '.join(run.separates)}: {NEXT_RUN}")
@@ -138,3 +142,24 @@ def _print(found: Diagnosis, terminal: Terminal) -> None:
         terminal.say("No run was held out: the last stretch of the last run was kept back for the figures.")
     for name, reason in found.unusable:
         terminal.note(f"{name} not used: {reason}")
+
+
+def _print_brought(found: Diagnosis, terminal: Terminal) -> None:
+    """What a drift model made of the diagnosis brings on the held-out runs."""
+    told = found.compensation
+    if told is None:
+        return
+    if told.note:
+        terminal.say(f"What compensation would bring is not known: {told.note}")
+    if not told.held_out:
+        return
+    rows = [
+        [b.run, *(number(value) for value in (b.before, b.constants, b.after, b.floor))]
+        for b in told.held_out
+    ]
+    heads = ["run", "before", "twin's constants", "with the causes", "noise floor"]
+    terminal.table("Compensated by what a gyro knows itself, rms on held-out runs [deg/h]", heads, rows)
+    for said in not_compensated(told):
+        terminal.say(f"{said[0].upper()}{said[1:]}.")
+    if told.counted:
+        terminal.say("Such a model: fogml train RUN... --test RUN --from-diagnosis DIR")

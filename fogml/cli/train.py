@@ -28,6 +28,23 @@ class TrainSettings(options.LimitSettings):
             "--train-again/--train-once",
         ),
     ] = False
+    from_diagnosis: Annotated[
+        str | None,
+        option(
+            "Compensate the causes that a diagnosis named: its folder; 'auto' is judged beside it.",
+            metavar="DIR",
+            reads=True,
+        ),
+    ] = None
+    causes: Annotated[
+        list[str],
+        option(
+            "With --from-diagnosis these causes in place of those named; may be repeated.",
+            "--cause",
+            metavar="EFFECT",
+            known=options.EFFECTS,
+        ),
+    ] = []
     navigation: Annotated[
         float | None, option("Show what the drift costs a navigator there.", metavar="LATITUDE")
     ] = None

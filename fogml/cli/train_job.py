@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from fogml.cli.from_diagnosis import unfitted_model
 from fogml.cli.options import LimitSettings
 from fogml.cli.runs import open_runs
 from fogml.cli.terminal import Terminal, Work, number
@@ -68,9 +71,7 @@ def check_settings(settings: TrainSettings | CompareSettings) -> None:
 
         parse_features(settings.features)
     if isinstance(settings, TrainSettings):
-        from fogml.models.names import make_model
-
-        make_model(settings.model, settings.features, settings.seed, settings.parameters)
+        unfitted_model(settings)
 
 
 def split_runs(settings: TrainSettings, terminal: Terminal) -> tuple[list[Run], list[Run]]:
@@ -112,8 +113,6 @@ def fit_and_judge(
     settings: TrainSettings, train_runs: list[Run], test_runs: list[Run], terminal: Terminal
 ) -> tuple[DriftModel, Judgement]:
     """The fitted model and its judgement."""
-    from fogml.models.names import make_model
-
     notes = _seen_before(train_runs, test_runs)
     noise = noise_run(settings, terminal)
     with terminal.work(f"fitting {settings.model}") as work:
@@ -134,21 +133,34 @@ def fit_and_judge(
             model = found.model
             notes.append(found.summary())
         else:
-            unfitted = make_model(settings.model, settings.features, settings.seed, settings.parameters)
-            model = fit(unfitted, train_runs, work)
+            model = fit(unfitted_model(settings), train_runs, work)
+        others: dict[str, DriftModel] = {}
+        if settings.from_diagnosis is not None:
+            from fogml.cli.from_diagnosis import not_compensated, read_compensation
+            from fogml.models.auto import AutoModel
+
+            notes += not_compensated(read_compensation(settings.from_diagnosis), settings.causes)
+            work.doing("fitting auto beside it")
+            others["auto"] = fit(AutoModel(seed=settings.seed), train_runs, work)
         work.doing("judging")
-        judgement = judge(
-            model,
-            train_runs,
-            test_runs,
+        judging = partial(
+            judge,
+            train_runs=train_runs,
+            test_runs=test_runs,
             averaging_s=settings.averaging,
-            design_index=settings.design_index,
-            limits=settings.limits,
             turn_on_band=settings.turn_on_band,
             any_unit=settings.any_unit,
-            notes=notes,
             noise=noise,
         )
+        judgement = judging(
+            model,
+            design_index=settings.design_index,
+            limits=settings.limits,
+            beside=list(others.values()),
+            notes=notes,
+        )
+        beside = {name: judging(other, beside=[model]).test for name, other in others.items()}
+        judgement = replace(judgement, beside=beside)
     if settings.strict:
         hold_strict([(run.run, run.findings) for run in judgement.test])
     return model, judgement
@@ -219,6 +231,13 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     title = f"{judgement.model['kind']} on {'runs' if len(judgement.test) > 1 else 'the run'} not trained on"
     averaging += "; synthetic data" if synthetic else ""
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
+    if judgement.beside:
+        from fogml.report.tables import beside_table
+
+        table = beside_table(judgement)
+        assert table is not None
+        heads = [heading.lower() for heading, _, _ in table.columns]
+        terminal.table("Beside other models, rms [deg/h]", heads, [list(row.cells) for row in table.rows])
     terminal.say(own_noise_by(worst_run(judgement.test)))
     for run in judgement.test:
         for name in _TOLD_BY_SOME:

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.features import curves as curves  # declares the curves that ship
 from fogml.features.memories import MEMORY_OPERATORS
 from fogml.features.own import Function, Recursion, own_operator
 from fogml.features.signal import TIME_ON, Signal, number_text

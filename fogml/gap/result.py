@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.gap.compensation_result import Compensation
 from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehearsed, WhatIf
 from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.result_json import gap_values
@@ -255,6 +256,8 @@ class Diagnosis:
         What these runs would name of each candidate, where that was asked for.
     shares
         Of the gap's energy: of each cause in all, by run and by regime.
+    compensation
+        What of it a gyro can compensate by itself.
     """
 
     fit: tuple[str, ...]
@@ -282,6 +285,7 @@ class Diagnosis:
     headline: tuple[str, ...] = ()
     rehearsal: tuple[Rehearsed, ...] = ()
     shares: tuple[CauseShare, ...] = ()
+    compensation: Compensation | None = None
 
     @property
     def named(self) -> tuple[Found, ...]:

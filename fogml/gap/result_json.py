@@ -47,6 +47,7 @@ def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
         "headline": list(diagnosis.headline),
         "shares": [_plain(asdict(item)) for item in diagnosis.shares],
         "rehearsal": [_plain(asdict(item)) for item in diagnosis.rehearsal],
+        "compensation": None if diagnosis.compensation is None else _plain(asdict(diagnosis.compensation)),
         "assumed": list(diagnosis.assumed),
     }
 

@@ -87,6 +87,7 @@ class FeatureModel(DriftModel):
     """
 
     form: ClassVar[str] = "features"
+    tells_covariance: ClassVar[bool] = False  # a fit does so by itself
     features_: Features
 
     def __init__(
@@ -117,7 +118,7 @@ class FeatureModel(DriftModel):
         learn_box(features, [part.atoms for part in rows])
         self.features_ = features
         count = self._fit_rows(rows, features)
-        if type(self.regressor_) is LinearRegressor:
+        if type(self.regressor_) is LinearRegressor and not self.tells_covariance:
             covariance = noise_covariance(rows, features.compose, self.regressor_)
             if covariance is not None:
                 self.regressor_.covariance_ = covariance
@@ -133,8 +134,7 @@ class FeatureModel(DriftModel):
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
         """Fit the regressor to the training rows; how many rows it was fitted to."""
-        regressor = self.unfitted_regressor(len(features))
-        regressor = for_features(regressor, features, [part.atoms for part in rows])
+        regressor = for_features(self.unfitted_regressor(len(features)), features, [r.atoms for r in rows])
         if isinstance(regressor, LinearRegressor) and self.max_rows is None:
             self.regressor_ = regressor.fit_parts([_part(part, features) for part in rows])
             return row_count(rows)

@@ -47,7 +47,17 @@ FORMS: dict[str, tuple[str, tuple[str, ...] | None]] = {
     "mean": ("fogml.models.baselines:MeanModel", ("mean",)),
     "features": (
         "fogml.models.feature_model:FeatureModel",
-        ("features", "polynomial", *PRESETS, "rbf", "rbf-patent", "mixed-effects", "combination", "shared"),
+        (
+            "features",
+            "polynomial",
+            *PRESETS,
+            "rbf",
+            "rbf-patent",
+            "mixed-effects",
+            "combination",
+            "shared",
+            "causes",
+        ),
     ),
     "sklearn": ("fogml.models.sklearn_model:SklearnModel", None),
     "joint": ("fogml.models.joint:JointModel", ("joint", "joint-patent")),

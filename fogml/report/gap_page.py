@@ -70,6 +70,12 @@ def gap_page(found: Diagnosis) -> str:
         how_far=gap_tables.how_far_table(found) if found.how_far else None,
         nearest=gap_tables_ahead.nearest_table(found, names),
         what_if=gap_tables_ahead.what_if_table(found, names),
+        compensation=gap_tables_ahead.compensation_table(found, names),
+        not_compensated=[
+            f"{title_of(c.effect, names)}: {c.reason}."
+            for c in (found.compensation.causes if found.compensation else ())
+            if c.counted and not c.features
+        ],
         rehearsal=gap_tables_ahead.rehearsal_table(found.rehearsal, names),
         how_far_notes=[f"{item.run}: {item.note}." for item in found.how_far if item.note],
         runs=drawn,

@@ -9,7 +9,7 @@ from fogml.gap.result import Diagnosis
 from fogml.report.gap_words import interval_words, probability_words, title_of
 from fogml.report.shading import regime_word
 from fogml.report.tables import Row, Table
-from fogml.report.words import MISSING, number, percent
+from fogml.report.words import MISSING, averages, number, percent
 
 MOST_ROWS = 20
 _SIZES = {"usual": "usual", "found": "as found"}
@@ -136,3 +136,26 @@ def _rehearsed(r: Rehearsed, names: dict[str, str]) -> Row:
 def _worst_first(rows: Sequence[Rehearsed]) -> list[Rehearsed]:
     order = {"mistaken": 0, "missed": 1, "named": 2}
     return sorted(rows, key=lambda r: (order[r.outcome], -r.length))
+
+
+def compensation_table(found: Diagnosis, names: dict[str, str]) -> Table | None:
+    """What a drift model made of the diagnosis brings on each held-out run; None where none was fitted."""
+    told = found.compensation
+    if told is None or not told.held_out:
+        return None
+    causes = " and ".join(title_of(c.effect, names) for c in told.counted) or "no cause"
+    return Table(
+        columns=(
+            ("Run", "", "text"),
+            ("Before", "deg/h", "figure"),
+            ("The twin's constants", "deg/h", "figure"),
+            ("With the causes", "deg/h", "figure"),
+            ("Noise floor", "deg/h", "figure"),
+        ),
+        rows=tuple(
+            Row((b.run, *(number(v) for v in (b.before, b.constants, b.after, b.floor))))
+            for b in told.held_out
+        ),
+        caption=f"Rms of {averages(told.held_out[0].averaging_s)}, compensated by what the unit itself knows "
+        f"in service; causes: {causes}.",
+    )

@@ -8,7 +8,7 @@ from typing import Any
 
 from fogml.report.words import averages, label, number, percent, unit_of
 from fogml.runs.findings import Finding
-from fogml.validation.results import Metrics, Repeatability, RunJudgement
+from fogml.validation.results import Judgement, Metrics, Repeatability, RunJudgement
 
 Column = tuple[str, str, str]
 """Heading, unit, and ``text`` or ``figure``."""
@@ -133,6 +133,29 @@ def runs_table(runs: Sequence[RunJudgement], caption: str = "") -> Table:
         ),
         rows=tuple(rows),
         caption=f"{averages(runs[0].averaging_s).capitalize()}, before → after{caption}.",
+    )
+
+
+def beside_table(judgement: Judgement) -> Table | None:
+    """Rms of each test run before, by the model, by others beside it, and the floor; None without others."""
+    if not judgement.beside:
+        return None
+    rows = [
+        Row(
+            (
+                run.run,
+                *(number(v) for v in (run.before.rms, run.after.rms)),
+                *(number(others[i].after.rms) for others in judgement.beside.values()),
+                number(run.floor),
+            )
+        )
+        for i, run in enumerate(judgement.test)
+    ]
+    figures = ["before", judgement.model["kind"], *judgement.beside, "noise floor"]
+    return Table(
+        columns=(("Run", "", "text"), *((name.capitalize(), "deg/h", "figure") for name in figures)),
+        rows=tuple(rows),
+        caption=f"Rms of {averages(judgement.test[0].averaging_s)}, on the same rows.",
     )
 
 

@@ -12,6 +12,7 @@ from fogml.report.page import Drawing, Tile, render
 from fogml.report.tables import (
     Noticed,
     Table,
+    beside_table,
     candidates_table,
     coefficients_table,
     metrics_table,
@@ -79,6 +80,7 @@ def train_page(
         tiles=headline_tiles(judgement),
         sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
         test_table=runs_table(judgement.test),
+        beside=beside_table(judgement),
         repeatability=repeatability_table(judgement.repeatability),
         unseen=unseen(judgement),
         train_table=runs_table(

@@ -57,6 +57,10 @@ def _body(judgement: Judgement) -> dict[str, Any]:
     advice = advice_on(judgement)
     values |= {"verdict": advice.grade, "reasons": list(advice.reasons), "next_step": advice.next_step}
     values["notes"] = list(judgement.notes)
+    if judgement.beside:
+        values["beside"] = {
+            name: {"test": [_run(run) for run in runs]} for name, runs in judgement.beside.items()
+        }
     return values
 
 

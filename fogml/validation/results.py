@@ -154,6 +154,8 @@ class Judgement:
     limits: tuple[LimitOutcome, ...] = ()
     notes: tuple[str, ...] = field(default=())
     repeatability: Repeatability | None = None
+    beside: Mapping[str, tuple[RunJudgement, ...]] = field(default_factory=dict)
+    """Other models on the same test runs, by name."""
 
     @property
     def met(self) -> bool:

@@ -11,6 +11,7 @@ from fogml.errors import InputError
 from fogml.gap.families.ahead import next_run, rehearse
 from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause
 from fogml.gap.families.closing import Foretold, HeldOut
+from fogml.gap.families.compensable import compensation_of
 from fogml.gap.families.inference import Inference, Progress, infer
 from fogml.gap.families.left_out import doubted
 from fogml.gap.families.own_simulator import candidates_of
@@ -214,6 +215,7 @@ def _answer(
         what_if=what_if,
         nearest=nearest,
         shares=shares,
+        compensation=compensation_of(found, judged.causes, named),
         headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments),
     )
 

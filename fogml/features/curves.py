@@ -1,0 +1,104 @@
+"""Curves of a temperature that known causes follow: waves of interference, and where a polymer turns.
+
+Declared as operators of one's own are (`fogml.features.own`), in arithmetic that becomes C.
+
+- ``sine(x, 8 degC)``, ``cosine(x, 8 degC)``: waves over x of that period, from x = 0 on.
+- ``late_sine(x, 8 degC, 600 s)``, ``late_cosine(...)``: the same of x behind a first-order lag, for optics
+  whose temperature no sensor tells.
+- ``transition(x, 40 degC, 5 degC)``: tanh((x - 40)/5), the step at a glass transition.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fogml.features.memories import LAG
+from fogml.features.own import BoolArray, FloatArray, Function, Recursion, State, declare
+from fogml.features.traced import decayed, where
+from fogml.signals.memory import Lag
+
+_QUARTER = (
+    1.5707963266218774,
+    -0.6459640926526784,
+    0.07969258733490203,
+    -0.004681620350456384,
+    0.000160217245958022,
+    -3.418212898537165e-06,
+)
+# sin(pi w / 2) = w (c0 + c1 w^2 + ...) for |w| <= 1 to 1.4e-11, all of which 2**-32 holds.
+_MOST_TURNS = 8
+# Turns up to 2**8 either way are brought back to one: 1.5 degC over 300 degC.
+
+
+def sine_of_turns(u: Any) -> Any:
+    """sin(2 pi u) for u up to 383 turns either way."""
+    for k in range(_MOST_TURNS, -1, -1):
+        turn, half = 2.0**k, 2.0 ** (k - 1)
+        u = where(u > half, u - turn, where(u < -half, u + turn, u))
+    w = 4.0 * where(u > 0.25, 0.5 - u, where(u < -0.25, -0.5 - u, u))
+    square = w * w
+    total: Any = _QUARTER[-1]
+    for coefficient in _QUARTER[-2::-1]:
+        total = total * square + coefficient
+    return total * w
+
+
+def sine(x: Any, period: float) -> Any:
+    """A wave over x, 0 and rising at 0."""
+    return sine_of_turns(x * (1.0 / period))
+
+
+def cosine(x: Any, period: float) -> Any:
+    """A wave over x, 1 at 0."""
+    return sine_of_turns(x * (1.0 / period) + 0.25)
+
+
+def transition(x: Any, centre: float, width: float) -> Any:
+    """tanh((x - centre) / width)."""
+    y = (x - centre) * (1.0 / width)
+    gone = decayed(where(y < 0.0, -2.0 * y, 2.0 * y))
+    size = (1.0 - gone) / (1.0 + gone)
+    return where(y < 0.0, -size, size)
+
+
+class LateWave:
+    """A wave over a signal behind a first-order lag, for whole recordings."""
+
+    def __init__(self, wave: Any, period: float, time_constant_s: float, sample_s: float) -> None:
+        self._wave, self._period, self._lag = wave, period, Lag(time_constant_s, sample_s)
+
+    def push(self, time: FloatArray, x: FloatArray) -> tuple[FloatArray, BoolArray]:
+        """Values at the next samples, and where they are settled; both of shape (n,)."""
+        late, settled = self._lag.push(time, x)
+        return np.asarray(self._wave(late, self._period)), settled
+
+
+def _late(name: str, wave: Any) -> Recursion:
+    def step(s: State, x: float, last: float, dt: float, period: float, tau: float) -> State:
+        return LAG.step(s, x, last, dt, tau)
+
+    return Recursion(
+        name=name,
+        parameters=("x", "s"),
+        unit="",
+        start=lambda x, period, tau: (0.0,),
+        step=step,
+        value=lambda s, x, period, tau: wave(x - s[0], period),
+        time_constant=1,
+        operations=72,
+        quicker=lambda period, tau, sample_s: LateWave(wave, period, tau, sample_s),
+    )
+
+
+CURVES = (
+    Function(name="sine", parameters=("x",), unit="", function=sine, operations=66),
+    Function(name="cosine", parameters=("x",), unit="", function=cosine, operations=67),
+    Function(name="transition", parameters=("x", "x"), unit="", function=transition, operations=30),
+    _late("late_sine", sine),
+    _late("late_cosine", cosine),
+)
+"""The curves that ship."""
+for _curve in CURVES:
+    declare(_curve)
