@@ -28,15 +28,15 @@ def check_suits(features: Features, runs: Sequence[Run]) -> None:
         half width that is beyond the recorded range.
     """
     for atom in features.atoms:
-        told = _unsuited(atom, runs)
+        told = unsuited(atom, runs)
         if told is not None:
             at = features.text.index(atom.text)
             message, hint = told
             raise InputError(f"{message}\n  {features.text}\n  {' ' * at}^\n{hint}")
 
 
-def _unsuited(atom: Atom, runs: Sequence[Run]) -> tuple[str, str] | None:
-    """What is wrong with an atom, and what to do."""
+def unsuited(atom: Atom, runs: Sequence[Run]) -> tuple[str, str] | None:
+    """What is wrong with an atom for training runs, and what to do; None where they suit it."""
     if atom.operator in ("lag", "since_on"):
         longest = max(float(run.time[-1] - run.time[0]) for run in runs)
         coarsest = max(runs, key=lambda run: run.sample_s)

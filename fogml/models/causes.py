@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.grammar import parse_terms
+from fogml.features.signal import check_holds
+from fogml.features.suits import unsuited
 from fogml.features.terms import Term
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
@@ -72,8 +74,15 @@ class CauseModel(FeatureModel):
         return grouped
 
     def _chosen_features(self, runs: Sequence[Run]) -> Features:
+        """All features but those of causes that the runs can tell nothing of, such as too long lags."""
         assert isinstance(self.features, str)
-        return resolve_features(self.features, runs)
+        grouped = self._grouped()
+        for run in runs:
+            check_holds(
+                run, {name for t in grouped for a in t.atoms for name in a.signal.sensors}, self.features
+            )
+        suited = [t for t, g in grouped.items() if not g or not any(unsuited(a, runs) for a in t.atoms)]
+        return resolve_features(", ".join(term.text for term in suited), runs)
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
         table = table_of_rows(rows, features.compose, self.max_rows)

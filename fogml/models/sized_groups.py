@@ -10,6 +10,7 @@ group costs what it is not needed for, and one that the rows do not confirm goes
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -97,7 +98,7 @@ class GroupedRows:
         """Prior standard deviation of each scaled coefficient."""
         sd = np.zeros(len(self._fits))
         for members, length in zip(self._members, lengths):
-            sd[members] = length / np.sqrt(max(np.count_nonzero(self._unit[members]), 1))
+            sd[members] = length / math.sqrt(max(int(np.count_nonzero(self._unit[members])), 1))
         return sd
 
     def log_evidence(self, lengths: Sequence[float]) -> float:

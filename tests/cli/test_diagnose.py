@@ -337,3 +337,33 @@ def test_without_an_effect_it_is_not_named_and_nothing_held_out_is_said(one_usab
 def test_the_written_settings_repeat_the_diagnosis(one_usable, tmp_path, invoke):
     invoke("diagnose", "--config", one_usable / "diagnose.config.yaml", "--out", tmp_path / "again")
     assert (tmp_path / "again" / "gap.json").read_bytes() == (one_usable / "gap.json").read_bytes()
+
+
+def test_a_found_cause_is_compensated(runs, diagnosed, gap, tmp_path, monkeypatch):
+    """``train --from-diagnosis`` gives on the held-out run what the diagnosis said, beside another model."""
+    from fogml.models.names import make_model
+
+    monkeypatch.setattr("fogml.models.auto.AutoModel", lambda seed: make_model("polynomial"))
+    (told,) = gap["compensation"]["held_out"]
+    assert told["after"] < 0.6 * told["constants"] < told["before"]
+    given = ["train", runs["a"], runs["b"], "--test", runs["c"], "--from-diagnosis", diagnosed]
+    printed = run_program(*given, "--out", tmp_path / "out")
+    report = json.loads((tmp_path / "out" / "report.json").read_text())
+    assert report["test"][0]["after"]["rms"] == pytest.approx(told["after"], rel=1e-6)
+    assert report["model"]["causes"].keys() == {"thermal_hysteresis"}
+    assert report["beside"]["auto"]["test"][0]["rows_used"] == report["test"][0]["rows_used"]
+    assert "Beside other models" in printed.stdout
+    run_program("export", tmp_path / "out", "--to", "json", "-o", tmp_path / "json")
+
+
+def test_a_diagnosis_that_makes_no_model_is_told(runs, diagnosed, tmp_path):
+    given = ["train", runs["a"], "--test", runs["c"], "--out", tmp_path / "out", "--from-diagnosis"]
+    for more, told in (
+        ([diagnosed, "--cause", "ageing"], "can't be compensated: it goes with the unit's own days"),
+        ([diagnosed, "--cause", "nothing"], "no candidate of that diagnosis"),
+        ([diagnosed, "--model", "rbf"], "the diagnosis makes the model"),
+        ([diagnosed, "--features", "T"], "--features: the diagnosis makes the model"),
+        ([tmp_path], "gap.json"),
+    ):
+        assert told in run_program(*given, *more, status=2).stderr
+    assert "of which diagnosis" in run_program(*given[:-1], "--cause", "ageing", status=2).stderr
