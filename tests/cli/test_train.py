@@ -164,7 +164,7 @@ def test_an_unknown_key_in_the_configuration(invoke, run_files, tmp_path):
     assert result.stderr == (
         "fogml: mine.yaml: unknown key 'modle'; did you mean 'model'? known keys are seed, averaging, "
         "design_index, limits, turn_on_band, noise, runs, test, model, features, parameters, train_again, "
-        "navigation, axis, repair, strict, any_unit, out\n"
+        "from_diagnosis, causes, navigation, axis, repair, strict, any_unit, out\n"
     )
     assert not (tmp_path / "out").exists()
 
