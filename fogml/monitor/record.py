@@ -14,6 +14,7 @@ from fogml.errors import InputError
 from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
+from fogml.monitor.figures import Averages, run_figures
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
@@ -26,11 +27,8 @@ FIGURES = {
     "scale_factor": "ppm",
 }
 """Figures of what a model leaves on a run, with their units."""
-LEAST_WINDOWS = 10
-"""Averages that figures of a run need: seven beyond the three coefficients."""
-LEAST_SHARE_OF_TRAINED = 0.5
-"""Part of the trained range that a temperature or its rate has to move through to tell a slope: what moves
-less tells it so much worse than other runs that it would hide them."""
+LEAST_WINDOWS = 16
+"""Averages that a run needs: as many as a fit of its noise does."""
 
 
 @dataclass(frozen=True)
@@ -66,14 +64,17 @@ class RunRecord:
     averaging_s
         Averaging time of the figures [s].
     level
-        Mean of what is left [deg/h].
+        What is left in the middle of the trained temperatures at rest [deg/h]; of the run's where the model
+        has no such range. By generalised least squares under the run's own noise.
     temperature_slope, rate_slope
-        Its slopes against temperature [deg/h/degC] and rate of temperature [deg/h/(degC/min)], fitted
-        together; NaN where the run moves through less than half of what the model was trained on.
+        Slopes of what is left against temperature [deg/h/degC] and rate of temperature [deg/h/(degC/min)],
+        fitted together; NaN where the run tells them less well than the model states them.
     scatter
-        Natural logarithm of the standard deviation of averages about these slopes [ln(deg/h)].
+        Natural logarithm of the deviation of an average from what those before it foretell [ln(deg/h)].
     scale_factor
         Error of the scale factor by the turns [ppm]; NaN where the table does not turn.
+    level_se, temperature_slope_se, rate_slope_se, scatter_se, scale_factor_se
+        How well the run tells each: standard error in its unit, the noise being estimated from the same run.
     """
 
     key: str
@@ -94,6 +95,11 @@ class RunRecord:
     rate_slope: float
     scatter: float
     scale_factor: float
+    level_se: float
+    temperature_slope_se: float
+    rate_slope_se: float
+    scatter_se: float
+    scale_factor_se: float
 
     @property
     def label(self) -> str:
@@ -136,7 +142,8 @@ def record_run(
         for name, values in block.columns.items():
             columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
         moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
-        kept = evaluation.full & evaluation.settled
+        # Outside training the model states nothing that could change.
+        kept = evaluation.full & evaluation.settled & ~evaluation.outside
         if moving.any():
             kept &= ~transition_mask(block)
         half = model.intervals_.half_width(0.9, evaluation.excess)
@@ -144,7 +151,7 @@ def record_run(
             block.time,
             kept,
             left=block.error_deg_h - (0.0 if block.facts.compensated else evaluation.drift),
-            temperature=block.temperature(),
+            temperature=block.temperature() if block.sensors() else np.zeros(len(block)),
             reference=block.reference_deg_h,
             half=half,
             moving=moving.astype(np.float64),
@@ -159,8 +166,10 @@ def record_run(
     used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(time), dtype=bool)
     if used.sum() < LEAST_WINDOWS:
         raise InputError(
-            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
-            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
+            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full, "
+            f"inside what the model was trained on ({outside / samples:.0%} of the samples lie outside); "
+            f"{LEAST_WINDOWS} are needed to tell what the model leaves: record longer, set --averaging, or "
+            "train on such temperatures"
         )
     facts = first.facts
     digest = hashlib.sha256()
@@ -169,9 +178,18 @@ def record_run(
         digest.update(f"{text}\0".encode())
     for name in sorted(columns):
         digest.update(f"{name}\0{columns[name].hexdigest()}".encode())
-    left, half = mean["left"][used], mean["half"][used]
-    level, temperature_slope, rate_slope, scatter = _slopes(
-        model, time[used], left, mean["temperature"][used], averaging_s
+    half = mean["half"][used]
+    told = run_figures(
+        Averages(
+            time,
+            mean["left"],
+            mean["temperature"],
+            mean["reference"],
+            used,
+            moving=~rest,
+            averaging_s=averaging_s,
+        ),
+        model,
     )
     return RunRecord(
         key=digest.hexdigest(),
@@ -184,53 +202,13 @@ def record_run(
         span_s=last_s - float(first.time[0]),
         samples=float(samples),
         outside_training=outside / samples,
-        beyond_interval=float(np.mean(np.abs(left) > half)) if first.earth_known else float("nan"),
+        beyond_interval=float(np.mean(np.abs(mean["left"][used]) > half))
+        if first.earth_known
+        else float("nan"),
         half_width=float(half.mean()),
         averaging_s=averaging_s,
-        level=level,
-        temperature_slope=temperature_slope,
-        rate_slope=rate_slope,
-        scatter=scatter,
-        scale_factor=_scale_factor(mean["left"][~rest], mean["reference"][~rest]),
+        **told,
     )
-
-
-def _slopes(
-    model: DriftModel, time: FloatArray, left: FloatArray, temperature: FloatArray, averaging_s: float
-) -> tuple[float, float, float, float]:
-    """Level, slopes and scatter of m averages."""
-    rate = _rate(time, temperature, averaging_s)
-    columns = [np.ones(len(time))]
-    told = []
-    for name, values in (("T", temperature), ("dT", rate)):
-        low, high = model.card_.box.get(name, (np.nan, np.nan))
-        moves = bool(np.ptp(values) > 0.0 and not np.ptp(values) < LEAST_SHARE_OF_TRAINED * (high - low))
-        told.append(moves)
-        if moves:
-            columns.append(values - values.mean())
-    design = np.stack(columns, axis=1)
-    coefficients, _, rank, _ = np.linalg.lstsq(design, left, rcond=None)
-    free = len(left) - int(rank)
-    scatter = float(np.linalg.norm(left - design @ coefficients)) / np.sqrt(max(free, 1))
-    slopes = iter(coefficients[1:].tolist())
-    found = [next(slopes) if moves else float("nan") for moves in told]
-    return float(left.mean()), found[0], found[1], float(np.log(scatter)) if scatter > 0.0 else float("nan")
-
-
-def _rate(time: FloatArray, temperature: FloatArray, averaging_s: float) -> FloatArray:
-    """Rate of averaged temperatures [degC/min], taken within stretches without a gap, shape (m,)."""
-    rate = np.zeros(len(time))
-    edges = np.flatnonzero(np.diff(time) > 2.5 * averaging_s) + 1
-    for part in np.split(np.arange(len(time)), edges):
-        if len(part) > 1:
-            rate[part] = 60.0 * np.gradient(temperature[part], time[part])
-    return rate
-
-
-def _scale_factor(left: FloatArray, reference: FloatArray) -> float:
-    """Error of the scale factor [ppm] by averages at which the table turns."""
-    power = float(reference @ reference)
-    return 1e6 * float(reference @ left) / power if len(left) and power > 0.0 else float("nan")
 
 
 class _Means:

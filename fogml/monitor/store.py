@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from sqlalchemy import Engine, Table
 
 FILE = "runs.parquet"
-TABLE = "fogml_monitor_runs"
-SCHEMA = "fogml.monitor-runs/1"
+TABLE = "fogml_monitor_runs_2"
+SCHEMA = "fogml.monitor-runs/2"
 _PAUSES_S = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0)
 """Pauses between tries of a store that is away [s]; the last one again and again."""
 Answer = TypeVar("Answer")
@@ -123,8 +123,8 @@ class FolderStore(Store):
             arrays = {array.name: array for array in stored.arrays}
             if missing := [name for name in (*TEXTS, *NUMBERS) if name not in arrays]:
                 raise InputError(
-                    f"{self._file}: column '{missing[0]}' is missing; it is no store of fogml monitor: "
-                    "choose another --store"
+                    f"{self._file}: column '{missing[0]}' is missing; it is no store of this version of "
+                    "fogml monitor: choose another --store, and give the runs again"
                 )
             rows = max((max(array.shape) for array in stored.arrays), default=0)
             columns: dict[str, Any] = {name: stored.marks(arrays[name]).tolist() for name in TEXTS}

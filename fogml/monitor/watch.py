@@ -152,7 +152,8 @@ def _watched(
         kept = [i for i, record in enumerate(records) if (record.model, record.averaging_s) == alike]
         records, age = [records[i] for i in kept], age[kept]
     figures = {name: np.array([getattr(record, name) for record in records]) for name in FIGURES}
-    chart = change_chart(figures, age, between, prior)
+    errors = {name: np.array([getattr(record, f"{name}_se") for record in records]) for name in FIGURES}
+    chart = change_chart(figures, age, between, prior, errors)
     first = chart.changes[-1].onset if chart.changes else 0
     since = len(records) - first
     state: State = "alarm" if chart.changes else "steady"

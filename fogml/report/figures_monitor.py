@@ -9,6 +9,7 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
+from fogml.intervals import Z90
 from fogml.report import style
 from fogml.report.axes import log_axis
 from fogml.report.figures_fleet import serial_axis
@@ -37,6 +38,13 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
                 x=age,
                 y=values,
                 mode="lines+markers",
+                error_y={
+                    "type": "data",
+                    **_bars(unit["runs"], name),
+                    "color": style.TRAINING,
+                    "thickness": 1,
+                    "width": 2,
+                },
                 line={"color": style.TRAINING, "width": 1},
                 marker={"size": 7, "color": style.BLUE},
                 customdata=[run["run"] for run in unit["runs"]],
@@ -85,10 +93,26 @@ def run_figures(unit: Mapping[str, Any]) -> Drawing:
         figure,
         alt=f"Figures of {plural(len(age), 'run')}. {'Changed: ' + changes if changes else 'No change'}.",
         caption=(
-            "What the model leaves on each run. Red line: where a change began; red circle: the run that it "
-            "was noticed with. Dashed: the model's 90 % interval for averages."
+            "What the model leaves on each run; bars: how well the run tells it, 90 %. Red line: where a "
+            "change began; red circle: the run that it was noticed with. Dashed: the model's 90 % interval "
+            "for averages."
         ),
     )
+
+
+def _bars(runs: Sequence[Mapping[str, Any]], name: str) -> dict[str, Any]:
+    """Ends of the intervals of 90 % of a figure's values, as people read them, beyond and below each."""
+    beyond, below = [], []
+    for run in runs:
+        value, error = shown_figure(run, name), run.get(f"{name}_se")
+        half = 0.0 if error is None else Z90 * error
+        if name == "scatter" and value is not None:
+            beyond.append(value * math.expm1(half))
+            below.append(-value * math.expm1(-half))
+        else:
+            beyond.append(half)
+            below.append(half)
+    return {"symmetric": False, "array": beyond, "arrayminus": below}
 
 
 def shown_figure(run: Mapping[str, Any], name: str) -> float | None:

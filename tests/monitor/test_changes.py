@@ -10,17 +10,20 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from fogml.errors import InputError
-from fogml.monitor.changes import ChangePrior, change_chart
+from fogml.monitor.changes import change_chart
+from fogml.monitor.evidence import ChangePrior, flicker_covariance
 
 
-def _marginal(y, column, size):
+def _marginal(y, column, size, covariance):
     """Integral over mean and log deviation of a normal likelihood with a random coefficient of `column`."""
     n = len(y)
     # The mean is taken out by contrasts, whose density does not depend on it.
     contrasts = np.linalg.svd(np.ones((1, n)))[2][1:]
     turned = contrasts @ y
     moved = contrasts @ column
-    spread = multivariate_normal(np.zeros(n - 1), np.eye(n - 1) + size**2 * np.outer(moved, moved))
+    spread = multivariate_normal(
+        np.zeros(n - 1), contrasts @ covariance @ contrasts.T + size**2 * np.outer(moved, moved)
+    )
 
     def density(log_deviation):
         return spread.pdf(turned * np.exp(-log_deviation)) * np.exp(-(n - 1) * log_deviation)
@@ -31,28 +34,52 @@ def _marginal(y, column, size):
 @pytest.mark.parametrize("ages", [np.arange(8.0), np.array([0.0, 1.0, 3.0, 3.5, 8.0, 9.0, 15.0, 16.0])])
 def test_the_statistic_is_the_sum_of_ratios_of_marginal_likelihoods(ages):
     y = np.random.default_rng(3).normal(size=8)
-    prior = ChangePrior(sizes=(3.0,), ramp_sizes=(0.5,))
+    own = np.exp(np.random.default_rng(4).normal(size=8))
+    prior = ChangePrior(sizes=(3.0,), ramp_sizes=(0.5,), between=(0.3, 1.0), wander=(0.0, 0.5))
     interval = (ages[2] - ages[0]) / 2
-    chart = change_chart({"level": y}, ages, 1e9, prior)
+    chart = change_chart({"level": y}, ages, 1e9, prior, {"level": 0.1 * own})
+    relative = own**2 / np.exp(np.mean(np.log(own[:3] ** 2)))
+    wander = flicker_covariance((ages - ages[0]) / interval, prior.longest_wander)
+    covariances = [np.diag(w + (1 - w) * relative) + q * wander for w in (0.3, 1.0) for q in (0.0, 0.5)]
     for n in (4, 8):
         logs = []
         for onset in range(3, n):
             step = (np.arange(n) >= onset).astype(float)
             ramp = np.where(np.arange(n) >= onset, (ages[:n] - ages[onset - 1]) / interval, 0.0)
-            plain = _marginal(y[:n], step, 0.0)
-            logs += [np.log(_marginal(y[:n], step, 3.0) / plain), np.log(_marginal(y[:n], ramp, 0.5) / plain)]
+
+            def likelihood(column, size, n=n):
+                return np.mean([_marginal(y[:n], column, size, c[:n, :n]) for c in covariances])
+
+            plain = likelihood(step, 0.0)
+            logs += [np.log(likelihood(step, 3.0) / plain), np.log(likelihood(ramp, 0.5) / plain)]
         assert chart.statistic[n - 1] == pytest.approx(np.sum(np.exp(logs)) / 2.0, rel=1e-6)
 
 
 def test_without_a_change_alarms_are_as_rare_as_stated():
     rng = np.random.default_rng(0)
-    runs, between, repeats = 30, 75.0, 120
+    runs, between, repeats = 30, 75.0, 60
+    prior = ChangePrior(wander=(0.0,))
     alarmed = 0
     for _ in range(repeats):
         figures = {"level": rng.normal(size=runs), "scatter": 7.0 + 0.1 * rng.normal(size=runs)}
-        alarmed += bool(change_chart(figures, np.arange(float(runs)), between).changes)
+        alarmed += bool(change_chart(figures, np.arange(float(runs)), between, prior).changes)
     # By Doob's inequality the share is at most 30 / 75; most paths stay well below.
     assert 0.0 < alarmed / repeats < 0.4
+
+
+def test_what_is_told_badly_and_what_wanders_is_no_change():
+    rng = np.random.default_rng(5)
+    alarmed = np.zeros(2, dtype=int)
+    for _ in range(40):
+        errors = np.exp(1.5 * rng.normal(size=30))
+        told = {"level": 0.1 * rng.normal(size=30) + errors * rng.normal(size=30)}
+        wanders = {
+            "level": np.linalg.cholesky(flicker_covariance(np.arange(30.0), 1e3)) @ rng.normal(size=30)
+        }
+        for place, (figures, se) in enumerate(((told, {"level": errors}), (wanders, None))):
+            alarmed[place] += bool(change_chart(figures, np.arange(30.0), 300.0, None, se).changes)
+    # Stated: at most 30 / 300 of either.
+    assert np.all(alarmed <= 4)
 
 
 @pytest.mark.parametrize("size", [4.0, 10.0])
@@ -70,11 +97,11 @@ def test_a_step_is_found_where_it_is(size):
             within = first.size_ci90[0] <= size <= first.size_ci90[1]
             found.append((first.figure == "level", held, within, first.raised_at - 15))
     right, held, within, delay = np.array(found, dtype=float).T
-    assert len(found) >= 24
+    assert len(found) >= (24 if size == 10.0 else 18)
     assert right.mean() > 0.9
     assert held.mean() > 0.85
     assert within.mean() > 0.7
-    assert np.median(delay) <= (4 if size == 4.0 else 1)
+    assert np.median(delay) <= (6 if size == 4.0 else 1)
 
 
 def test_a_ramp_is_told_from_a_step_and_runs_that_do_not_tell_are_passed_over():
@@ -84,7 +111,7 @@ def test_a_ramp_is_told_from_a_step_and_runs_that_do_not_tell_are_passed_over():
     level[rng.choice(60, 15, replace=False)] = np.nan
     (change, *_) = change_chart({"level": level}, age, 1000.0).changes
     assert change.shape == "ramp"
-    assert change.size_ci90[0] < 0.2 < change.size_ci90[1]
+    assert change.size == pytest.approx(0.2, rel=0.2)
     assert np.isfinite(level[change.onset])
 
 

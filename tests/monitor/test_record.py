@@ -50,7 +50,31 @@ def test_a_run_whose_temperature_stays_tells_no_slopes(model, tmp_path):
     record = record_run(model, [still])
     assert np.isnan(record.temperature_slope)
     assert np.isnan(record.rate_slope)
-    assert np.isfinite(record.level)
+    # The level rests on what the model states of the slope.
+    assert record.level_se > record_run(model, [run]).level_se
+
+
+def test_standard_errors_are_those_of_repeated_runs(model, tmp_path):
+    run = read_run(write_run(tmp_path, 10, noise=0.0))
+    records = []
+    for seed in range(10):
+        noise = 0.05 * np.random.default_rng((11, seed)).normal(size=len(run))
+        records.append(record_run(model, [run.with_columns(gyro=run.gyro + noise)]))
+    for name in ("level", "temperature_slope", "rate_slope", "scatter"):
+        values = np.array([getattr(record, name) for record in records])
+        stated = np.array([getattr(record, f"{name}_se") for record in records])
+        # The deviation of 10 values is told to a quarter; stated errors hold that the noise may be slow.
+        assert 0.2 < np.std(values) / np.sqrt(np.mean(stated**2)) < 1.4, name
+
+
+def test_what_lies_outside_training_tells_nothing(model, tmp_path):
+    run = read_run(write_run(tmp_path, 12))
+    hot = run.with_columns(T=run.temperature() + np.where(run.time > 2000.0, 60.0, 0.0))
+    plain, told = record_run(model, [run]), record_run(model, [hot])
+    assert told.outside_training > 0.1
+    assert abs(told.level - plain.level) < 5.0 * told.level_se
+    with pytest.raises(InputError, match="train on such temperatures"):
+        record_run(model, [run.with_columns(T=run.temperature() + 200.0)])
 
 
 def test_what_the_unit_compensated_itself_is_taken_as_it_is(model, tmp_path):
@@ -63,7 +87,7 @@ def test_what_the_unit_compensated_itself_is_taken_as_it_is(model, tmp_path):
 
 def test_a_run_that_is_too_short_is_refused(model, tmp_path):
     run = read_run(write_run(tmp_path, 9))
-    with pytest.raises(InputError, match="10 are needed"):
+    with pytest.raises(InputError, match="16 are needed"):
         record_run(model, [run[:150]])
     with pytest.raises(InputError, match="no samples"):
         record_run(model, [])

@@ -34,6 +34,11 @@ RECORD = RunRecord(
     rate_slope=-1e-3,
     scatter=-4.0,
     scale_factor=float("nan"),
+    level_se=0.002,
+    temperature_slope_se=float("nan"),
+    rate_slope_se=1e-4,
+    scatter_se=0.1,
+    scale_factor_se=float("nan"),
 )
 
 
