@@ -4,8 +4,8 @@
 answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``. ``record.md`` holds the
 figures of the diagnosis before this one on some of these cases.
 
-With ``--calibrate`` it prints the trust of `fogml.gap.families.priors.Priors` that what is listed asks for:
-the one monotone map between evidence and probability, fitted by likelihood.
+With ``--calibrate`` it prints the trust and the surest odds of `fogml.gap.families.priors.Priors` that what
+is listed asks for: the one map between evidence and probability, fitted by likelihood.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.optimize import minimize_scalar
+from scipy.optimize import minimize
 from scipy.special import expit
 
 from experiments.gap_blind.__main__ import answered_marks, same_twin, twin_lines
@@ -31,8 +31,6 @@ from fogml.report.blind_words import figure_text, wanted_text
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent
-LAPSES = 0.04
-"""Share of names that are right or false whatever the odds are."""
 
 
 def main() -> None:
@@ -41,14 +39,14 @@ def main() -> None:
     parser.add_argument("suites", type=Path, nargs="+", help="folders of blind suites")
     parser.add_argument("--answers", default=DIAGNOSIS, help="name of the answers (diagnosis)")
     parser.add_argument("--workers", type=int, default=1, help="processes (1)")
-    parser.add_argument("--calibrate", action="store_true", help="print the trust; no page")
+    parser.add_argument("--calibrate", action="store_true", help="print the map's numbers; no page")
     given = parser.parse_args()
     suites = [BlindFolder(path) for path in given.suites]
     marks = [x for s in suites for x in answered_marks(s, given.answers, given.workers)]
     seeds = sorted({x.truth.seed for x in marks})
     if given.calibrate:
-        trust, count = fitted_trust(names_of(suites, given.answers))
-        print(f"trust {trust:.2f}, of {count} names of seeds {seeds}")
+        trust, surest, count = fitted_map(names_of(suites, given.answers))
+        print(f"trust {trust:.2f}, surest {surest:.2f}, of {count} names of seeds {seeds}")
         return
     drawn = [x for x in marks if x.truth.reality != SAME_TWIN]
     counts = Counter(x.truth.reality for x in drawn)
@@ -62,8 +60,8 @@ def main() -> None:
     write_results(HERE, values, page(values))
 
 
-def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, float, bool]]:
-    """Of each cause that is listed its log odds against something unknown and among known ones; if right."""
+def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, float, float, bool]]:
+    """Of each listed cause its odds against the unknown, among known ones, its share, in logs; if right."""
     found = []
     for suite in suites:
         for mark in answered_marks(suite, answers):
@@ -72,26 +70,27 @@ def names_of(suites: Sequence[BlindFolder], answers: str) -> list[tuple[float, f
             odds = {w["effect"]: w["log_odds"] for w in (*told["which"], *told["suspected"])}
             for item in (*mark.items, *mark.suspected):
                 if given := odds[item.effect]:
-                    found.append((given["against_unknown"], given["among_known"], item.right))
+                    own = (given["against_unknown"], given["among_known"], given["log_share"])
+                    found.append((*own, item.right))
     return found
 
 
-def fitted_trust(names: Sequence[tuple[float, float, bool]]) -> tuple[float, int]:
-    """Trust by penalised likelihood of what was listed, and how many names that were.
+def fitted_map(names: Sequence[tuple[float, float, float, bool]]) -> tuple[float, float, int]:
+    """Trust and the surest name's log odds by penalised likelihood, and how many names that were listed.
 
-    Of `LAPSES` of the names nothing can be told by odds: no straight line bears one name that is false for
-    certain. The penalty holds the trust near 1, a standard deviation of a factor e, where names are few.
+    The penalty holds the trust near 1, a standard deviation of a factor e, where names are few.
     """
-    told = np.array([(known, among) for known, among, _ in names])
-    right = np.array([r for *_, r in names], dtype=bool)
+    *told, right = (np.array(values) for values in zip(*names))
+    known, among, share = told
 
-    def loss(log_trust: float) -> float:
-        chances = expit(math.exp(log_trust) * told).prod(axis=1)
-        chances = 0.5 * LAPSES + (1.0 - LAPSES) * chances
-        return float(-np.log(np.where(right, chances, 1.0 - chances)).sum() + 0.5 * log_trust**2)
+    def loss(at: np.ndarray) -> float:
+        trust, surest = math.exp(at[0]), at[1]
+        against = np.logaddexp.reduce([-trust * known, -trust * among, -surest - share])
+        chances = np.clip(expit(-against), 1e-9, 1.0 - 1e-9)
+        return float(-np.log(np.where(right, chances, 1.0 - chances)).sum() + 0.5 * at[0] ** 2)
 
-    found = minimize_scalar(loss, bounds=(-4.0, 2.0), method="bounded").x
-    return math.exp(float(found)), len(right)
+    found = minimize(loss, [-1.5, 2.0], method="Nelder-Mead").x
+    return math.exp(float(found[0])), float(found[1]), len(right)
 
 
 def _fit_runs(marks: Sequence[Mark]) -> dict[str, int]:

@@ -71,7 +71,8 @@ class Found:
     onset
         Since when it acts; None where from the first run on.
     log_odds
-        By the evidence: of a known cause in its place against something unknown; of its class among those.
+        By the evidence: of a known cause in its place against something unknown; of its class among those;
+        and the logarithm of its share of what all causes make, by energy.
     share
         Of the structural gap's energy above the floor, between 0 and 1.
     place
@@ -94,7 +95,7 @@ class Found:
     left_out: tuple[str, ...] = ()
     grows: float | None = None
     onset: Onset | None = None
-    log_odds: tuple[float, float] | None = None
+    log_odds: tuple[float, float, float] | None = None
 
     @property
     def named(self) -> bool:

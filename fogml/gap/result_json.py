@@ -67,7 +67,7 @@ def _found(found: Found) -> dict[str, Any]:
         "onset": None if found.onset is None else asdict(found.onset),
         "log_odds": None
         if found.log_odds is None
-        else dict(zip(("against_unknown", "among_known"), found.log_odds)),
+        else dict(zip(("against_unknown", "among_known", "log_share"), found.log_odds)),
         "share": found.share,
         "place": found.place,
         "times_usual": found.times_usual,

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from scipy.special import expit
 
 from fogml.gap.families.card import card_of
 from fogml.gap.families.closing import Foretold
@@ -143,8 +142,7 @@ def _judged(search: Search, family: int, form: str, size: str, data: FloatArray,
             [0.0, *(s for f, s in scores.items() if f not in known)],
         )
     )
-    acts = expit(priors.trusted(float(np.logaddexp(own, others)) - unknown))
-    probability = float(acts * expit(priors.trust * (own - others)))
+    probability = priors.believed(float(np.logaddexp(own, others)) - unknown, own - others)
     probability = at_cost(probability, cost)
     named = probability >= NAMED
     outcome = "missed" if not named else "named" if family in alike else "mistaken"

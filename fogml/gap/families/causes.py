@@ -88,7 +88,7 @@ def found_cause(
         share=share,
         place=declared.place,
         times_usual=abs(card.value.amplitude) / high,
-        log_odds=(cause.odds, cause.within),
+        log_odds=(cause.odds, cause.within, cause.log_share),
         left_out=cause.left_out if probability >= NAMED else (),
     )
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fogml.gap.families.inference import Inference
-from fogml.gap.families.linear_gaussian import left_out_log_density
+from fogml.gap.families.linear_gaussian import Posterior, left_out_log_density
 from fogml.gap.families.search import Explanation, Member
 from fogml.runs.run import FloatArray
 
@@ -32,6 +32,8 @@ class Cause:
         What it adds to the log density of each run given the others, over the best set without it [nats].
     known
         That it, or another known cause in its place, acts, by the evidence alone.
+    log_share
+        Logarithm of its share of what all causes of the set make, by energy.
     doubted
         What of that is not believed.
     left_out
@@ -44,6 +46,7 @@ class Cause:
     evidence: float
     carried: float
     known: float
+    log_share: float = 0.0
     doubted: float = 0.0
     left_out: tuple[str, ...] = ()
 
@@ -83,7 +86,7 @@ def judge(found: Inference) -> Judgement:
 
     The odds of a cause are those of all sets that hold a member of its class; where runs foretell each other
     worse with it than with the best of what is unknown in its place, less so. Forms are never quite known, so
-    that all odds count less (`Priors.trust`).
+    that all odds count less, and those of a small cause beside a large one least (`Priors.believed`).
     """
     families, priors, search = found.columns.families, found.setting.priors, found.search
     first = sorted(found.with_others(found.explanations), key=lambda e: -e.score)
@@ -100,7 +103,7 @@ def judge(found: Inference) -> Judgement:
         best = likeliest
         alike = {f: _alike(found, explanations, best, f) for f in search.names(best)}
         instead = {f: search.unexplained(best, set(alike[f])) for f in alike}
-    weights = _weights(explanations)
+    weights, energies = _weights(explanations), _energies(found, best)
     causes = []
     for f, members in alike.items():
         held = min(float(sum(w for e, w in zip(explanations, weights) if set(members) & set(e.key))), 1.0)
@@ -110,14 +113,21 @@ def judge(found: Inference) -> Judgement:
         rest = search.names(best) - {f}
         known = float(sum(w for e, w in zip(explanations, weights) if search.names(e) - rest))
         cause = Cause(
-            tuple(own), tuple(families[g].id for g in members), 0.0, held, carried, max(known, held)
+            tuple(own),
+            tuple(families[g].id for g in members),
+            probability=0.0,
+            evidence=held,
+            carried=carried,
+            known=max(known, held),
+            log_share=math.log(max(energies[f], 1e-12) / max(sum(energies.values()), 1e-12)),
         )
-        believed = _chance(priors.trusted(cause.odds))
+        share = cause.log_share
+        believed = priors.believed(cause.odds, log_share=share)
         causes.append(
             replace(
                 cause,
                 left_out=_left_out(found, best, f),
-                probability=believed * _chance(priors.trust * cause.within),
+                probability=priors.believed(cause.odds, cause.within, log_share=share),
                 doubted=max(cause.known - believed, 0.0),
             )
         )
@@ -140,6 +150,22 @@ def _weights(explanations: Sequence[Explanation]) -> FloatArray:
     scores = np.array([e.score for e in explanations])
     weights = np.exp(scores - scores.max())
     return np.asarray(weights / weights.sum())
+
+
+def _energies(found: Inference, explanation: Explanation) -> dict[int, float]:
+    """Squares of the whitened lengths, beside what is fixed, of what each family makes; no plant's."""
+    held = found.field
+    mean = Posterior.of(held.design(explanation.nodes), held.base.data).mean
+    made: dict[int, float] = {}
+    at = held.fixed.shape[1]
+    for m in explanation.members:
+        block = m.size * held.block(m.node)
+        course = block @ mean[at : at + block.shape[1]]
+        at += block.shape[1]
+        if found.columns.families[m.family].kind != "plant":
+            left = float(held.base.gram(course[:, None])[0, 0])
+            made[m.family] = made.get(m.family, 0.0) + max(left, 0.0)
+    return made
 
 
 def _likeliest(found: Inference, explanations: Sequence[Explanation]) -> Explanation:
@@ -201,10 +227,6 @@ def _with_more(explanations: Sequence[Explanation], more: Sequence[Explanation])
         if e.key not in have or told.score > have[e.key].score:
             have[e.key] = told
     return tuple(sorted(have.values(), key=lambda e: -e.score))
-
-
-def _chance(log_odds: float) -> float:
-    return 1.0 / (1.0 + math.exp(-log_odds))
 
 
 def _log_odds(probability: float) -> float:

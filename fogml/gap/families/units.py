@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.special import expit
 from scipy.stats import t as student
 
 from fogml.errors import InputError
@@ -207,7 +206,7 @@ def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[Share
     for id in sorted({f.effect for d in by_unit.values() for f in d.found}):
         acts = float(sum(w for w, names in zip(weights, sets) if id in names))
         odds = np.log(max(acts, 1e-12)) - np.log(max(1.0 - acts, 1e-12))
-        probability = float(expit(priors.trusted(float(odds))))
+        probability = priors.believed(float(odds))
         sizes = {u: f.amplitude for u, d in by_unit.items() for f in d.found if f.effect == id}
         if probability < LISTED or not sizes:
             continue

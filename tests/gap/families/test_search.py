@@ -52,9 +52,13 @@ def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
     assert cause.evidence <= cause.known
     judged = judge(found)
     assert all(0.0 <= p <= 1.0 for p in (judged.unknown, judged.nothing, cause.evidence))
-    known = 1.0 / (1.0 + np.exp(-priors.trusted(cause.odds)))
-    among = 1.0 / (1.0 + np.exp(-priors.trust * cause.within))
-    assert cause.probability == pytest.approx(known * among)
+    against = np.exp(-priors.trust * np.array([cause.odds, cause.within])).sum() + np.exp(-priors.surest)
+    # All that is made is its own.
+    assert cause.log_share == 0.0
+    assert cause.probability == pytest.approx(1.0 / (1.0 + against))
+    # Beside one that makes nine times as much, against it counts ten times what no evidence shows.
+    beside = priors.believed(cause.odds, cause.within, log_share=np.log(0.1))
+    assert beside == pytest.approx(1.0 / (1.0 + against + 9.0 * np.exp(-priors.surest)))
     # Of a rival that is known nothing more is unknown.
     rival = replace(cause, evidence=0.5 * cause.evidence)
     assert rival.odds == cause.odds and rival.within < cause.within
