@@ -16,6 +16,7 @@ from fogml.readers import READERS
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.reading import file_format, read_run, read_table
 from tests.readers import files
+from tests.runs import test_excel_habits as excel
 from tests.runs.test_headers import FILES, GYRO, TIME
 
 WRITERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
@@ -55,6 +56,17 @@ def section(quick: bool) -> Section:
             path.write_bytes(text.encode())
             said[habit] = _outcome(path)
             habits.append([habit, text.splitlines()[0][:40].replace("\0", ""), said[habit]])
+        tables, answers = [], {}
+        for name, content in (excel.READ | {"book.xlsx": ""} | excel.ANSWERS).items():
+            path = Path(folder) / name
+            if name == "book.xlsx":
+                excel.write_book(path)
+            else:
+                excel.write(path, content)
+            answers[name] = _answer(path)
+            first = path.read_bytes().splitlines()[:1] if name != "book.xlsx" else []
+            shown = b"".join(first).decode("gbk" if name == "gbk.csv" else "utf-8").replace("\t", " ⇥ ")
+            tables.append([name, shown, answers[name].removeprefix(f"{name}: ").removeprefix(f"{name}, ")])
     markdown = "\n\n".join(
         [
             "## Formats and headers",
@@ -64,9 +76,12 @@ def section(quick: bool) -> Section:
             table(["format", "file", "rows", "columns", "error", "CPU [s]"], rows),
             "Text files of 30 samples with one habit each:",
             table(["habit", "first line", "outcome"], habits),
+            f"Tables of {excel.COUNT} samples as spreadsheet programs leave them, read as `inspect` and "
+            "`train` do; a model over temperature asks for the temperature too:",
+            table(["file", "first line", "outcome"], tables),
         ]
     )
-    return Section(markdown, {"formats": data, "habits": said})
+    return Section(markdown, {"formats": data, "habits": said, "spreadsheets": answers})
 
 
 def _errors(columns: Any, kind: str) -> list[float]:
@@ -82,6 +97,18 @@ def _errors(columns: Any, kind: str) -> list[float]:
             wanted = np.round(1000.0 * right[name]) if unit == "count" else right[name]
             found.append(float(np.max(np.abs(values - wanted)) / np.max(np.abs(wanted))))
     return found
+
+
+def _answer(path: Path) -> str:
+    """How a spreadsheet's table is taken, its temperature asked for as a model does."""
+    try:
+        run = read_run(path)
+        warmth = run.temperature("T")
+    except InputError as error:
+        return str(error)
+    gyro = excel.GYRO + (1000.0 if path.name == "thousands.csv" else 0.0)
+    pairs = (run.time, excel.TIME), (run.gyro, gyro), (warmth, excel.INNER)
+    return "read" if all(np.allclose(found, right, atol=1e-4) for found, right in pairs) else "WRONG"
 
 
 def _outcome(path: Path) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.twin_model import AnyModel
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.noise_fit import NoiseFit, NoisePrior, fit_noise
 from fogml.signals.noise_model import NoiseModel
 
@@ -67,9 +68,10 @@ def prior_of(model: AnyModel, noise_run: Run | None) -> tuple[NoisePrior, str]:
 
 def _motion(run: Run, usable: np.ndarray) -> FloatArray:
     """Temperature as a regressor of a static run, where it moves at all."""
-    if not run.temperature_columns:
+    warmth = leading_temperature(run)
+    if warmth is None:
         return np.empty((int(usable.sum()), 0))
-    temperature = run.temperature()[usable]
+    temperature = warmth[usable]
     if not np.isfinite(temperature).all() or np.ptp(temperature) < 0.05:
         return np.empty((len(temperature), 0))
     return (temperature - temperature.mean())[:, None]

@@ -16,6 +16,7 @@ from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
 from fogml.monitor.figures import Averages, run_figures
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
 
@@ -147,11 +148,12 @@ def record_run(
         if moving.any():
             kept &= ~transition_mask(block)
         half = model.intervals_.half_width(0.9, evaluation.excess)
+        warmth = leading_temperature(block)
         means.add(
             block.time,
             kept,
             left=block.error_deg_h - (0.0 if block.facts.compensated else evaluation.drift),
-            temperature=block.temperature() if block.sensors() else np.zeros(len(block)),
+            temperature=np.zeros(len(block)) if warmth is None else warmth,
             reference=block.reference_deg_h,
             half=half,
             moving=moving.astype(np.float64),

@@ -10,11 +10,11 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
 from fogml.runs.findings import Finding
 from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 
 STUCK_S = 600.0
 """A sensor that shows one value for longer [s] may be stuck."""
@@ -219,12 +219,9 @@ def _outliers(run: Run) -> Iterator[Finding]:
 
 
 def _span(run: Run) -> Iterator[Finding]:
-    if not run.temperature_columns:
+    temperature = leading_temperature(run)
+    if temperature is None:
         return
-    try:
-        temperature = run.temperature()
-    except InputError:
-        temperature = run.temperature(run.temperature_columns[0])
     span = float(np.ptp(temperature))
     if span < SMALL_SPAN_DEGC:
         message = f"the temperature spans {span:.3g} degC only; under 5 degC a drift model is poorly told"

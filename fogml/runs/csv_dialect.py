@@ -15,7 +15,7 @@ from fogml.runs.columns import column_spec, parse_header
 from fogml.runs.csv_header import fields_of, find_header
 from fogml.runs.csv_source import CsvSource, csv_source
 from fogml.runs.header_spelling import DATE_NAMES
-from fogml.runs.raw_table import wanted_cells
+from fogml.runs.raw_table import empty_file, wanted_cells
 from fogml.runs.stamps import Stamps, stamps_of
 
 MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
@@ -138,7 +138,7 @@ def csv_dialect(path: Path) -> CsvDialect:
             "'time [s],gyro [deg/h],T [degC]' and rows of numbers were expected"
         )
     if header is None:
-        raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
+        raise empty_file(path.name)
     is_padded = source.wide is None and b"\0" in raw
     if any(ord(character) < 32 and character != "\t" for character in lines[header.line]) or (
         is_padded and not header.is_sure

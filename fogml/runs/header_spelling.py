@@ -40,11 +40,12 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
     """Header cells with the names and units of the run format where they are spellings of these.
 
     A name is taken for one of the run format's only with a unit that this has, or with none at all. A word
-    such as ``temperature`` counts as ``T`` only where no other column is a temperature.
+    such as ``temperature`` counts as ``T`` where the columns give no ``T``: neither it, nor ``T_in``, nor
+    sensors of the coil.
     """
     found = [_parts(cell) for cell in cells]
     taken = {name for name, _ in found if column_spec(name)}
-    is_warm = any(column_spec(n) is not None and is_accepted(n, u) and n.startswith("T") for n, u in found)
+    is_warm = any((n in ("T", "T_in") or coil_sensor_number(n)) and is_accepted(n, u) for n, u in found)
     others = Counter(_MEANT.get(_plain(other)) for other, _ in found if column_spec(other) is None)
     names = []
     for name, unit in found:

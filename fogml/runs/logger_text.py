@@ -17,6 +17,7 @@ from fogml.runs.findings import Finding
 from fogml.runs.logger_lines import Lines, single_blanks
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_parts import TextLayout
+from fogml.runs.raw_table import empty_file
 from fogml.runs.stamps import StampClock, Stamps, stamps_of
 
 FloatArray = NDArray[np.float64]
@@ -92,7 +93,7 @@ def _content(path: Path, profile: TextLayout) -> bytes:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
     if not raw.strip():
-        raise InputError(f"{path.name}: the file is empty")
+        raise empty_file(path.name)
     try:
         text = raw.decode(profile.encoding).removeprefix("\ufeff").encode()
     except UnicodeError as error:

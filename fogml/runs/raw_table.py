@@ -163,7 +163,14 @@ def moment(origin_s: object) -> datetime | None:
 
 def no_samples(file: str) -> InputError:
     """What to say of a file without rows."""
-    return InputError(f"{file}: a header and no samples; rows of numbers were expected below it")
+    return InputError(
+        f"{file}: a header and no samples; rows of numbers were expected below it, export it again"
+    )
+
+
+def empty_file(file: str) -> InputError:
+    """What to say of a file that holds nothing."""
+    return InputError(f"{file}: the file is empty; a header and samples were expected, export it again")
 
 
 @dataclass(frozen=True)

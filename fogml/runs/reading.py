@@ -10,7 +10,7 @@ from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
-from fogml.runs.raw_table import RawTable
+from fogml.runs.raw_table import RawTable, empty_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
@@ -245,7 +245,7 @@ def _format_of_content(path: Path) -> str:
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror or error})") from None
     if not head:
-        raise InputError(f"{path.name}: the file is empty; a header and samples were expected")
+        raise empty_file(path.name)
     if (reader := reader_of_content(head, path.suffix)) is not None:
         return reader.name
     for magic, what in _FOREIGN.items():

@@ -78,12 +78,10 @@ class Run:
         """Take columns as read-only views of one length."""
         frozen: dict[str, FloatArray] = {}
         for name, values in columns.items():
-            view = np.asarray(values, dtype=np.float64).view()
-            view.flags.writeable = False
-            frozen[name] = view
-        for name in ("time", "gyro"):
-            if name not in frozen:
-                raise InputError(f"{self.name}: no column '{name}'; a run always needs time and gyro")
+            frozen[name] = np.asarray(values, dtype=np.float64).view()
+            frozen[name].flags.writeable = False
+        for name in (name for name in ("time", "gyro") if name not in frozen):
+            raise InputError(f"{self.name}: no column '{name}'; a run always needs time and gyro")
         lengths = {name: values.shape for name, values in frozen.items()}
         if len(set(lengths.values())) > 1 or frozen["time"].ndim != 1:
             raise InputError(f"{self.name}: columns differ in length: {lengths}")
@@ -149,8 +147,7 @@ class Run:
     @cached_property
     def rate(self) -> FloatArray:
         """Table rate about the input axis [deg/s], shape (n,); zeros where not recorded."""
-        rate = self.columns.get("rate")
-        return np.zeros(len(self)) if rate is None else rate
+        return self.columns["rate"] if "rate" in self.columns else np.zeros(len(self))
 
     @property
     def earth_known(self) -> bool:
@@ -190,7 +187,10 @@ class Run:
         if sensors:
             return self._sensor_mean(sensors)
         held = ", ".join(self.temperature_columns) or "none"
-        raise InputError(f"{self.name}: no temperature '{name}'; the run holds {held}")
+        raise InputError(
+            f"{self.name}: no temperature '{name}'; the run holds {held}; call the column that measures it "
+            f"'{name} [degC]', or let an import profile join the log that does"
+        )
 
     def sensors(self, name: str = "T") -> tuple[str, ...]:
         """The columns that a temperature is the mean of; none where the run does not hold it."""

@@ -15,6 +15,12 @@ _COARSE = 4096
 """Rows at which the slow temperatures are worked out, at least."""
 
 
+def leading_temperature(run: Run) -> FloatArray | None:
+    """``T`` of a run, or the first of its temperatures where it gives none [degC], shape (n,)."""
+    names = ["T"] if run.sensors("T") else run.temperature_columns[:1]
+    return run.temperature(names[0]) if names else None
+
+
 def thermal_columns(run: Run) -> Callable[[FloatArray], FloatArray]:
     """Columns that a drift with a run's temperature may follow, at times [s], shape (times, columns).
 
@@ -22,11 +28,12 @@ def thermal_columns(run: Run) -> Callable[[FloatArray], FloatArray]:
 
     Raises
     ------
-    InputError
+    ValueError
         If the run holds no temperature.
     """
-    name = "T" if run.sensors("T") else run.temperature_columns[0]
-    temperature = run.temperature(name)
+    temperature = leading_temperature(run)
+    if temperature is None:
+        raise ValueError(f"{run.name} holds no temperature")
     at = np.arange(0, len(run), max(len(run) // _COARSE // 2, 1))
     counts = np.diff(np.append(at, len(run)))
     coarse, time = (np.add.reduceat(values, at) / counts for values in (temperature, run.time))

@@ -11,6 +11,7 @@ from fogml.json_files import finite_json
 from fogml.runs.columns import column_spec
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.averages import block_averages
 
 INSPECT_SCHEMA = "fogml.inspect/1"
@@ -97,7 +98,7 @@ def _gaps(run: Run) -> dict[str, Any]:
 def _regimes(run: Run) -> dict[str, Any]:
     """Time spent in each regime [s], and the regimes one after the other."""
     found = regimes(run)
-    temperature = run.temperature("T") if run.temperature_columns else None
+    temperature = leading_temperature(run)
     # The time that a row stands for: up to the next row, gaps not counted.
     shares = np.append(np.diff(run.time), run.sample_s)
     shares[run.gap_starts - 1] = run.sample_s

@@ -13,6 +13,7 @@ from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.validation.floors import check_noise_run, floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
@@ -249,7 +250,8 @@ def _noise(run: Run) -> dict[str, Any] | None:
 
 def _series(errors: RunErrors, metrics: RunMetrics, before: FloatArray, after: FloatArray) -> AveragedSeries:
     run, used = errors.run, errors.used
-    temperature = run.temperature("T") if run.temperature_columns else np.full(len(run), np.nan)
+    held = leading_temperature(run)
+    temperature = np.full(len(run), np.nan) if held is None else held
     columns = [temperature, before, after, errors.drift, errors.half_width]
     averages = metrics.averages(*(column[used] for column in columns))
     temperature, before, after, drift, half_width = averages.values

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from fogml.runs.regimes import regimes
 from fogml.runs.run import BoolArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 
 ROOM_TEMPERATURE_DEGC = 25.0
 LEAST_DIFFERENCE_DEGC = 5.0
@@ -55,9 +56,9 @@ def find_soaks(run: Run, used: BoolArray, least_s: float) -> tuple[Soak, ...]:
     used
         Rows that count, shape (n,).
     """
-    if not run.temperature_columns:
+    temperature = leading_temperature(run)
+    if temperature is None:
         return ()
-    temperature = run.temperature("T")
     stays: list[tuple[Approach, list[NDArray[np.intp]]]] = [("none", [])]
     for name, start, stop in regimes(run).segments():
         if name in ("ramp_up", "ramp_down"):

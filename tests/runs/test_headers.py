@@ -123,6 +123,7 @@ def test_names_in_chinese(tmp_path):
         (["time_us", "gyro_dps", "Temperature (K)"], ("time [us]", "gyro [deg/s]", "T [K]")),
         (["Time (min)", "Gyro (mdps)", "Temp [C]"], ("time [min]", "gyro [mdeg/s]", "T [degC]")),
         (["time [s]", "gyro [dph]", "Temp [C]", "T1"], ("time [s]", "gyro [deg/h]", "Temp [degC]", "T1")),
+        (["time [s]", "gyro [dph]", "Temp [C]", "T_out"], ("time [s]", "gyro [deg/h]", "T [degC]", "T_out")),
         (["IMU (left)", "B_x (G)", "vibration [g]"], ("IMU (left)", "B_x [G]", "vibration [g]")),
         (["time [s]", "GyrX (dps)", "w_y [rad/s]"], ("time [s]", "gyro_x [deg/s]", "gyro_y [rad/s]")),
         (["gyro [Hz]", "time", "T2 [℃]"], ("gyro [Hz]", "time", "T2 [degC]")),

@@ -16,6 +16,7 @@ from fogml.gap.families.rows import Rows
 from fogml.gap.families.unknown import unknown_families
 from fogml.gap.noise import UNIT_FACTOR
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.thermal_columns import leading_temperature
 from fogml.signals.noise_fit import NAMES, NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
@@ -182,8 +183,8 @@ class StaticRun:
         full = counts >= max(0.5 * width, 1)
         means = np.bincount(row, weights=values) / np.maximum(counts, 1)
         free = [np.ones(len(counts))]
-        if run.temperature_columns:
-            warmth = run.temperature()[usable]
+        if (held := leading_temperature(run)) is not None:
+            warmth = held[usable]
             if np.isfinite(warmth).all() and np.ptp(warmth) > 0.05:
                 free.append(np.bincount(row, weights=warmth - warmth.mean()) / np.maximum(counts, 1))
         ends = time[0] + (np.arange(len(counts)) + 1.0) * width * step

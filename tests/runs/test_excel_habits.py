@@ -1,0 +1,127 @@
+"""Tables as spreadsheet programs leave them: each is read, or answered with what to do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.reading import read_run
+from tests.cli.conftest import run_program
+
+COUNT = 240
+TIME = 10.0 * np.arange(COUNT)
+INNER = 20.0 + 30.0 * np.sin(np.arange(COUNT) / 38.0)
+OUTER = INNER + 0.5
+GYRO = 10.0 + 0.02 * INNER + 0.05 * np.sin(1e4 * np.arange(COUNT))
+HEADER = "time [s],gyro [deg/h],T_in [degC],T_out [degC]"
+ROWS = [f"{t:g},{g:.6f},{a:.4f},{b:.4f}" for t, g, a, b in zip(TIME, GYRO, INNER, OUTER, strict=True)]
+
+
+def text(header=HEADER, rows=ROWS):
+    return "\n".join([header, *rows, ""])
+
+
+def semicolons(line):
+    return line.replace(",", ";").replace(".", ",")
+
+
+def moment(row):
+    seconds, _, rest = row.partition(",")
+    at = np.datetime64("2026-01-05T08:00:00") + np.timedelta64(int(seconds), "s")
+    return f"{str(at).replace('T', ' ')},{rest}"
+
+
+def thousands(row):
+    seconds, gyro, *rest = row.split(",")
+    return ",".join([seconds, f'"{1000.0 + float(gyro):,.6f}"', *rest])
+
+
+READ = {
+    "plain.csv": text(),
+    "bom.csv": ("\ufeff" + text()).replace("\n", "\r\n"),
+    "case.csv": text("Time [s],Gyro [deg/h],T_In [degC],T_Out [degC]"),
+    "degsym.csv": text("time[s],gyro[°/h],T_in[℃],T_out[℃]"),
+    "gbk.csv": text("时间 [s],陀螺 [°/h],温度 [°C],T_out [°C]").encode("gbk"),
+    "german.csv": "\ufeff" + semicolons(HEADER) + "\n" + "\n".join(map(semicolons, ROWS)) + "\n",
+    "parens.csv": text("Time (s),Gyro (°/h),T_in (°C),T_out (°C)"),
+    "stamps.csv": text(rows=map(moment, ROWS)),
+    "tab.txt": text().replace(",", "\t"),
+    "temp.csv": text("time [s],gyro [deg/hr],Temp [degC],T_out [degC]"),
+    "thousands.csv": text(rows=map(thousands, ROWS)),
+    "title.csv": "Chamber test FOG-0417;;;\nOperator: Li\n" + text(),
+    "trailing.csv": text(HEADER + ",", [row + "," for row in ROWS]),
+    "unit.csv": text("time [s],gyro [dph],T_in [degC],T_out [degC]"),
+    "unit2.csv": text("time [sec],gyro [deg/h],T_in [Celsius],T_out [degC]"),
+}
+ANSWERED = {
+    "badcells.csv": (
+        text(rows=[*ROWS[:7], "70,10.5,OVF,20", *ROWS[8:]]),
+        r"line 9, column 'T_in': 'OVF' is not a number .*; correct the line, or --repair drops such rows",
+    ),
+    "dups.csv": (
+        text(rows=[*ROWS[:100], ROWS[99], *ROWS[100:]]),
+        r"line 102: .*or --repair drops the repeats",
+    ),
+    "empty.csv": (text(rows=[]), "a header and no samples; rows of numbers were expected below it"),
+    "nounits.csv": (text("time,gyro,T_in,T_out"), r"'time' states no unit; write 'time \[s\]' in the header"),
+    "zero.csv": ("", "the file is empty; a header and samples were expected"),
+}
+NO_TEMPERATURE = text("time [s],gyro [deg/h]", [",".join(row.split(",")[:2]) for row in ROWS])
+ANSWERS = {name: content for name, (content, _) in ANSWERED.items()} | {"notemp.csv": NO_TEMPERATURE}
+
+
+def write(path, content):
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+
+
+def write_book(path):
+    import xlsxwriter
+
+    with xlsxwriter.Workbook(str(path)) as book:
+        sheet = book.add_worksheet()
+        sheet.write_row(0, 0, HEADER.split(","))
+        for place, row in enumerate(ROWS, start=1):
+            sheet.write_row(place, 0, map(float, row.split(",")))
+
+
+@pytest.mark.parametrize("name", READ)
+def test_is_read(tmp_path, name):
+    path = tmp_path / name
+    write(path, READ[name])
+    run = read_run(path)
+    np.testing.assert_allclose(run.time, TIME)
+    np.testing.assert_allclose(run.gyro, GYRO + (1000.0 if name == "thousands.csv" else 0.0), atol=1e-6)
+    np.testing.assert_allclose(run.temperature("T"), INNER, atol=1e-4)
+    np.testing.assert_allclose(run.temperature("T_out"), OUTER, atol=1e-4)
+
+
+def test_a_workbook_is_read(tmp_path):
+    pytest.importorskip("xlsxwriter")
+    write_book(path := tmp_path / "book.xlsx")
+    np.testing.assert_allclose(read_run(path).temperature("T"), INNER, atol=1e-4)
+
+
+@pytest.mark.parametrize("name", ANSWERED)
+def test_is_answered(tmp_path, name):
+    content, said = ANSWERED[name]
+    path = tmp_path / name
+    path.write_text(content)
+    with pytest.raises(InputError, match=said):
+        read_run(path)
+
+
+def test_without_a_temperature_is_inspected_and_not_trained(tmp_path):
+    path = tmp_path / "notemp.csv"
+    path.write_text(NO_TEMPERATURE)
+    run_program("inspect", path, "-o", tmp_path / "inspected", "--quiet")
+    told = run_program("train", path, "--test", path, "-o", tmp_path / "trained", status=2).stderr
+    assert "no temperature 'T'" in told
+    assert "the run holds none; call the column that measures it 'T [degC]', or let an import profile" in told
+
+
+@pytest.mark.parametrize("name", ["T_out", "T_chamber"])
+def test_another_temperature_than_the_coils_is_enough_to_inspect(tmp_path, name):
+    path = tmp_path / "run.csv"
+    path.write_text(text(f"time [s],gyro [deg/h],{name} [degC],note [1]"))
+    run_program("inspect", path, "-o", tmp_path / "inspected", "--quiet")
