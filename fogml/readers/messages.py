@@ -8,12 +8,13 @@ import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import partial
-from operator import attrgetter
+from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from fogml.readers import mcap_chunks
 from fogml.readers.columns import Column, Container, Kept
 from fogml.readers.spool import Rows
 
@@ -45,7 +46,7 @@ def leaves(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str,
     elif not isinstance(message, str | bytes | None.__class__):
         fields = message if isinstance(message, dict) else _fields(message)
         if tuple(fields) in _STAMPS:
-            yield above, message, _stamp
+            yield above, message, _stamp_of(fields, isinstance(message, dict))
         elif depth < _DEEPEST:
             for name, item in fields.items():
                 yield from leaves(item, f"{above}.{name}" if above else str(name), depth + 1)
@@ -61,10 +62,15 @@ def _one(value: Any) -> tuple[float]:
     return (float(value),)
 
 
-def _stamp(message: Any) -> tuple[float]:
-    """Seconds of a stamp."""
-    whole, parts = (message if isinstance(message, dict) else _fields(message)).values()
-    return (float(whole) + 1e-9 * float(parts),)
+def _stamp_of(fields: dict[str, Any], is_dict: bool) -> ToFloats:
+    """What gives the seconds of a stamp."""
+    got = (itemgetter if is_dict else attrgetter)(*fields)
+
+    def seconds(stamp: Any) -> tuple[float]:
+        whole, parts = got(stamp)
+        return (float(whole) + 1e-9 * float(parts),)
+
+    return seconds
 
 
 def numbers(message: Any) -> Iterator[tuple[str, float]]:
@@ -253,14 +259,14 @@ class Mcap(Messages):
 
         super().__init__()
         self.opened = Path(path).open("rb")  # noqa: SIM115  closed by `close`
-        decoders: list[Any] = [DecoderFactory(), _Json()]
-        self.file = make_reader(self.opened, decoder_factories=decoders)
+        self.decoders: list[Any] = [DecoderFactory(), _Json()]
+        self.file = make_reader(self.opened, decoder_factories=self.decoders)
         summary = self.file.get_summary()
         if summary is None:
             raise ValueError("no summary at its end")
         self.begin_ns = summary.statistics.message_start_time if summary.statistics else 0
         self.origin_s = self.begin_s
-        self.in_order = bool(summary.chunk_indexes)
+        self.summary = summary
         counts = summary.statistics.channel_message_counts if summary.statistics else self.counted()
         schemas = summary.schemas
         self.topics(
@@ -279,9 +285,24 @@ class Mcap(Messages):
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
         """As `Messages`; a file without an index of its chunks is read in its own order, not sorted whole."""
-        found = self.file.iter_decoded_messages(topics=[topic], log_time_order=self.in_order)
-        for _, _, record, message in found:
-            yield record.log_time, message
+        if not self.summary.chunk_indexes:
+            for _, _, record, found in self.file.iter_decoded_messages(topics=[topic], log_time_order=False):
+                yield record.log_time, found
+            return
+        channels = {number: one for number, one in self.summary.channels.items() if one.topic == topic}
+        decoders = {number: self.decoder(one) for number, one in channels.items()}
+        chunks = self.summary.chunk_indexes
+        for recorded_ns, number, content in mcap_chunks.messages(self.opened, chunks, decoders):
+            yield recorded_ns, decoders[number](content)
+
+    def decoder(self, channel: Any) -> Callable[[bytes], Any]:
+        """What decodes a channel's messages."""
+        schema = self.summary.schemas.get(channel.schema_id)
+        found = (each.decoder_for(channel.message_encoding, schema) for each in self.decoders)
+        decoder = next((each for each in found if each is not None), None)
+        if decoder is None:
+            raise ValueError(f"{channel.topic} is in {channel.message_encoding}, which is not read")
+        return decoder
 
     def close(self) -> None:
         """Let go of the file."""

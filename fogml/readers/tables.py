@@ -214,7 +214,9 @@ class Mdf(Container):
         from asammdf import MDF
 
         super().__init__()
-        self.file = MDF(path, use_display_names=False)
+        # Given a path, the library unpacks a channel of over 200 MB whole for each part of it.
+        self.opened = open(path, "rb")  # noqa: SIM115  closed by `close`
+        self.file = MDF(self.opened, use_display_names=False)
         self.origin_s = _seconds(self.file.start_time)
         groups: Any = self.file.groups
         for index, group in enumerate(groups):
@@ -230,11 +232,17 @@ class Mdf(Container):
                     self.add(named, "time" if is_clock else channel.name, "s" if is_clock else unit, reader)
 
     def samples(self, group: int, place: int, start: int, stop: int) -> Any:
-        """Samples of a channel."""
-        found = self.file.get(group=group, index=place, record_offset=start, record_count=stop - start)
-        return np.asarray(found.samples, dtype=np.float64)
+        """Samples of a channel, NaN where they are marked invalid."""
+        # Otherwise the library leaves out what is invalid, and later samples move up.
+        found, invalid = self.file.get(
+            group=group, index=place, record_offset=start, record_count=stop - start,
+            samples_only=True, ignore_invalidation_bits=True,
+        )  # fmt: skip
+        samples = np.asarray(found, dtype=np.float64)
+        return samples if invalid is None else np.where(invalid, np.nan, samples)
 
     def close(self) -> None:
         """Let go of the file."""
         super().close()
         self.file.close()
+        self.opened.close()

@@ -180,7 +180,13 @@ def test_what_can_be_no_feature_lists_what_is_known() -> None:
     [
         ("T, tempo", 3, "no column 'tempo'", "the run holds T, power"),
         ("T, d(pwer)", 5, "no column 'pwer'", "did you mean 'power'?"),
-        ("T*dT_out", 3, "no temperature 'T_out'", "the run holds T"),
+        (
+            "T*dT_out",
+            3,
+            "no temperature 'T_out'",
+            "the run holds T; call the column that measures it 'T_out [degC]', or let an import profile join "
+            "the log that does",
+        ),
         (
             "T, since_on(400 s)",
             3,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -168,3 +169,49 @@ def test_a_struct_of_matlab(tmp_path):
     run = read_run(tmp_path / "log.mat")
     np.testing.assert_array_equal(run.gyro, GYRO)
     np.testing.assert_array_equal(run.columns["T_in"], WARM)
+
+
+def test_mdf_is_read_in_parts_however_large_and_invalid_samples_are_none(tmp_path, monkeypatch):
+    asammdf = pytest.importorskip("asammdf")
+    from asammdf.blocks import mdf_v4
+
+    from fogml.readers.tables import Mdf
+
+    path = tmp_path / "log.mf4"
+    invalid = np.arange(COUNT) % 7 == 3
+    with asammdf.MDF(version="4.10") as file:
+        file.append([asammdf.Signal(GYRO, TIME, name="gyro", invalidation_bits=invalid)])
+        file.save(path)
+    # The library takes every file for a large one.
+    monkeypatch.setattr(mdf_v4, "validate_blocks", lambda *told: True)
+    monkeypatch.setattr(mdf_v4, "get_channel_raw_bytes_complete", None)
+    with contextlib.closing(Mdf(str(path), [])) as held:
+        found = held.arrays[[told["name"] for told in held.described].index("gyro")]
+        np.testing.assert_array_equal(found[20:50,], np.where(invalid, np.nan, GYRO)[20:50])
+
+
+def test_messages_of_mcap_come_in_the_order_of_their_times(tmp_path):
+    """As the library's own reader orders them, in chunks that overlap."""
+    pytest.importorskip("mcap")
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    from fogml.readers import mcap_chunks
+
+    rng, path = np.random.default_rng(3), tmp_path / "log.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, chunk_size=300)
+        writer.start()
+        channels = [writer.register_channel(f"/{name}", "json", 0) for name in "abc"]
+        for i in range(400):
+            now = int(100 * i + rng.integers(0, 3000)) // 50
+            writer.add_message(channels[rng.integers(3)], now, b"%d" % i, now)
+        writer.finish()
+    with path.open("rb") as file:
+        reader = make_reader(file)
+        right = [(m.log_time, m.channel_id, m.data) for _, _, m in reader.iter_messages(topics=["/a", "/c"])]
+        chunks = reader.get_summary().chunk_indexes
+        assert len(chunks) > 20 and len(right) > 200
+        found = list(mcap_chunks.messages(file, chunks, (channels[0], channels[2])))
+    assert [time for time, *_ in found] == [time for time, *_ in right]
+    assert sorted(found) == sorted(right)
