@@ -77,7 +77,7 @@ def _table(run: Mapping[str, Any], costs: Mapping[str, Any]) -> Table:
     for axis in costs["axes"]:
         for kind, unit in (("position_km", "km"), ("heading_deg", "deg")):
             cells = [
-                f"{number(before)} → {number(after)}"
+                f"{number(before)} → {number(after)}".replace(" × ", "\u00a0×\u00a0")
                 for before, after in zip(
                     run["constant"]["before"][axis][kind], run["constant"]["after"][axis][kind], strict=True
                 )
@@ -88,7 +88,7 @@ def _table(run: Mapping[str, Any], costs: Mapping[str, Any]) -> Table:
         columns=(
             ("Constant drift of", "", "text"),
             ("Unit", "", "text"),
-            *((f"{hours:g} h", "", "figure") for hours in costs["hours"]),
+            *((f"{hours:g} h", "", "figure pair") for hours in costs["hours"]),
         ),
         rows=tuple(rows),
         caption=(

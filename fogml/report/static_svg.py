@@ -13,8 +13,11 @@ from fogml.escaping import markup
 
 FloatArray = NDArray[np.float64]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 58.0, 8.0, 8.0, 34.0
-_DIGIT, _TITLE = 6.2, 25.0
-"""Widths of a digit of a label, and of the title of the upright axis with what is free about it."""
+_TITLE = 25.0
+"""Width of the title of the upright axis with what is free about it."""
+_WIDTHS = {"−": 8.8, "+": 8.8, ".": 3.4}
+_DIGIT = 6.7
+"""Widths of characters of a label of 10.5 px in DejaVu Sans, the widest of the fonts of pages."""
 _LEGEND, _LEGEND_COLUMNS = 15.0, 3
 
 
@@ -46,7 +49,7 @@ def ticks(low: float, high: float, about: int = 5) -> list[float]:
     if first + 1 > np.floor(high / step + 1e-9):
         # A single one tells no size.
         return ticks(low, high, 2 * about)
-    return [float(round(k * step, 12)) + 0.0 for k in np.arange(first, np.floor(high / step + 1e-9) + 1)]
+    return [float(f"{k * step:.12g}") + 0.0 for k in np.arange(first, np.floor(high / step + 1e-9) + 1)]
 
 
 def line_figure(
@@ -81,7 +84,7 @@ def line_figure(
         room = max(0.0, 0.5 * (1.0 - (y_span[1] - y_span[0])))
         y_span = y_span[0] - room, y_span[1] + room
     y_ticks = _ticks_of(y_span, "y" in log, about=4)
-    left = max(_LEFT, _TITLE + _DIGIT * max((len(_tick(value)) for value in y_ticks), default=0))
+    left = max(_LEFT, _TITLE + max((_width(_tick(value)) for value in y_ticks), default=0.0))
     top = _TOP + _LEGEND * (1 + (sum(bool(c.label) for c in curves) - 1) // _LEGEND_COLUMNS)
 
     def across(x: FloatArray | float) -> FloatArray:
@@ -98,7 +101,7 @@ def line_figure(
         parts.append(f'<path d="M{x},{top}V{height - _BOTTOM}" stroke="#E4E7EB"/>')
         label = _tick(value)
         # A long label at the right edge would reach out of the picture.
-        anchor = "end" if float(x) + 0.5 * _DIGIT * len(label) > width else "middle"
+        anchor = "end" if float(x) + 0.5 * _width(label) > width else "middle"
         at = f'x="{width if anchor == "end" else x}" y="{height - _BOTTOM + 13}" text-anchor="{anchor}"'
         parts.append(f"<text {at}>{label}</text>")
     for value in y_ticks:
@@ -174,6 +177,11 @@ def _outline(x: FloatArray, y: FloatArray) -> str:
         pieces.append(f"{'L' if pen_down else 'M'}{a:.1f},{b:.1f}")
         pen_down = True
     return "".join(pieces)
+
+
+def _width(label: str) -> float:
+    """Width of a label of a tick."""
+    return sum(_WIDTHS.get(character, _DIGIT) for character in label)
 
 
 def _tick(value: float) -> str:

@@ -11,7 +11,7 @@ from fogml.runs.findings import Finding
 from fogml.validation.results import Judgement, Metrics, Repeatability, RunJudgement
 
 Column = tuple[str, str, str]
-"""Heading, unit, and ``text`` or ``figure``."""
+"""Heading, unit, and ``text``, ``figure``, or ``figure pair`` of two that may stand below each other."""
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,8 @@ class Opened:
     session: str
     target: str
     console: list[str] = field(default_factory=list)
-    loaded: bool = False
+    loads: set[str] = field(default_factory=set)
+    """Navigations whose page has loaded; the empty page that comes first is one."""
 
     def tell(self, script: str) -> Any:
         """The value of a script in the page."""
@@ -103,9 +104,10 @@ class Browser:
         opened = self.pages[session] = Opened(self, session, target)
         for domain in ("Page", "Runtime", "Log"):
             opened.ask(f"{domain}.enable")
+        opened.ask("Page.setLifecycleEventsEnabled", enabled=True)
         opened.on_paper(False)
-        opened.ask("Page.navigate", url=page.as_uri())
-        while not opened.loaded:
+        navigation = opened.ask("Page.navigate", url=page.as_uri())["loaderId"]
+        while navigation not in opened.loads:
             self._hear()
         figures = opened.tell('document.querySelectorAll(".plot").length')
         while figures and not opened.console and not opened.tell('!!document.querySelector("[data-drawn]")'):
@@ -136,8 +138,8 @@ class Browser:
         event: dict[str, Any] = json.loads(line)
         page = self.pages.get(event.get("sessionId", ""))
         told = event.get("params", {})
-        if page is not None and event.get("method") == "Page.loadEventFired":
-            page.loaded = True
+        if page is not None and event.get("method") == "Page.lifecycleEvent":
+            page.loads |= {told["loaderId"]} if told["name"] == "load" else set()
         elif page is not None and event.get("method") == "Runtime.consoleAPICalled":
             page.console.append(" ".join(str(one.get("value", "")) for one in told["args"]))
         elif page is not None and event.get("method") == "Runtime.exceptionThrown":

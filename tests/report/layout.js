@@ -20,6 +20,13 @@ function (paper) {
       faults.push(e.tagName + "." + e.className + " " + words(e) + " needs " + e.scrollWidth + ", has " + e.clientWidth);
     }
   });
+  document.querySelectorAll("svg text").forEach(function (e) {
+    var box = e.getBoundingClientRect(), room = e.ownerSVGElement.getBoundingClientRect();
+    if (e.closest(".plot") || !box.width) { return; }
+    if (box.left < room.left - 1 || box.right > room.right + 1 || box.top < room.top - 2 || box.bottom > room.bottom + 2) {
+      faults.push(words(e) + " is cut by its figure's edge");
+    }
+  });
   // Texts that are seen, by their boxes; those of one element belong together.
   var boxes = [], walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
   for (var node = walker.nextNode(); node; node = walker.nextNode()) {

@@ -13,6 +13,7 @@ from fogml.report.words import number
 from tests.report.chromium import CHROMIUM, Browser, Opened
 from tests.report.many_units import batch_biases, pages_of_many
 from tests.report.pages import Page, every_page
+from tests.report.procedure_pages import procedure_pages
 
 pytestmark = [
     pytest.mark.browser,
@@ -22,6 +23,8 @@ NAMED_BUTTONS = {"Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes", "Download p
 KINDS = (
     *("train", "train of five", "compare", "inspect", "noise", "gap", "index", "certificate"),
     *("acceptance", "batch", "fleet", "monitor", "monitored unit"),
+    *("sweep", "plan", "blind", "effect", "catalogue", "misalignment", "north", "north of a recording"),
+    *("rate", "train with navigation", "axes", "axes accepted"),
 )
 LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 
@@ -29,7 +32,7 @@ LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 @cache
 def pages() -> dict[str, str]:
     """Every kind of page."""
-    return every_page() | pages_of_many()
+    return every_page() | pages_of_many() | procedure_pages()
 
 
 @pytest.fixture(scope="module")

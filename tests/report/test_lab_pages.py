@@ -36,14 +36,16 @@ def simulated() -> str:
     return north_page(finite_json(values))
 
 
-def rates() -> str:
+def rates(source: str = "T") -> str:
     from fogml.lab.rate_json import rate_json
     from fogml.lab.rate_programmes import rate_runs
     from fogml.report.rate_page import rate_page
     from fogml.twin.twin import Twin
 
     twin = Twin().with_effect("loop_gain", 1e-3)
-    values = rate_json(rate_runs(twin, frequencies_hz=np.array([10.0, 100.0, 300.0])), source="T", twin=twin)
+    values = rate_json(
+        rate_runs(twin, frequencies_hz=np.array([10.0, 100.0, 300.0])), source=source, twin=twin
+    )
     return rate_page(finite_json(values))
 
 

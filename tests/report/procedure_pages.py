@@ -1,0 +1,59 @@
+"""Pages of studies, plans and the laboratory's procedures, with long serial numbers.
+
+``data/plan.json`` and ``data/sweep.json`` are what `fogml plan` and `fogml sweep` wrote, shortened.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from fogml.blind.scoring.values import score_values
+from fogml.report import blind_page
+from fogml.report.axes_page import axes_page
+from fogml.report.catalogue_page import catalogue_page
+from fogml.report.effect_card import effect_page
+from fogml.report.plan_page import plan_page
+from fogml.report.sweep_page import sweep_page
+from fogml.twin.card import card_values
+from fogml.twin.pictures import allan_curve, pictures, rate_curves
+from fogml.twin.registry import effects
+from tests.blind.test_parts import marks_of
+from tests.lab.test_batch import SERIAL, report
+from tests.report import test_lab_pages as lab
+from tests.report.judgements import judgement
+from tests.report.pages import noise_values
+
+DATA = Path(__file__).parent / "data"
+
+
+def written(name: str) -> dict:
+    """The JSON that a command wrote."""
+    return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
+
+
+def procedure_pages() -> dict[str, str]:
+    """Name to HTML of each page."""
+    shown = [effects()[id] for id in ("shupe_pure", "loop_gain")]
+    drawn = [(card_values(one), *pictures(one), rate_curves(one), allan_curve(one)) for one in shown]
+    links = {axis: f"{axis}/noise.html" for axis in "xyz"}
+    serial = SERIAL.format(7)
+    return {
+        "sweep": sweep_page(written("sweep"), judgement()),
+        "plan": plan_page(written("plan")),
+        "blind": blind_page(score_values(marks_of(range(1, 41)))),
+        "effect": effect_page(drawn[0][0], [drawn[0][1]], *drawn[0][2:]),
+        "catalogue": catalogue_page(drawn),
+        "misalignment": lab.misalignment(),
+        "north": lab.simulated(),
+        "north of a recording": lab.recorded(),
+        "rate": lab.rates(serial),
+        "train with navigation": lab.trained(),
+        "axes": axes_page(
+            {"command": "noise", "axes": {axis: noise_values() | {"run": f"{serial}.csv"} for axis in links}},
+            links,
+        ),
+        "axes accepted": axes_page(
+            {"command": "lab acceptance", "axes": {axis: report(7, 0.01) for axis in links}}, links
+        ),
+    }
