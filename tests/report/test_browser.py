@@ -68,7 +68,7 @@ def test_a_page_is_drawn_in_silence_and_nothing_is_cut_or_covered(browser, kind)
 
 FIGURES = """Array.from(document.querySelectorAll(".plot")).map(function (plot) {
   return {
-    curves: plot.querySelectorAll(".main-svg .js-line, .main-svg .point, .main-svg .trace.bars, .main-svg .points").length,
+    curves: plot.querySelectorAll(".main-svg .js-line, .main-svg .point, .main-svg .trace.bars, .main-svg .points, .main-svg .hm image").length,
     buttons: Array.from(plot.querySelectorAll(".modebar-btn")).map(function (e) { return e.dataset.title; })
   };
 })"""  # noqa: E501
