@@ -66,8 +66,11 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
             work.doing("writing")
             write_gap(folder, found)
             settings.write_into(folder, "diagnose")
-            found.write_model(model, folder / "twin.yaml")
+            used = {run.name for run in runs} - {name for name, _ in found.unusable}
+            told = found.write_model(model, folder / "twin.yaml", [run for run in runs if run.name in used])
     _print(found, terminal)
+    for said in told:
+        terminal.say(f"{said}.")
     terminal.result(found.as_dict())
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
     return found

@@ -53,7 +53,8 @@ class SimulateSettings(Settings):
     """A synthetic run from a programme and a twin.
 
     It is written block by block. The run holds what was recorded; --truth keeps every node and every
-    effect's contribution apart.
+    effect's contribution apart. With --draws a fleet of plausible units: constants, effects and plant drawn
+    from the twin's covariance, as a diagnosis leaves it, and what is suspected on as often as it is likely.
     Samples in which the unit is off are not recorded.
     """
 
@@ -68,6 +69,13 @@ class SimulateSettings(Settings):
     twin: Annotated[
         str | dict[str, Any], option("The twin.", metavar="NAME|FILE", reads=True, known=options.TWINS)
     ] = "nominal"
+    draws: Annotated[
+        int,
+        Field(ge=0),
+        option(
+            "Units drawn from what is not known of the twin, a run each: OUT-1, OUT-2, ...", metavar="UNITS"
+        ),
+    ] = 0
     columns: list[str] = Field(default_factory=_usual_columns)
     facts: dict[str, Any] | None = None
     out: Annotated[

@@ -10,14 +10,21 @@ from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.runs.facts import facts_from
 from fogml.twin.between_runs import Storage
+from fogml.twin.draws import drawn_twin
 from fogml.twin.programme import load_programme
 from fogml.twin.simulate import default_facts, world_of, write_world
-from fogml.twin.twin_file import load_twin
+from fogml.twin.twin_file import load_twin, twin_dict
 from fogml.twin.world import World
+
+DRAW_APART = 1000
+"""Seeds of drawn units are so far apart: a file of several runs takes one for each."""
 
 
 def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
     """Simulate block by block into a file, and print what was written."""
+    if settings.draws:
+        _simulate_draws(settings, terminal)
+        return
     if settings.runs:
         _simulate_runs(settings, terminal)
         return
@@ -43,6 +50,47 @@ def simulate_and_write(settings: SimulateSettings, terminal: Terminal) -> None:
         with terminal.work(f"simulating {programme.name}", total=len(world.timeline)) as work:
             rows = write_world(world, out, settings.truth, work.advance)
     _print(settings, world, rows, terminal)
+
+
+def _simulate_draws(settings: SimulateSettings, terminal: Terminal) -> None:
+    """Simulate units drawn from the twin's uncertainty, each into files of its own number."""
+    if not settings.out and not settings.runs:
+        raise InputError("no --out is given; name the run to write, .csv or .parquet")
+    twin, width = load_twin(settings.twin), len(str(settings.draws))
+    several = Collected(terminal)
+    for number in range(1, settings.draws + 1):
+
+        def numbered(path: str | None, tag: str = f"{number:0{width}d}") -> str | None:
+            return path and str(Path(path).with_name(f"{Path(path).stem}-{tag}{Path(path).suffix}"))
+
+        runs = [
+            run.model_copy(update={"out": numbered(run.out), "truth": numbered(run.truth)})
+            for run in settings.runs
+        ]
+        drawn = {"twin": twin_dict(drawn_twin(twin, settings.seed, number)), "draws": 0, "runs": runs}
+        files = {"out": numbered(settings.out), "truth": numbered(settings.truth)}
+        own_seed = {"seed": settings.seed + number * DRAW_APART}
+        simulate_and_write(settings.model_copy(update={**drawn, **files, **own_seed}), several)
+    values = {"schema": "fogml.simulation/1", "twin": twin.name, "draws": several.values}
+    terminal.result(values)
+
+
+class Collected(Terminal):
+    """Prints as another does, and keeps results to be told together.
+
+    Attributes
+    ----------
+    values
+        Results so far.
+    """
+
+    def __init__(self, terminal: Terminal) -> None:
+        super().__init__(terminal.as_json, terminal.quiet)
+        self.values: list[object] = []
+
+    def result(self, values: object) -> None:
+        """Kept."""
+        self.values.append(values)
 
 
 def _simulate_runs(settings: SimulateSettings, terminal: Terminal) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -16,7 +16,8 @@ from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehears
 from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.result_json import gap_values
 from fogml.gap.where_result import Where
-from fogml.runs.run import FloatArray
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
     from fogml.gap.twin_model import AnyModel
@@ -259,6 +260,8 @@ class Diagnosis:
         Of the gap's energy: of each cause in all, by run and by regime.
     compensation
         What of it a gyro can compensate by itself.
+    uncertainty
+        Covariance of constants and named effects together.
     """
 
     fit: tuple[str, ...]
@@ -287,23 +290,37 @@ class Diagnosis:
     rehearsal: tuple[Rehearsed, ...] = ()
     shares: tuple[CauseShare, ...] = ()
     compensation: Compensation | None = None
+    uncertainty: Uncertainty | None = None
 
     @property
     def named(self) -> tuple[Found, ...]:
         """The effects that are named."""
         return tuple(found for found in self.found if found.named)
 
-    def write_model(self, model: AnyModel, path: Path) -> None:
-        """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``."""
+    def write_model(self, model: AnyModel, path: Path, runs: Sequence[Run] = ()) -> tuple[str, ...]:
+        """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``.
+
+        A twin has its covariance, what is suspected, and a plant fitted to what `runs` recorded besides; what
+        of it there is to be said is given back in sentences.
+        """
+        from fogml.gap.better_twin import better_twin
+        from fogml.gap.twin_model import TwinModel
+        from fogml.twin.twin_file import save_twin
+
         noise, spread = self.noise.coefficients, self.noise.relative_se
         factors = {f"factor_{name}": max(math.exp(spread.get(name, 0.0)), 1.0) for name in "NBK"}
-        model.write(
-            path,
+        values = (
             {c.name: c.value for c in self.constants},
             self.effects,
             NoisePrior(noise["N"], noise["B"], noise["K"], **factors),
             {c.name: c.se for c in self.constants},
         )
+        if not isinstance(model, TwinModel):
+            model.write(path, *values)
+            return ()
+        twin, told = better_twin(model.diagnosed(*values), self, runs)
+        save_twin(twin, path)
+        return told
 
     def as_dict(self) -> dict[str, Any]:
         """The content of ``gap.json``."""

@@ -10,6 +10,7 @@ import numpy as np
 
 from fogml.gap.model import Candidate, Constant, EffectValue, GyroModel, NoisePrior
 from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, UNITS, NominalConstants
+from fogml.twin.quantities import Grade
 from fogml.twin.registry import effect, effects
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import save_twin
@@ -62,20 +63,30 @@ class TwinModel:
         noise: NoisePrior,
         standard_errors: Mapping[str, float],
     ) -> None:
-        """Write a twin file: constants as fitted, their standard errors as priors, effects on."""
+        """Write a twin file: as `diagnosed`."""
+        save_twin(self.diagnosed(constants, effects, noise, standard_errors), path)
+
+    def diagnosed(
+        self,
+        constants: Mapping[str, float],
+        effects: tuple[EffectValue, ...],
+        noise: NoisePrior,
+        standard_errors: Mapping[str, float],
+    ) -> Twin:
+        """The twin with constants as fitted, their standard errors as priors, effects on."""
         twin = with_effects(self.twin, constants, effects)
         deviations = asdict(self.twin.nominal_sd) | {
             name: float(value) for name, value in standard_errors.items() if value > 0.0
         }
-        twin = replace(
+        return replace(
             twin,
             name=f"{self.twin.name}-diagnosed",
             description="Fitted to recordings, with the effects that a diagnosis named",
             nominal_sd=NominalConstants(**deviations),
             noise=replace(self.twin.noise, N=float(noise.N), B=float(noise.B), K=float(noise.K)),
             noise_factor={"N": noise.factor_N, "B": noise.factor_B, "K": noise.factor_K},
+            uncertainty=None,
         )
-        save_twin(twin, path)
 
 
 AnyModel = TwinModel | GyroModel
@@ -86,12 +97,15 @@ def with_effects(twin: Twin, constants: Mapping[str, float], effects: tuple[Effe
     """The twin with constants set and effects on, each within what is physical."""
     changed = twin.with_nominal(**{name: float(value) for name, value in constants.items()})
     for value in effects:
-        declared = effect(value.id)
-        held = {
-            q.name: float(np.clip(value.shape[q.name], *q.limits))
-            for q in declared.shape
-            if q.name in value.shape
-        }
-        amplitude = float(np.clip(value.amplitude, *declared.amplitude.limits))
+        amplitude, held = within_limits(value.id, value.amplitude, value.shape, twin.grade)
         changed = changed.with_effect(value.id, amplitude, **held)
     return changed
+
+
+def within_limits(
+    id: str, amplitude: float, shape: Mapping[str, float], grade: Grade
+) -> tuple[float, dict[str, float]]:
+    """Amplitude and shape of an effect brought to what is physical; of a shape not told the usual one."""
+    declared = effect(id)
+    held = {q.name: float(np.clip(shape[q.name], *q.limits)) for q in declared.shape if q.name in shape}
+    return float(np.clip(amplitude, *declared.amplitude.limits)), declared.default_shape(grade) | held

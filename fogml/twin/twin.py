@@ -20,6 +20,7 @@ from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.quantities import Grade
 from fogml.twin.registry import catalogue_order, effect
 from fogml.twin.set_up import Plant, Sensors, Surroundings
+from fogml.twin.uncertainty import Suspected, Uncertainty
 
 if TYPE_CHECKING:
     from fogml.runs.facts import Facts
@@ -76,6 +77,10 @@ class Twin:
         The rest of the set-up.
     settings
         Id of each effect that is on to its amplitude and shape.
+    uncertainty
+        Covariance of its parameters, where a diagnosis told it.
+    suspected
+        Id of each effect that may act and is not on, with its probability.
 
     Raises
     ------
@@ -97,6 +102,8 @@ class Twin:
     sensors: Sensors = field(default_factory=Sensors)
     surroundings: Surroundings = field(default_factory=Surroundings)
     settings: Mapping[str, EffectSetting] = field(default_factory=dict)
+    uncertainty: Uncertainty | None = None
+    suspected: Mapping[str, Suspected] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         # Raises where layers and winding don't fit together.
@@ -111,6 +118,10 @@ class Twin:
                     raise InputError(f"effects '{id}' and '{other}' can't be on at the same time; remove one")
         ordered = dict(sorted(settings.items(), key=lambda item: catalogue_order(effect(item[0]))))
         object.__setattr__(self, "settings", MappingProxyType(ordered))
+        for id, held in self.suspected.items():
+            effect(id).checked({"amplitude": held.amplitude, **held.shape})
+            if id in self.settings:
+                raise InputError(f"effect '{id}' is on and suspected; it is one of the two")
         factors = dict.fromkeys(("N", "B", "K"), NOISE_FACTOR) | dict(self.noise_factor)
         object.__setattr__(self, "noise_factor", MappingProxyType(factors))
 

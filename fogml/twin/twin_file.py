@@ -7,11 +7,13 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from pydantic import ValidationError
 
 from fogml.errors import InputError
 from fogml.outputs import whole_file
 from fogml.runs.columns import KNOWN, is_temperature
+from fogml.twin.draws import moved
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
@@ -46,6 +48,7 @@ from fogml.twin.twin_schema import (
     message,
     near,
 )
+from fogml.twin.uncertainty import Suspected, Uncertainty
 from fogml.yaml_text import read_yaml, yaml_text
 
 SCHEMA = "fogml.twin/1"
@@ -124,9 +127,13 @@ def twin_from(values: Any, source: str = "twin") -> Twin:
                 **_values(source, "surroundings", stated.surroundings, SURROUNDING_QUANTITIES)
             ),
             settings={id: _setting(source, id, entry) for id, entry in stated.effects.items()},
+            uncertainty=_uncertainty(stated.uncertainty),
+            suspected={id: _suspected(source, id, entry) for id, entry in stated.suspected.items()},
         )
         # Raises where plant and effects don't fit together.
         _ = twin.network
+        for name in twin.uncertainty.names if twin.uncertainty else ():
+            moved(twin, name, 0.0)
         return twin
     except InputError as error:
         raise InputError(_prefixed(source, str(error))) from None
@@ -174,11 +181,27 @@ def twin_dict(twin: Twin) -> dict[str, Any]:
     values["surroundings"] = section(SURROUNDING_QUANTITIES, twin.surroundings)
     if twin.settings:
         values["effects"] = {
-            declared.id: {"amplitude": {"value": setting.amplitude, "unit": declared.amplitude.unit}}
-            | {q.name: {"value": setting.shape[q.name], "unit": q.unit} for q in declared.shape}
+            declared.id: _effect_values(declared.id, setting.amplitude, setting.shape)
             for declared, setting in twin.on
         }
+    if twin.uncertainty is not None:
+        values["uncertainty"] = {
+            "source": twin.uncertainty.source,
+            "parameters": list(twin.uncertainty.names),
+            "covariance": twin.uncertainty.covariance.tolist(),
+        }
+    if twin.suspected:
+        values["suspected"] = {
+            id: {"probability": held.probability, **_effect_values(id, held.amplitude, held.shape)}
+            for id, held in twin.suspected.items()
+        }
     return values
+
+
+def _effect_values(id: str, amplitude: float, shape: Mapping[str, float]) -> dict[str, Any]:
+    declared = effect(id)
+    told = {"amplitude": {"value": amplitude, "unit": declared.amplitude.unit}}
+    return told | {q.name: {"value": shape[q.name], "unit": q.unit} for q in declared.shape}
 
 
 def _plant(source: str, stated: Any) -> Plant:
@@ -212,16 +235,37 @@ def _sensors(source: str, stated: Any) -> Sensors:
     return Sensors(shared, single)
 
 
-def _setting(source: str, id: str, entry: Mapping[str, Stated]) -> EffectSetting:
+def _uncertainty(stated: Any) -> Uncertainty | None:
+    if stated is None:
+        return None
+    rows = stated.covariance
+    if any(len(row) != len(rows) for row in rows):
+        raise InputError("uncertainty: rows of the covariance are of different lengths")
+    matrix = np.array(rows, dtype=np.float64).reshape(len(rows), len(rows))
+    return Uncertainty(tuple(stated.parameters), matrix, stated.source)
+
+
+def _suspected(source: str, id: str, entry: Mapping[str, Stated]) -> Suspected:
+    if "probability" not in entry:
+        raise InputError(f"nothing is given for 'suspected.{id}.probability'")
+    rest = {name: held for name, held in entry.items() if name != "probability"}
+    setting = _setting(source, id, rest, "suspected")
+    try:
+        return Suspected(entry["probability"].value, setting.amplitude, setting.shape)
+    except InputError as error:
+        raise InputError(f"key 'suspected.{id}': {error}") from None
+
+
+def _setting(source: str, id: str, entry: Mapping[str, Stated], section: str = "effects") -> EffectSetting:
     declared = effect(id)
     known = {"amplitude": declared.amplitude, **{q.name: q for q in declared.shape}}
     values = {}
     for name, held in entry.items():
         if name not in known:
             raise InputError(
-                f"unknown key 'effects.{id}.{name}'{near(name, known)}; known keys are {', '.join(known)}"
+                f"unknown key '{section}.{id}.{name}'{near(name, known)}; known keys are {', '.join(known)}"
             )
-        values[name] = _value(source, f"effects.{id}.{name}", held, known[name])
+        values[name] = _value(source, f"{section}.{id}.{name}", held, known[name])
     amplitude, shape = declared.checked(values)
     return EffectSetting(amplitude, shape)
 

@@ -96,6 +96,13 @@ def _optional(kind: type[_Strict]) -> tuple[Any, Any]:
     return kind, Field(default_factory=kind)
 
 
+class _UncertaintySection(_Strict):
+    source: str = ""
+    parameters: list[str]
+    covariance: list[list[Annotated[float, Field(allow_inf_nan=False)]]]
+
+
+_EFFECTS: Any = dict[str, dict[str, Annotated[Stated, BeforeValidator(_plain)]]]
 _Sensor: Any = _section("_Sensor", SENSOR_QUANTITIES, reads=(dict[str, float], {}))
 _SENSOR_TABLE: Any = dict[str, _Sensor]
 _LINE_SECTION: Any = _section("_Line", LINE, layers=(Annotated[int, Field(ge=1, le=1000)], 32)) | None
@@ -128,7 +135,9 @@ TWIN_FILE: Any = create_model(
     ),
     sensors=_optional(_section("_Sensors", SENSOR_QUANTITIES, single=(_SENSOR_TABLE, {}))),
     surroundings=_optional(_section("_Surroundings", SURROUNDING_QUANTITIES)),
-    effects=(dict[str, dict[str, Annotated[Stated, BeforeValidator(_plain)]]], {}),
+    effects=(_EFFECTS, {}),
+    uncertainty=(_UncertaintySection | None, None),
+    suspected=(_EFFECTS, {}),
 )
 """The file as pydantic checks it; values and units are checked against their quantities afterwards."""
 

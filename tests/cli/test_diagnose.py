@@ -16,6 +16,7 @@ from click.testing import CliRunner
 from fogml.cli.diagnose_job import _print
 from fogml.cli.main import app
 from fogml.cli.terminal import Terminal
+from fogml.gap.diagnosis import diagnose
 from fogml.gap.families.units import SharedCause, UnitsDiagnosis
 from fogml.gap.result import Estimate
 from fogml.runs.reading import read_run
@@ -367,3 +368,20 @@ def test_a_diagnosis_that_makes_no_model_is_told(runs, diagnosed, tmp_path):
     ):
         assert told in run_program(*given, *more, status=2).stderr
     assert "of which diagnosis" in run_program(*given[:-1], "--cause", "ageing", status=2).stderr
+
+
+def test_the_twin_of_a_diagnosis_is_simulated_and_shows_no_gap(diagnosed, tmp_path):
+    """What it simulates differs from it in nothing, and its draws scatter as it is unsure."""
+    config = {"programme": steps(PROGRAMMES["b"]), "twin": str(diagnosed / "twin.yaml"), "sample_s": SAMPLE_S}
+    file = tmp_path / "simulate.yaml"
+    file.write_text(yaml.safe_dump(config | {"columns": ["T_in", "T_out", "rate"]}))
+    run_program("simulate", file, "--out", tmp_path / "again.csv")
+    twin = load_twin(diagnosed / "twin.yaml")
+    assert diagnose(twin, [read_run(tmp_path / "again.csv")], plan=False).verdict == "no_gap"
+    assert {"nominal.b0", "effects.thermal_hysteresis.amplitude"} <= set(twin.uncertainty.names)
+    printed = run_program("simulate", file, "--draws", 3, "--out", tmp_path / "d.csv", "--json")
+    drawn = [read_run(tmp_path / f"d-{number}.csv") for number in (1, 2, 3)]
+    assert len({run.facts.unit for run in drawn}) == 3
+    assert [one["run"] for one in json.loads(printed.stdout)["draws"]] == ["d-1.csv", "d-2.csv", "d-3.csv"]
+    assert np.ptp([run.gyro_deg_h.mean() for run in drawn]) < 0.5 < abs(drawn[0].gyro_deg_h.mean())
+    assert "no --out" in run_program("simulate", file, "--draws", 2, status=2).stderr

@@ -13,6 +13,7 @@ from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cau
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.compensable import compensation_of
 from fogml.gap.families.inference import Inference, Progress, infer
+from fogml.gap.families.joint import joint_uncertainty
 from fogml.gap.families.left_out import doubted
 from fogml.gap.families.own_simulator import candidates_of
 from fogml.gap.families.posterior import Cause, Judgement, at_cost, judge
@@ -191,6 +192,7 @@ def _answer(
         stage_energies(found, energies),
         Noise(found.field.whitening.noise, found.points.fit, found.points.source),
     )
+    values = fitted_values(found, judged, named, cards)
     return Diagnosis(
         fit=tuple(r.run.name for r in scene.runs[: scene.fitted]),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
@@ -207,7 +209,8 @@ def _answer(
         constants=constants_of(found, after),
         evidence=evidence,
         noise=noise_of(found, after),
-        effects=fitted_values(found, judged, named, cards),
+        effects=values,
+        uncertainty=joint_uncertainty(found, values),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,
         assumed=assumed(found),

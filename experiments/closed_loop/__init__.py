@@ -1,0 +1,1 @@
+"""From a found cause to a compensated gyro, on fresh units."""

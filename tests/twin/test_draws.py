@@ -1,0 +1,108 @@
+"""What is not known of a twin: its file, units drawn from it, a plant fitted to recorded temperatures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import yaml
+
+from fogml.errors import InputError
+from fogml.twin.draws import drawn_twin, parameter_values
+from fogml.twin.plant.fit import fit_plant
+from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.standard import ThermalConstants
+from fogml.twin.set_up import Plant
+from fogml.twin.simulate import simulate
+from fogml.twin.twin import Twin
+from fogml.twin.twin_file import load_twin, save_twin, twin_dict
+from fogml.twin.uncertainty import Suspected, Uncertainty
+
+NAMES = ("nominal.b0", "effects.thermal_hysteresis.half_width", "plant.case")
+COVARIANCE = np.array([[0.04, 0.05, 0.0], [0.05, 0.25, -6.0], [0.0, -6.0, 900.0]])
+
+
+def unsure() -> Twin:
+    """A twin with a covariance over three sections and one effect that is suspected."""
+    twin = load_twin("nominal").with_effect("thermal_hysteresis", 0.2, half_width=8.0)
+    shape = {
+        "transition_temperature": 40.0,
+        **load_twin("nominal").with_effect("glass_transition").settings["glass_transition"].shape,
+    }
+    suspected = {"glass_transition": Suspected(0.3, 0.1, shape)}
+    return replace(twin, uncertainty=Uncertainty(NAMES, COVARIANCE, "a diagnosis"), suspected=suspected)
+
+
+def test_a_file_reads_back_as_the_same_twin(tmp_path):
+    twin = unsure()
+    save_twin(twin, tmp_path / "twin.yaml")
+    back = load_twin(tmp_path / "twin.yaml")
+    assert twin_dict(back) == twin_dict(twin)
+    assert back.uncertainty is not None
+    np.testing.assert_allclose(back.uncertainty.covariance, COVARIANCE)
+
+
+def test_drawn_units_scatter_as_the_covariance_says():
+    twin = unsure()
+    drawn = [drawn_twin(twin, 3, number) for number in range(1, 801)]
+    values = np.array([[parameter_values(one)[name] for name in NAMES] for one in drawn])
+    scale = np.sqrt(np.diag(COVARIANCE))
+    np.testing.assert_allclose(values.mean(axis=0), [0.0, 8.0, 900.0], atol=4.0 * scale.max() / 28.0)
+    np.testing.assert_allclose(
+        np.cov(values.T) / np.outer(scale, scale), COVARIANCE / np.outer(scale, scale), atol=0.15
+    )
+    share = np.mean(["glass_transition" in one.settings for one in drawn])
+    assert abs(share - 0.3) < 4.0 * (0.21 / 800) ** 0.5
+    assert drawn_twin(twin, 3, 5).settings == drawn[4].settings
+    assert drawn[0].uncertainty is None and not drawn[0].suspected
+
+
+def test_without_a_covariance_constants_come_from_their_own_deviations():
+    drawn = [drawn_twin(load_twin("nominal"), 1, number).nominal for number in range(1, 301)]
+    assert np.std([one.b0 for one in drawn]) == pytest.approx(5.0, rel=0.2)
+    assert np.corrcoef([one.b0 for one in drawn], [one.b1 for one in drawn])[0, 1] < 0.25
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        ({"uncertainty": {"parameters": ["nominal.b9"], "covariance": [[1.0]]}}, "no parameter 'nominal.b9'"),
+        ({"uncertainty": {"parameters": ["nominal.b0"], "covariance": [[-1.0]]}}, "covariance"),
+        ({"uncertainty": {"parameters": ["nominal.b0"], "covariance": [[1.0], [2.0]]}}, "rows"),
+        ({"suspected": {"ageing": {"amplitude": 0.1}}}, "suspected.ageing.probability"),
+        ({"suspected": {"ageing": {"amplitude": 0.1, "probability": 2.0}}}, "between 0 and 1"),
+        ({"suspected": {"thermal_hysteresis": {"amplitude": 0.1, "probability": 0.2}}}, "on and suspected"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, change, told):
+    path = tmp_path / "mine.yaml"
+    plain = replace(unsure(), uncertainty=None, suspected={})
+    path.write_text(yaml.safe_dump({**twin_dict(plain), **change}))
+    with pytest.raises(InputError, match=f"mine.yaml.*{told}"):
+        load_twin(path)
+
+
+STEPS = ["soak at 25 degC for 30 min", "ramp to 55 degC at 1 degC/min", "soak at 55 degC for 60 min"]
+COLUMNS = ["T_chamber", "T_in", "T_out", "T_electronics"]
+
+
+def test_a_plant_is_fitted_to_what_was_recorded():
+    heating = SelfHeating(3.0, 3.0, 900.0)
+    constants = ThermalConstants(case=1300.0, case_to_coil=240.0, coil=300.0, electronics=420.0)
+    true = replace(load_twin("nominal"), plant=Plant(constants, heating=heating))
+    runs = [simulate(STEPS, true, sample_s=20.0, seed=s, columns=COLUMNS).run for s in (1, 2)]
+    found = fit_plant(Plant(heating=heating), runs)
+    assert found is not None
+    assert {"plant.case", "plant.case_to_coil", "plant.coil", "plant.electronics"} <= set(found.names)
+    deviations = np.sqrt(np.diag(found.covariance))
+    for name, sd in zip(found.names, deviations):
+        fitted, truth = (getattr(c, name.removeprefix("plant.")) for c in (found.plant.constants, constants))
+        assert abs(np.log(fitted / truth)) < 4.0 * sd < 0.6, name
+    assert max(found.misfit_degc.values()) < 0.01  # the sensors' noise is 0.005
+
+
+def test_without_air_or_another_node_no_plant_is_fitted():
+    for columns in (["T_in", "T_out"], ["T_chamber"]):
+        run = simulate(STEPS, "nominal", sample_s=60.0, columns=columns).run
+        assert fit_plant(Plant(), [run]) is None
