@@ -15,10 +15,13 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import diagnose
 from fogml.gap.families.units import UnitsDiagnosis
+from fogml.gap.replayed_column import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
 from fogml.gap.twin_model import TwinModel
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
+from fogml.runs.columns import REPLAYED
+from fogml.runs.run import Run
 from fogml.twin.twin_file import load_twin
 
 NEXT_RUN = "next-run.yaml"
@@ -40,6 +43,10 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
         runs = open_runs(settings.runs, terminal, repair=settings.repair)
         held_out = open_runs(settings.held_out, terminal, repair=settings.repair) if settings.held_out else []
         noise = open_run(settings.noise, repair=settings.repair) if settings.noise else None
+        recorded, kept_back = runs, held_out
+        column = _column(settings, model, runs, held_out, terminal)
+        if column is not None:
+            model, runs, held_out = column.model, column.fit, column.held_out
         if of_several_units(runs):
             with terminal.work("diagnosing") as work:
                 several = diagnose_several(settings, model, runs, held_out, noise, work.doing)
@@ -62,7 +69,8 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 progress=work.doing,
             )
             work.doing("compensating")
-            found = with_brought(found, runs, held_out, noise)
+            found = with_brought(found, recorded, kept_back, noise)
+            found = found if column is None else column.shown(found)
             work.doing("writing")
             write_gap(folder, found)
             settings.write_into(folder, "diagnose")
@@ -74,6 +82,18 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     terminal.result(found.as_dict())
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
     return found
+
+
+def _column(
+    settings: DiagnoseSettings, model: TwinModel, runs: list[Run], held_out: list[Run], terminal: Terminal
+) -> ByColumn | None:
+    """What takes the twin's place where the runs say themselves what a simulator gives for them."""
+    if not any(REPLAYED in run.columns for run in (*runs, *held_out)):
+        return None
+    if settings.twin != "nominal":
+        terminal.note(f"the runs' column 'replayed' is not used: --twin {settings.twin} replays them")
+        return None
+    return by_column(model.twin, runs, held_out) if has_column([*runs, *held_out]) else None
 
 
 def write_gap(folder: Path, found: Diagnosis) -> None:

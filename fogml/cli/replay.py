@@ -13,12 +13,14 @@ class ReplaySettings(Settings):
     """A twin's output for a run's inputs, or what one effect changes.
 
     The output is the one without noise. The file written holds the run's columns and 'replayed [deg/h]'.
+    What another simulator gave for the run stands in the twin's place: a file with 'time' and 'gyro', such as
+    Simulink's logged output, or the folder of results of gnss-ins-sim.
     """
 
     job: ClassVar[str] = "fogml.cli.replay_job:replay_and_write"
     twin: Annotated[
         str | None,
-        argument("TWIN", "A twin file, or the name of one that ships.", reads=True, known=options.TWINS),
+        argument("TWIN", "A twin file or name, or a simulator's output.", reads=True, known=options.TWINS),
     ] = None
     run: Annotated[
         str | None,
@@ -31,6 +33,9 @@ class ReplaySettings(Settings):
     truth: Annotated[
         str | None,
         option("Truth of a simulated run, in place of its columns.", metavar="FILE", reads=True),
+    ] = None
+    gyro_axis: Annotated[
+        str | None, option("Of gnss-ins-sim's three axes the gyro's.", "--axis", metavar="x|y|z")
     ] = None
     after: Annotated[
         list[str],

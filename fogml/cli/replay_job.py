@@ -12,7 +12,9 @@ from fogml.cli.runs import open_run
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import check_finite
+from fogml.runs.columns import REPLAYED
 from fogml.runs.run import FloatArray, Run
+from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
 from fogml.runs.writing import BlockWriter, carried_cells, header_cells
 from fogml.twin.between_runs import Storage
 from fogml.twin.replay import replay
@@ -36,13 +38,19 @@ def replay_and_write(settings: ReplaySettings, terminal: Terminal) -> None:
     for what, given in (("the run itself", settings.run), ("the truth", settings.truth)):
         if given and out.exists() and Path(given).exists() and out.samefile(given):
             raise InputError(f"{out}: is {what}; choose another --out")
-    twin = load_twin(settings.twin)
+    elsewhere = settings.twin not in twin_names() and is_simulator_output(settings.twin)
+    if elsewhere and (settings.only or settings.truth or settings.after):
+        raise InputError(f"{settings.twin}: a simulator's output takes no --only, --truth or --after")
+    twin = None if elsewhere else load_twin(settings.twin)
     with terminal.work(f"reading {settings.run}") as work:
         run = open_run(settings.run, repair=settings.repair)
         truth = read_truth(settings.truth) if settings.truth else None
         work.doing("replaying")
-        replayed = _replayed(settings, twin, run, truth)
-        values = _values(settings, twin, run, replayed)
+        if twin is None:
+            replayed = _given_by(settings.twin, settings.gyro_axis, run)
+        else:
+            replayed = _replayed(settings, twin, run, truth)
+        values = _values(settings, Path(settings.twin).name if twin is None else twin.name, run, replayed)
         check_finite(values, run.name)
         work.doing(f"writing {out.name}")
         with settings.written_beside(out, "replay"):
@@ -58,19 +66,27 @@ def _replayed(settings: ReplaySettings, twin: Twin, run: Run, truth: Truth | Non
     return replay_after(twin, run, after, only=settings.only, storage=storage)
 
 
+def _given_by(path: str, axis: str | None, run: Run) -> FloatArray:
+    """What another simulator gave for a run [deg/h], shape (n,)."""
+    if Path(path).is_dir():
+        return at_times_of(run, *read_gnss_ins_sim(path, axis), path)
+    given = open_run(path, axis=axis)
+    return at_times_of(run, given.time, given.gyro_deg_h, path)
+
+
 def _write(run: Run, replayed: FloatArray, out: Path) -> None:
-    recorded = {cell: run.columns[name] for name, cell in header_cells(run).items()}
+    recorded = {cell: run.columns[name] for name, cell in header_cells(run).items() if name != REPLAYED}
     with BlockWriter(out, run.facts) as writer:
         writer.write({**recorded, "replayed [deg/h]": replayed}, carried_cells(run))
 
 
-def _values(settings: ReplaySettings, twin: Twin, run: Run, replayed: FloatArray) -> dict[str, Any]:
+def _values(settings: ReplaySettings, twin: str, run: Run, replayed: FloatArray) -> dict[str, Any]:
     assert settings.out
     values: dict[str, Any] = {
         "schema": "fogml.replay/1",
         "run": run.name,
         "out": Path(settings.out).name,
-        "twin": twin.name,
+        "twin": twin,
         "only": settings.only,
         "rows": len(run),
         "unit": "deg/h",

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
-from fogml.runs.columns import KNOWN, coil_sensor_number, column_spec, is_temperature
+from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, column_spec, is_temperature
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
 
 TIME_ON = "time_on"
 """Time since power-on [s]: a column of that name, else from the fact ``powered_on``."""
-NOT_INPUTS = ("time", "gyro")
+NOT_INPUTS = ("time", "gyro", REPLAYED)
 """Columns that no feature may be made of."""
 _ORDER = ["T", *(name for name in KNOWN if name != "T")]
 

@@ -40,6 +40,9 @@ _GYRO = {
     "rad/s": (3600.0 * _DEGREE_PER_RADIAN, 0.0),
     "count": (1.0, 0.0),
 }
+_SIMULATED = {unit: scale for unit, scale in _GYRO.items() if unit != "count"}
+REPLAYED = "replayed"
+"""The column that a simulator's output stands in."""
 _TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
 _RATE = {"deg/s": (1.0, 0.0), "deg/h": (1.0 / 3600.0, 0.0), "rad/s": (_DEGREE_PER_RADIAN, 0.0)}
 _ANGLE = {"deg": (1.0, 0.0), "rad": (_DEGREE_PER_RADIAN, 0.0)}
@@ -72,6 +75,7 @@ def _specs() -> dict[str, ColumnSpec]:
         ColumnSpec("compressor", DUTY, _DUTY, "duty of the compressor"),
         ColumnSpec("heater", DUTY, _DUTY, "duty of the heater"),
         ColumnSpec("fan", DUTY, _DUTY, "duty of the fan"),
+        ColumnSpec(REPLAYED, "deg/h", _SIMULATED, "what a simulator gives for this run's inputs"),
         ColumnSpec("B_x", "uT", _FIELD, "magnetic field in the gyro frame"),
         ColumnSpec("B_y", "uT", _FIELD, "magnetic field in the gyro frame"),
         ColumnSpec("B_z", "uT", _FIELD, "magnetic field in the gyro frame"),

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.runs.columns import KNOWN, coil_sensor_number, header, is_temperature
+from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, header, is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.between_runs import Storage
@@ -41,6 +41,7 @@ DEFAULT_COLUMNS = (
 """What is recorded beside time and gyro unless told otherwise."""
 DEFAULT_FACTS = Facts(axis="x", latitude=39.9, input_axis="up")
 BLOCK_ROWS = 1 << 14
+_NO_SENSOR = ("time", "gyro", REPLAYED)
 _ROUNDED = 1e-6
 """Of a count: what a rate's digits leave of it."""
 
@@ -251,8 +252,8 @@ def world_of(
         stated = stated.model_copy(update={"scale_factor": ScaleFactor(value=counts)})
     names = tuple(DEFAULT_COLUMNS if columns is None else columns)
     for name in names:
-        if name in ("time", "gyro") or (name not in KNOWN and coil_sensor_number(name) is None):
-            known = [key for key in KNOWN if key not in ("time", "gyro")]
+        if name in _NO_SENSOR or (name not in KNOWN and coil_sensor_number(name) is None):
+            known = [key for key in KNOWN if key not in _NO_SENSOR]
             raise InputError(
                 f"columns: '{name}' can't be recorded; known are {', '.join(known)} "
                 "and coil sensors T1, T2 ..."

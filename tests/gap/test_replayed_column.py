@@ -1,0 +1,50 @@
+"""A simulator's output in a column is enough for a diagnosis, whatever else it knows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.gap.families.making_rows import rows_of
+from fogml.gap.replayed_column import by_column, has_column
+from fogml.runs.run import Run
+from fogml.twin.replay import replay
+from fogml.twin.simulate import simulate
+from fogml.twin.twin_file import load_twin
+
+STEPS = ["soak at 20 degC for 30 min", "ramp to 50 degC at 1 degC/min", "soak at 50 degC for 30 min"]
+
+
+def run(seed: int) -> Run:
+    """A run whose simulator knows a bias, a slope and a wave over temperature."""
+    twin = load_twin("nominal").with_nominal(b0=2.0, b1=0.02, m=0.5)
+    made = simulate(STEPS, twin, sample_s=20.0, seed=seed, columns=["T_in", "T_out"]).run
+    T = made.temperature("T_in")
+    wave = 0.3 * np.sin(T / 3.0)
+    simulator = made.facts.earth_rate_deg_h + 1.8 + 0.02 * (T - 25.0) + wave
+    columns = {**made.columns, "gyro": made.gyro + wave, "replayed": simulator}
+    return Run(f"r{seed}", columns, made.facts)
+
+
+def test_the_gap_is_recorded_less_the_column():
+    runs = [run(1), run(2)]
+    assert has_column(runs)
+    told = by_column(load_twin("nominal"), runs[:1], runs[1:])
+    nominal = told.model.twin.nominal
+    assert nominal.b0 == pytest.approx(1.8, abs=0.4) and nominal.b1 == pytest.approx(0.02, abs=0.02)
+    for given, made in zip(runs, (*told.fit, *told.held_out)):
+        gap = given.gyro_deg_h - given.columns["replayed"]
+        np.testing.assert_allclose(made.gyro_deg_h - replay(told.model.twin, made), gap, atol=1e-9)
+        assert "replayed" not in made.columns
+        # What the simulator knows is no part of the gap: smooth rows leave what it misses.
+        rows = rows_of(made, told.model.twin, 400)
+        assert abs(rows.gap.mean() - 0.2) < 0.15 and np.std(rows.gap) < 0.25
+
+
+def test_runs_that_have_it_and_runs_that_do_not_are_refused():
+    one = run(1)
+    bare = Run("bare", {n: v for n, v in one.columns.items() if n != "replayed"}, one.facts)
+    assert not has_column([bare])
+    with pytest.raises(InputError, match="bare: no column 'replayed"):
+        has_column([one, bare])
