@@ -31,8 +31,8 @@ def test_the_gap_is_recorded_less_the_column():
     runs = [run(1), run(2)]
     assert has_column(runs)
     told = by_column(load_twin("nominal"), runs[:1], runs[1:])
-    nominal = told.model.twin.nominal
-    assert nominal.b0 == pytest.approx(1.8, abs=0.4) and nominal.b1 == pytest.approx(0.02, abs=0.02)
+    apart = runs[0].columns["replayed"] - replay(told.model.twin, runs[0])
+    assert abs(apart.mean()) < 0.01 and np.std(apart) < 0.25  # the wave's share that no constant holds
     for given, made in zip(runs, (*told.fit, *told.held_out)):
         gap = given.gyro_deg_h - given.columns["replayed"]
         np.testing.assert_allclose(made.gyro_deg_h - replay(told.model.twin, made), gap, atol=1e-9)
