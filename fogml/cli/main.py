@@ -66,6 +66,10 @@ COMMANDS = {
         ".monitor:MonitorSettings",
         "Watch units in service: what their model leaves on each run, and since when that is another.",
     ),
+    "app": (
+        ".app:AppSettings",
+        "A page on this machine: drop files, choose, train, judge, diagnose, export.",
+    ),
     "effects": (
         ".effects:EffectsSettings",
         "The catalogue of effects that a twin can have, or the card of one.",

@@ -27,7 +27,7 @@ _FLAGS = (
     "--disable-background-timer-throttling",
     "--disable-renderer-backgrounding",
     # No name resolves: a page that needs anything from elsewhere fails here as it does offline.
-    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
     "--remote-debugging-pipe",
 )
 _SCREEN = {"width": 1366, "height": 900, "deviceScaleFactor": 1, "mobile": False}
@@ -99,6 +99,14 @@ class Browser:
 
     def open(self, page: Path) -> Opened:
         """Open a page, and wait until its figures are drawn."""
+        opened = self.open_at(page.as_uri())
+        figures = opened.tell('document.querySelectorAll(".plot").length')
+        while figures and not opened.console and not opened.tell('!!document.querySelector("[data-drawn]")'):
+            time.sleep(0.02)
+        return opened
+
+    def open_at(self, address: str) -> Opened:
+        """Open an address, and wait until it has loaded."""
         target = self.ask("Target.createTarget", url="about:blank")["targetId"]
         session = self.ask("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
         opened = self.pages[session] = Opened(self, session, target)
@@ -106,12 +114,9 @@ class Browser:
             opened.ask(f"{domain}.enable")
         opened.ask("Page.setLifecycleEventsEnabled", enabled=True)
         opened.on_paper(False)
-        navigation = opened.ask("Page.navigate", url=page.as_uri())["loaderId"]
+navigation = opened.ask("Page.navigate", url=address)["loaderId"]
         while navigation not in opened.loads:
             self._hear()
-        figures = opened.tell('document.querySelectorAll(".plot").length')
-        while figures and not opened.console and not opened.tell('!!document.querySelector("[data-drawn]")'):
-            time.sleep(0.02)
         return opened
 
     def ask(self, method: str, session: str | None = None, **parameters: Any) -> Any:

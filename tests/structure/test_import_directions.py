@@ -32,6 +32,7 @@ ALLOWED = {
     "monitor": FIRST | {"models"},
     "report": FIRST
     | {"models", "validation", "twin", "gap", "blind", "tuning", "export", "lab", "fleet", "monitor"},
+    "app": set(),
     "testing": FIRST | {"models", "validation", "twin", "gap"},
 }
 ALLOWED["cli"] = set(ALLOWED) - {"testing"}

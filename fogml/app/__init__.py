@@ -1,0 +1,1 @@
+"""A local web page to drop files on: each click is a command line, run in the background."""

@@ -1,0 +1,198 @@
+"""Jobs of the app: a folder each, so that they outlive the server and are found again."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from fogml.app.runner import CANCELLED, ENDED, PROCESS, write_whole
+from fogml.errors import InputError
+from fogml.processes import process_is_alive
+
+TAIL_BYTES = 20_000
+"""How much of what a job printed is shown: its end."""
+STATES = {0: "done", 1: "limit", 2: "refused", 130: "cancelled", 143: "cancelled"}
+"""What an exit status says: done, done and a limit was not met, bad input, interrupted; else it failed."""
+
+
+class Jobs:
+    """The jobs of a folder.
+
+    Parameters
+    ----------
+    home
+        Folder of the app; jobs lie in ``jobs/NNNN``.
+    at_once
+        How many may run at a time; others wait.
+    """
+
+    def __init__(self, home: Path, at_once: int) -> None:
+        self.home, self.at_once = home, at_once
+        self.folder = home / "jobs"
+        self.folder.mkdir(exist_ok=True)
+
+    def names(self) -> list[str]:
+        """Numbers of the jobs, in the order in which they were asked for."""
+        return sorted(p.name for p in self.folder.iterdir() if p.name.isdigit() and (p / "job.json").exists())
+
+    def add(self, words_of: Callable[[str], list[str]]) -> str:
+        """A new job; `words_of` gives its command from the folder of its results. Its number."""
+        number = max([int(name) for name in os.listdir(self.folder) if name.isdigit()], default=0) + 1
+        while True:
+            name = f"{number:04d}"
+            try:
+                (self.folder / name).mkdir()
+                break
+            except FileExistsError:
+                number += 1
+        words = words_of(f"jobs/{name}/results")
+        made = datetime.now(UTC).isoformat(timespec="seconds")
+        write_whole(self.folder / name / "job.json", {"words": words, "made": made})
+        self.start_waiting()
+        return name
+
+    def start_waiting(self) -> None:
+        """Start what waits, as far as may run at once."""
+        states = {name: self.state(name) for name in self.names()}
+        free = self.at_once - sum(state == "running" for state in states.values())
+        for name in [name for name, state in states.items() if state == "waiting"][: max(free, 0)]:
+            # It returns once the job is under way, in a session of its own.
+            subprocess.run(
+                [sys.executable, "-P", "-m", "fogml.app.runner", str(self.folder / name)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+                check=True,
+            )
+
+    def state(self, name: str) -> str:
+        """``waiting``, ``running``, ``done``, ``limit``, ``refused``, ``cancelled`` or ``failed``."""
+        folder = self.folder / name
+        ended = _read(folder / ENDED)
+        if ended is not None:
+            return "cancelled" if (folder / CANCELLED).exists() else STATES.get(ended["status"], "failed")
+        process = _read(folder / PROCESS)
+        if process is None:
+            return "waiting"
+        if process_is_alive(process["pid"], process["started"]):
+            return "running"
+        # It may have ended between the two looks.
+        if (folder / ENDED).exists():
+            return self.state(name)
+        return "cancelled" if (folder / CANCELLED).exists() else "failed"
+
+    def told(self, name: str) -> dict[str, Any]:
+        """A job in short: number, command line, state, when it was asked for, its progress."""
+        folder = self.folder / name
+        job = _read(folder / "job.json") or {"words": [], "made": ""}
+        state = self.state(name)
+        last = _tail(folder / "stderr", 400).strip().rpartition("\n")[2] if state == "running" else ""
+        ended = _read(folder / ENDED) or {}
+        return {
+            "name": name,
+            "command": job["words"][0] if job["words"] else "",
+            "line": command_line(job["words"]),
+            "made": job["made"],
+            "state": state,
+            "status": ended.get("status"),
+            "seconds": ended.get("seconds"),
+            "progress": last,
+        }
+
+    def in_full(self, name: str) -> dict[str, Any]:
+        """A job with what it printed and the files that it wrote."""
+        folder = self.folder / name
+        results = folder / "results"
+        files = [str(p.relative_to(results)) for p in sorted(results.rglob("*")) if p.is_file()]
+        shown = [path for path in files if not any(part.startswith(".") for part in Path(path).parts)]
+        return {
+            **self.told(name),
+            "stdout": _tail(folder / "stdout", TAIL_BYTES),
+            "stderr": _tail(folder / "stderr", TAIL_BYTES),
+            "files": sorted(shown, key=lambda path: (not path.endswith(".html"), path.count("/"), path)),
+        }
+
+    def models(self) -> list[str]:
+        """Folders of models that jobs have written, the newest first."""
+        found = [
+            str(card.parent.relative_to(self.home))
+            for name in self.names()
+            for card in (self.folder / name / "results").rglob("model/model.json")
+        ]
+        return sorted(found, reverse=True)
+
+    def twins(self) -> list[str]:
+        """Twins that diagnoses have written, the newest first."""
+        found = [(self.folder / name / "results" / "twin.yaml") for name in self.names()]
+        return sorted((str(path.relative_to(self.home)) for path in found if path.is_file()), reverse=True)
+
+    def cancel(self, name: str) -> None:
+        """End a job: at first by asking its command, which leaves nothing half written; again: at once."""
+        folder = self.folder / name
+        again = (folder / CANCELLED).exists()
+        state = self.state(name)
+        if state not in ("waiting", "running"):
+            return
+        (folder / CANCELLED).touch()
+        if state == "waiting":
+            write_whole(folder / ENDED, {"status": 130, "seconds": 0.0})
+            return
+        process = _read(folder / PROCESS)
+        if process is None or not process_is_alive(process["pid"], process["started"]):
+            return
+        with contextlib.suppress(ProcessLookupError):
+            if again:
+                os.killpg(process["pid"], signal.SIGKILL)
+            elif process["child"] is not None:
+                os.kill(process["child"], signal.SIGTERM)
+
+    def remove(self, name: str) -> None:
+        """Remove a job that has ended, and its results.
+
+        Raises
+        ------
+        InputError
+            If it runs or waits.
+        """
+        if self.state(name) in ("waiting", "running"):
+            raise InputError(f"job {name} has not ended; cancel it first")
+        shutil.rmtree(self.folder / name)
+
+    def folder_of(self, name: str) -> Path | None:
+        """A job's folder by its number; None if there is no such job."""
+        return self.folder / name if name in self.names() else None
+
+
+def command_line(words: list[str]) -> str:
+    """The command line of a job, to be run in the app's folder."""
+    return shlex.join(["fogml", *words])
+
+
+def _read(path: Path) -> dict[str, Any] | None:
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return values if isinstance(values, dict) else None
+
+
+def _tail(path: Path, count: int) -> str:
+    """The last bytes of a file as text; empty if there is none."""
+    try:
+        with open(path, "rb") as file:
+            file.seek(0, os.SEEK_END)
+            size = file.tell()
+            file.seek(max(size - count, 0))
+            return file.read().decode("utf-8", "replace")
+    except OSError:
+        return ""

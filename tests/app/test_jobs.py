@@ -1,0 +1,86 @@
+"""Jobs: each runs once, goes on without its server, and is found again."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fogml.app.jobs import Jobs
+from fogml.app.runner import PROCESS
+from fogml.errors import InputError
+
+ENDLESS = ["app", "endless", "--port", "0"]
+
+
+def until(state: str, jobs: Jobs, name: str) -> None:
+    """Wait for a job's state."""
+    while jobs.state(name) != state:
+        assert jobs.state(name) in ("waiting", "running"), jobs.in_full(name)
+        jobs.start_waiting()
+        time.sleep(0.02)
+
+
+def test_a_job_goes_on_without_its_server_and_is_found_again(tmp_path: Path) -> None:
+    code = (
+        "import sys, os; from pathlib import Path; from fogml.app.jobs import Jobs\n"
+        f"Jobs(Path({str(tmp_path)!r}), 1).add(lambda results: ['docs', 'index'])\n"
+        "os.kill(os.getpid(), 9)"
+    )
+    subprocess.run([sys.executable, "-c", code], check=False)
+    jobs = Jobs(tmp_path, 1)
+    assert jobs.names() == ["0001"]
+    until("done", jobs, "0001")
+    told = jobs.in_full("0001")
+    assert told["line"] == "fogml docs index" and told["status"] == 0
+    assert "Fibre-optic gyros drift" in told["stdout"]
+    # Once it has begun, nobody begins it again.
+    began = (tmp_path / "jobs" / "0001" / PROCESS).stat().st_mtime_ns
+    again = subprocess.run(
+        [sys.executable, "-m", "fogml.app.runner", str(tmp_path / "jobs" / "0001")], check=True
+    )
+    assert again.returncode == 0
+    assert (tmp_path / "jobs" / "0001" / PROCESS).stat().st_mtime_ns == began
+    jobs.remove("0001")
+    assert jobs.names() == []
+
+
+def test_jobs_wait_for_each_other_and_are_cancelled(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 1)
+    first = jobs.add(lambda results: ENDLESS)
+    second = jobs.add(lambda results: ["docs"])
+    while "Open" not in jobs.in_full(first)["stdout"]:
+        time.sleep(0.02)
+    assert [jobs.state(name) for name in (first, second)] == ["running", "waiting"]
+    with pytest.raises(InputError, match="cancel it first"):
+        jobs.remove(first)
+    jobs.cancel(second)
+    assert jobs.state(second) == "cancelled"
+    jobs.cancel(first)
+    until("cancelled", jobs, first)
+    assert jobs.told(first)["status"] == 143
+
+
+def test_a_job_whose_processes_are_gone_has_failed(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 2)
+    name = jobs.add(lambda results: ENDLESS)
+    while "Open" not in jobs.in_full(name)["stdout"]:
+        time.sleep(0.02)
+    group = os.getpgid(json.loads((tmp_path / "jobs" / name / PROCESS).read_text())["pid"])
+    assert group != os.getpgid(0)
+    os.killpg(group, signal.SIGKILL)
+    until("failed", jobs, name)
+
+
+def test_a_refused_command_says_why(tmp_path: Path) -> None:
+    jobs = Jobs(tmp_path, 1)
+    name = jobs.add(lambda results: ["inspect", "files/none.csv", "--out", results])
+    until("refused", jobs, name)
+    told = jobs.in_full(name)
+    assert "none.csv" in told["stderr"] and told["files"] == []
