@@ -114,7 +114,7 @@ class Browser:
             opened.ask(f"{domain}.enable")
         opened.ask("Page.setLifecycleEventsEnabled", enabled=True)
         opened.on_paper(False)
-navigation = opened.ask("Page.navigate", url=address)["loaderId"]
+        navigation = opened.ask("Page.navigate", url=address)["loaderId"]
         while navigation not in opened.loads:
             self._hear()
         return opened
