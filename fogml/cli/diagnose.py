@@ -12,9 +12,11 @@ from fogml.cli.settings import Settings
 class DiagnoseSettings(Settings):
     """Where the gap between twin and recordings lies, which effect causes it, how far it closes.
 
-    Writes gap.json, gap.html, twin.yaml (the twin with the effect added), diagnose.config.yaml and, where a
-    further run would tell more, next-run.yaml (its programme, for fogml simulate). Runs that state different
-    units are diagnosed together: causes are shared, sizes are each unit's own, in a folder for each.
+    Writes gap.json, gap.html, what-if.html (sizes of effects on sliders), twin.yaml (the twin with the effect
+    added), diagnose.config.yaml and, where a further run would tell more, next-run.yaml (its programme, for
+    fogml simulate). Runs with a column 'replayed [deg/h]' are held against that in place of the twin. Runs
+    that state different units are diagnosed together: causes are shared, sizes are each unit's own, in a
+    folder for each.
     """
 
     job: ClassVar[str] = "fogml.cli.diagnose_job:diagnose_and_write"

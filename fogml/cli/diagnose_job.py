@@ -26,6 +26,8 @@ from fogml.twin.twin_file import load_twin
 
 NEXT_RUN = "next-run.yaml"
 """The programme of a run that would tell more, for ``fogml simulate``."""
+WHAT_IF = "what-if.html"
+"""The page on which the sizes of effects are moved."""
 
 
 def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagnosis | UnitsDiagnosis:
@@ -66,6 +68,7 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 seed=settings.seed,
                 rehearsed=settings.rehearse,
                 cost_of_false_name=settings.cost_of_false_name,
+                courses=True,
                 progress=work.doing,
             )
             work.doing("compensating")
@@ -80,7 +83,9 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
     for said in told:
         terminal.say(f"{said}.")
     terminal.result(found.as_dict())
-    terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}")
+    terminal.say(
+        f"Written to {settings.out}: open {Path(settings.out) / 'gap.html'}, and {WHAT_IF} to try sizes"
+    )
     return found
 
 
@@ -97,11 +102,15 @@ def _column(
 
 
 def write_gap(folder: Path, found: Diagnosis) -> None:
-    """``gap.json``, its page and the programme of a further run."""
+    """``gap.json``, its page, that of what-ifs, and the programme of a further run."""
     from fogml.report import gap_page
 
     write_json(folder / "gap.json", found.as_dict())
     (folder / "gap.html").write_text(gap_page(found), encoding="utf-8")
+    if found.counterfactuals:
+        from fogml.report.counterfactual_page import counterfactual_page
+
+        (folder / WHAT_IF).write_text(counterfactual_page(found), encoding="utf-8")
     if found.separating_run is not None:
         (folder / NEXT_RUN).write_text(found.separating_run.programme, encoding="utf-8")
 

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 
 from fogml.errors import InputError
+from fogml.gap.counterfactual_result import Counterfactual
 from fogml.gap.result import Diagnosis, RunSeries
 from fogml.gap.twin_model import TwinModel
 from fogml.runs.columns import REPLAYED
@@ -26,6 +28,8 @@ from fogml.twin.twin import Twin
 PRIOR_ROWS = 1e-3
 """Weight of the constants' priors, in rows: enough to hold what no run shows at nought, and no more."""
 NAME = "the runs' column 'replayed'"
+_REPLAYED_SERIES = ("recorded", "replayed_before", "replayed_recalibrated", "replayed_after")
+Shown = TypeVar("Shown", RunSeries, Counterfactual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,26 +57,21 @@ class ByColumn:
             "Replayed is what the runs' column 'replayed' says; twin.yaml is the nominal twin nearest to it, "
             "with what was found.",
         )
-        series = tuple(self._series(s) for s in found.series)
-        return replace(found, series=series, assumed=(*said, *found.assumed))
+        series = tuple(self._moved(s, _REPLAYED_SERIES) for s in found.series)
+        others = tuple(self._moved(c, ("recorded", "replayed")) for c in found.counterfactuals)
+        return replace(found, series=series, counterfactuals=others, assumed=(*said, *found.assumed))
 
-    def _series(self, series: RunSeries) -> RunSeries:
-        if series.run not in self.apart:
-            return series
-        time, apart = self.apart[series.run]
+    def _moved(self, shown: Shown, names: Sequence[str]) -> Shown:
+        """Averages of a run, those of the names moved by what the column is apart from the stand-in."""
+        if shown.run not in self.apart:
+            return shown
+        time, apart = self.apart[shown.run]
         whole = np.concatenate([[0.0], np.cumsum(apart)])
-        ends = np.searchsorted(
-            time, series.time_s[:, None] + 0.5 * series.averaging_s * np.array([-1.0, 1.0])
-        )
+        half = 0.5 * shown.averaging_s * np.array([-1.0, 1.0])
+        ends = np.searchsorted(time, shown.time_s[:, None] + half)
         count = np.maximum(ends[:, 1] - ends[:, 0], 1)
         mean = (whole[ends[:, 1]] - whole[ends[:, 0]]) / count
-        return replace(
-            series,
-            recorded=series.recorded + mean,
-            replayed_before=series.replayed_before + mean,
-            replayed_recalibrated=series.replayed_recalibrated + mean,
-            replayed_after=series.replayed_after + mean,
-        )
+        return replace(shown, **{name: getattr(shown, name) + mean for name in names})
 
 
 def has_column(runs: Sequence[Run]) -> bool:

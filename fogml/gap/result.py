@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.compensation_result import Compensation
+from fogml.gap.counterfactual_result import Counterfactual
 from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehearsed, WhatIf
 from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.result_json import gap_values
@@ -262,6 +263,8 @@ class Diagnosis:
         What of it a gyro can compensate by itself.
     uncertainty
         Covariance of constants and named effects together.
+    counterfactuals
+        What each effect makes of each run, where that was asked for.
     """
 
     fit: tuple[str, ...]
@@ -291,6 +294,7 @@ class Diagnosis:
     shares: tuple[CauseShare, ...] = ()
     compensation: Compensation | None = None
     uncertainty: Uncertainty | None = None
+    counterfactuals: tuple[Counterfactual, ...] = ()
 
     @property
     def named(self) -> tuple[Found, ...]:
@@ -300,8 +304,7 @@ class Diagnosis:
     def write_model(self, model: AnyModel, path: Path, runs: Sequence[Run] = ()) -> tuple[str, ...]:
         """Write the diagnosed model, constants fitted and effects added, as ``twin.yaml``.
 
-        A twin has its covariance, what is suspected, and a plant fitted to what `runs` recorded besides; what
-        of it there is to be said is given back in sentences.
+        A twin has its covariance, what is suspected, and a plant fitted to `runs` besides, told in sentences.
         """
         from fogml.gap.better_twin import better_twin
         from fogml.gap.twin_model import TwinModel

@@ -17,6 +17,7 @@ from fogml.report.gap_tiles import headline_tiles, warnings
 from fogml.report.gap_words import (
     headline,
     held_out_words,
+    subject_of,
     title_of,
     titles,
     verdict_sentences,
@@ -56,7 +57,7 @@ def gap_page(found: Diagnosis) -> str:
     drawn = _drawn(found)
     return render(
         "gap.html",
-        title=f"{_subject(found)} – {verdict_words(found).lower()}",
+        title=f"{subject_of(found)} – {verdict_words(found).lower()}",
         found=found,
         headline=headline(found),
         kicker=_kicker(found),
@@ -115,15 +116,6 @@ def gap_page(found: Diagnosis) -> str:
     )
 
 
-def _subject(found: Diagnosis) -> str:
-    """The unit and axis where the runs state them, else the fit runs."""
-    unit = next((s.gyro for s in found.series if s.gyro), None)
-    axis = next((s.axis for s in found.series if s.axis), None)
-    if unit:
-        return f"{unit}, axis {axis}" if axis else unit
-    return listed(list(found.fit))
-
-
 def _kicker(found: Diagnosis) -> str:
     held = (
         "the last stretch of the last run kept back"
@@ -131,7 +123,7 @@ def _kicker(found: Diagnosis) -> str:
         else (f"{plural(len(found.held_out), 'run')} held out" if found.held_out else "nothing held out")
     )
     return (
-        f"Gap between the twin “{found.model}” and {_subject(found)}: "
+        f"Gap between the twin “{found.model}” and {subject_of(found)}: "
         f"fitted on {plural(len(found.fit), 'run')}, {held}"
     )
 

@@ -238,3 +238,12 @@ STATUS_WORDS = {
     "in_constants": "no trace of its own in these runs",
 }
 """What became of a candidate."""
+
+
+def subject_of(found: Diagnosis) -> str:
+    """The unit and axis where the runs state them, else the fit runs."""
+    unit = next((s.gyro for s in found.series if s.gyro), None)
+    axis = next((s.axis for s in found.series if s.axis), None)
+    if unit:
+        return f"{unit}, axis {axis}" if axis else unit
+    return listed(list(found.fit))

@@ -98,7 +98,7 @@ def _environment() -> Environment:
     return environment
 
 
-def _text(name: str) -> Markup:
+def template_text(name: str) -> Markup:
     """A style sheet or script of the templates folder, as it stands."""
     loader = _environment().loader
     assert loader is not None
@@ -132,8 +132,8 @@ def render(template: str, *, title: str, **context: Any) -> str:
         .render(
             title=title,
             draw=_Drawings(),
-            style=_text("style.css"),
-            script=_text("figures.js"),
+            style=template_text("style.css"),
+            script=template_text("figures.js"),
             plotly=_plotly,
             version=fogml.__version__,
             **context,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
 import re
@@ -80,7 +81,8 @@ def gap(diagnosed) -> dict:
 
 def test_what_is_written(diagnosed):
     written = sorted(path.name for path in diagnosed.iterdir())
-    assert written == ["diagnose.config.yaml", "gap.html", "gap.json", "next-run.yaml", "twin.yaml"]
+    files = ["diagnose.config.yaml", "gap.html", "gap.json", "next-run.yaml", "twin.yaml", "what-if.html"]
+    assert written == files
     assert re.search("<h1>(Explained|Ambiguous)", (diagnosed / "gap.html").read_text(encoding="utf-8"))
 
 
@@ -385,3 +387,22 @@ def test_the_twin_of_a_diagnosis_is_simulated_and_shows_no_gap(diagnosed, tmp_pa
     assert [one["run"] for one in json.loads(printed.stdout)["draws"]] == ["d-1.csv", "d-2.csv", "d-3.csv"]
     assert np.ptp([run.gyro_deg_h.mean() for run in drawn]) < 0.5 < abs(drawn[0].gyro_deg_h.mean())
     assert "no --out" in run_program("simulate", file, "--draws", 2, status=2).stderr
+
+
+def test_sizes_on_sliders_add_up_to_what_was_replayed(diagnosed, gap):
+    """The page's own numbers: nothing acting, plus the course as found, leaves what the diagnosis says."""
+    text = (diagnosed / "what-if.html").read_text(encoding="utf-8")
+    packed = re.search(r'id="what-if-data">(.*?)</script>', text, re.DOTALL)
+    run = json.loads(packed[1])["runs"][0]
+
+    def values(cell: str) -> np.ndarray:
+        return np.frombuffer(base64.b64decode(cell), dtype="<f4").astype(float)
+
+    course = values(run["courses"]["thermal_hysteresis"])
+    left = values(run["recorded"]) - values(run["replayed"])
+    (told,) = gap["how_far"]
+    assert np.sqrt(np.mean((left - course) ** 2)) == pytest.approx(told["after"], rel=1e-4)
+    assert np.sqrt(np.mean(left**2)) > 2.0 * told["after"]
+    assert run["floor"] == pytest.approx(told["floor"], rel=0.1)
+    assert len(run["courses"]) > 10 and "deadband" not in run["courses"]
+    assert all(len(values(cell)) == len(left) for cell in run["courses"].values())

@@ -12,6 +12,7 @@ from fogml.gap.families.ahead import next_run, rehearse
 from fogml.gap.families.causes import cards_of, energy, fitted_values, found_cause
 from fogml.gap.families.closing import Foretold, HeldOut
 from fogml.gap.families.compensable import compensation_of
+from fogml.gap.families.counterfactual import counterfactuals
 from fogml.gap.families.inference import Inference, Progress, infer
 from fogml.gap.families.joint import joint_uncertainty
 from fogml.gap.families.left_out import doubted
@@ -57,6 +58,7 @@ def diagnose(
     plan: bool = True,
     rehearsed: bool = False,
     cost_of_false_name: float = 1.0,
+    courses: bool = False,
     progress: Progress | None = None,
 ) -> Diagnosis:
     """Where the gap lies, which causes make it, how far it closes; on recordings.
@@ -83,6 +85,8 @@ def diagnose(
         Whether to tell what these runs would name of each candidate.
     cost_of_false_name
         Of a false name over that of a missed one: a cause is named from odds of this on.
+    courses
+        Whether to keep what each effect makes of each run, for a page on which their sizes are moved.
     progress
         Told what is being done.
 
@@ -95,7 +99,7 @@ def diagnose(
     tell = progress or (lambda what: None)
     found = inferred(model, fit, held_out, noise, without, priors, tell)
     tell("judging on held-out runs")
-    return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, tell)
+    return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, courses, tell)
 
 
 def inferred(
@@ -133,6 +137,7 @@ def answered(
     cost_of_false_name: float,
     plan: bool = False,
     rehearsed: bool = False,
+    courses: bool = False,
     tell: Progress = lambda what: None,
 ) -> Diagnosis:
     """What is said of a posterior; `part` where the last stretch of the last run was held out."""
@@ -140,7 +145,7 @@ def answered(
 
     with threadpool_limits(1):
         judged = judge(found)
-        answer = _answer(found, judged, noise, part, seed, cost_of_false_name)
+        answer = _answer(found, judged, noise, part, seed, cost_of_false_name, courses)
         if plan:
             open_ = answer.verdict in ("unknown", "partly_explained")
             run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_)
@@ -152,7 +157,13 @@ def answered(
 
 
 def _answer(
-    found: Inference, judged: Judgement, noise: Run | None, part: bool, seed: int, cost: float
+    found: Inference,
+    judged: Judgement,
+    noise: Run | None,
+    part: bool,
+    seed: int,
+    cost: float,
+    courses: bool,
 ) -> Diagnosis:
     scene = found.setting.scene
     shifted = [at_cost(c.probability, cost) for c in judged.causes]
@@ -211,6 +222,7 @@ def _answer(
         noise=noise_of(found, after),
         effects=values,
         uncertainty=joint_uncertainty(found, values),
+        counterfactuals=counterfactuals(found, after, named, cards) if courses else (),
         series=series_of(found, recalibrated, after),
         unusable=found.unusable,
         assumed=assumed(found),

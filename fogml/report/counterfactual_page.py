@@ -1,0 +1,130 @@
+"""The page on which the sizes of effects are moved: recorded against replayed, offline, by anyone."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from fogml.escaping import script_data
+from fogml.gap.counterfactual_result import Counterfactual
+from fogml.gap.result import Diagnosis
+from fogml.report import style
+from fogml.report.gap_words import subject_of, title_of, titles, unit_words
+from fogml.report.page import Drawing, render, template_text
+from fogml.report.words import averages
+
+MOST_FACTOR = 3.0
+"""Sliders go up to this many times the size found, or usual."""
+STEP = 0.05
+
+
+@dataclass(frozen=True)
+class Slider:
+    """One effect's slider: its name, the size that 1 stands for, where it begins and ends."""
+
+    number: int
+    effect: str
+    title: str
+    size: float
+    unit: str
+    start: float
+    low: float
+    high: float = MOST_FACTOR
+    step: float = STEP
+
+
+def counterfactual_page(found: Diagnosis) -> str:
+    """The self-contained HTML page of a diagnosis that kept its courses.
+
+    Parameters
+    ----------
+    found
+        As :func:`fogml.gap.diagnose` gives it with ``courses=True``.
+    """
+    runs = sorted(found.counterfactuals, key=lambda run: not run.held_out)
+    sliders = _sliders(found, runs)
+    data = {"runs": [_packed(run) for run in runs]}
+    return render(
+        "counterfactual.html",
+        title=f"{subject_of(found)} – what if?",
+        name=subject_of(found),
+        kicker=f"The twin “{found.model}” against recordings, with effects of any size",
+        runs=[f"{run.run} ({'held out' if run.held_out else 'fitted on'})" for run in runs],
+        acting=[s for s in sliders if s.start],
+        others=[s for s in sliders if not s.start],
+        drawing=_drawing(runs[0]),
+        data=script_data(json.dumps(data)),
+        averages=averages(runs[0].averaging_s).capitalize(),
+        sliders=template_text("counterfactual.js"),
+    )
+
+
+def _sliders(found: Diagnosis, runs: Sequence[Counterfactual]) -> list[Slider]:
+    """Of every effect that some run shows: those that act first, then those that hold most of the gap."""
+    names, told = titles(found), dict[str, Slider]()
+    gain = {row.effect: -row.gain for row in found.evidence}
+    courses = {course.effect: course for run in runs for course in run.courses}
+    order = sorted(courses.values(), key=lambda c: (not c.acts, gain.get(c.effect, 0.0)))
+    for number, course in enumerate(order):
+        low = -MOST_FACTOR if course.signed else 0.0
+        told[course.effect] = Slider(
+            number,
+            course.effect,
+            title_of(course.effect, names),
+            course.size,
+            "" if course.unit == "1" else unit_words(course.unit) or course.unit,
+            float(course.acts),
+            low,
+        )
+    return list(told.values())
+
+
+def _packed(run: Counterfactual) -> dict[str, Any]:
+    """A run's courses as base64 of float32, which holds seven digits."""
+
+    def packed(values: np.ndarray) -> str:
+        return base64.b64encode(np.asarray(values, dtype="<f4").tobytes()).decode("ascii")
+
+    return {
+        "floor": run.floor,
+        "time": packed((run.time_s - run.time_s[0]) / 3600.0),
+        "temperature": packed(run.temperature_degc),
+        "recorded": packed(run.recorded),
+        "replayed": packed(run.replayed),
+        "courses": {course.effect: packed(course.values) for course in run.courses},
+    }
+
+
+def _drawing(run: Counterfactual) -> Drawing:
+    """Temperature, recorded with replayed, and the gap, as the sliders begin."""
+    hours = (run.time_s - run.time_s[0]) / 3600.0
+    replayed = run.replayed + sum(c.values for c in run.courses if c.acts)
+    figure = make_subplots(
+        rows=3, cols=1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.7, 1.4, 1.2]
+    )
+    lines = (
+        (1, run.temperature_degc, "temperature", {"color": style.BLUE, "width": 1.6}),
+        (2, run.recorded, "recorded", {"color": style.BEFORE, "width": 1.3}),
+        (2, replayed, "replayed", {"color": style.MODEL, "width": 2.0, "dash": "dash"}),
+        (3, run.recorded - replayed, "gap", {"color": style.AFTER, "width": 1.3}),
+    )
+    for row, values, name, looks in lines:
+        trace = go.Scatter(x=hours, y=values, mode="lines", name=name, line=looks)
+        figure.add_trace(trace, row=row, col=1)
+    for row, words in enumerate(("T [°C]", "error [deg/h]", "gap [deg/h]"), start=1):
+        figure.update_yaxes(title_text=words, title_font_size=12, row=row, col=1)
+    figure.update_xaxes(title_text="time [h]", row=3, col=1)
+    style.styled(figure, 560, legend={"y": 1.06}, hovermode="x")
+    return Drawing(
+        figure,
+        alt="Temperature, recorded and replayed output, and the gap between them, in time; they follow the "
+        "sliders below.",
+        caption="Recorded stays; replayed and the gap follow the sliders.",
+    )
