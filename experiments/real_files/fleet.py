@@ -9,11 +9,12 @@ from scipy.stats import t
 
 from experiments.real_files.section import Section
 from fogml.features.parse import parse_features
-from fogml.fleet.constants import FORM, ROWS, UnitConstants, fleet_constants
-from fogml.fleet.shared import ODD
-from fogml.models.linear import LinearRegressor
-from fogml.models.prior import PriorRegressor
-from fogml.models.table import training_table
+from fogml.fleet.constants import FORM, FleetConstants, UnitConstants, fleet_constants
+from fogml.fleet.shared import ODD, DrawnMember, size_priors
+from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
+from fogml.models.mixed_effects_model import averages_of, composed
+from fogml.models.prior import agreement
+from fogml.models.table import run_rows, training_table
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray, Run
 
@@ -22,7 +23,7 @@ SPREAD = np.array([0.1, 1e-3, 1e-5, 1e-7, 0.03, 4e-4])
 """Of the units' constants: of 1, u, u^2, u^3, dT, u dT with u = T - 25 degC [deg/h, degC, degC/min]."""
 SAMPLE_S, WHITE, FLICKER = 30.0, 0.12, 0.02
 """Sample interval [s]; white noise of a sample [deg/h]; amplitude of the flicker's spectrum [deg/h]."""
-FLEETS, UNITS, TESTED, ODD_WIDTH, SHORT_HOURS = 25, 24, 20, 3.0, 2.0
+FLEETS, UNITS, TESTED, ODD_WIDTH, SHORT_HOURS = 8, 24, 20, 3.0, 2.0
 """Fleets; units of each; units tested against each; width of odd ones; hours of a short run."""
 
 
@@ -62,17 +63,20 @@ def recorded(
     return Run("run.csv", columns, Facts(unit="unit", axis="x")), drift
 
 
-def case(prior: dict[str, Any], seed: int, far: float, coloured: bool, hours: float | None) -> dict[str, Any]:
+def case(fleet: FleetConstants, seed: int, far: float, coloured: bool, hours: float | None) -> dict[str, Any]:
     """One unit: its agreement, and errors from the truth on another cycle."""
     form = parse_features(FORM)
-    table = training_table([recorded(seed, far, coloured, 1.0, hours)[0]], form, ROWS)
-    drawn = PriorRegressor(prior).fit(table.X, table.y, groups=table.run_index, time=table.time_s)
-    alone = LinearRegressor(ridge="auto").fit(table.X, table.y)
+    rows = run_rows(recorded(seed, far, coloured, 1.0, hours)[0], form)
+    table = composed(averages_of([rows]), form)
+    alone = fit_mixed_effects(table, form.terms).regressor()
+    found = fit_mixed_effects(table, form.terms, size_priors(fleet.own, table))
+    member = DrawnMember(form, found, fleet.prior, fleet.own.get(OWN_PARTS[0], 0.0))
+    drawn = member.regressor(table)
     run, drift = recorded(seed, far, coloured, 0.8)
     other = training_table([run], form)
     truth = np.interp(other.time_s, run.time, drift)
     errors = [float(np.sqrt(np.mean((one.predict(other.X) - truth) ** 2))) for one in (alone, drawn)]
-    return {"agreement": drawn.agreement_, "alone": errors[0], "drawn": errors[1]}
+    return {"agreement": agreement(*member.told(table), fleet.prior), "alone": errors[0], "drawn": errors[1]}
 
 
 def section(quick: bool) -> Section:
@@ -80,15 +84,15 @@ def section(quick: bool) -> Section:
     fleets, tested = (2, 3) if quick else (FLEETS, TESTED)
     rows = []
     for coloured in (True, False):
-        priors = []
+        known = []
         for fleet in range(fleets):
             units = [UnitConstants.of([recorded(1000 * fleet + k, 1.0, coloured)[0]]) for k in range(UNITS)]
-            priors.append(fleet_constants(units).prior.as_dict())
+            known.append(fleet_constants(units))
         for hours in (SHORT_HOURS, None):
             for far, count in ((1.0, tested), (ODD_WIDTH, max(tested // 5, 1))):
                 found = [
-                    [case(prior, 1000 * fleet + 500 + k, far, coloured, hours) for k in range(count)]
-                    for fleet, prior in enumerate(priors)
+                    [case(constants, 1000 * fleet + 500 + k, far, coloured, hours) for k in range(count)]
+                    for fleet, constants in enumerate(known)
                 ]
                 rows.append(_row(found, coloured, hours, far))
     lines = [
@@ -112,8 +116,8 @@ def section(quick: bool) -> Section:
         )
     lines += [
         "",
-        "The noise of a unit's rows is told from the rows themselves, white, flicker and random walk "
-        "together, and averaged over (`fogml.models.row_noise`).",
+        "What moves a unit's rows beside its constants is a run's own slow and faster drift and white noise, "
+        "their sizes by evidence (`fogml.models.mixed_effects`).",
     ]
     return Section("\n".join(lines), {"rows": rows})
 

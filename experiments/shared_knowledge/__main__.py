@@ -15,33 +15,26 @@ from experiments.results import write_results
 from experiments.shared_knowledge.ideal import nats_for_odd
 from experiments.shared_knowledge.page import page
 from experiments.shared_knowledge.units import SAMPLE_S, TEST_RATE, TRAIN_RATE, run, unit
-from fogml.fleet.constants import FORM, ROWS, FleetConstants, UnitConstants, fleet_constants
-from fogml.fleet.shared import shared_model
-from fogml.models.feature_model import FeatureModel
+from fogml.fleet.constants import FORM, FleetConstants, UnitConstants, fleet_constants
+from fogml.fleet.shared import SharedModel, shared_model
+from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.names import make_model
-from fogml.models.prior import PriorRegressor
-from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.runs.run import BoolArray, FloatArray
 from fogml.validation.judge import judge
 
 HERE = Path(__file__).parent
 AVERAGING_S = 100.0
 FLEET = 24
-FRESH = range(9000, 9100)
-HOURS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0)
+FRESH = range(9100, 9108)
+HOURS = (1.0, 1.5, 2.0, 4.0, 8.0)
 WIDTHS = (1.0, 3.0, 6.0)
 
 
-def unchecked(fleet: FleetConstants, train: Run) -> FeatureModel:
+class Unchecked(SharedModel):
     """A model drawn to the fleet whatever its run tells."""
-    model = FeatureModel(fleet.features, PriorRegressor(fleet.prior.as_dict()), max_rows=ROWS).fit(train)
-    own = model.features_.box
-    model.features_.set_box(
-        {
-            name: (min(low, fleet.box[name][0]), max(high, fleet.box[name][1]))
-            for name, (low, high) in own.items()
-        }
-    )
-    return model
+
+    def _why_alone(self, covered: float) -> str:
+        return ""
 
 
 def left_where(error: FloatArray, where: BoolArray) -> float:
@@ -57,11 +50,12 @@ def case(fleet: FleetConstants, seed: int, hours: float, far: float) -> dict[str
     """What is left of another run with a model of the first hours of one, with and without the fleet."""
     world = unit(seed, far)
     train, test = run(world, 2 * seed, TRAIN_RATE, hours), run(world, 2 * seed + 1, TEST_RATE)
-    alone = make_model("polynomial", FORM).fit(train)
     drawn = shared_model(fleet).fit(train)
     left = any("left to its own runs" in note for note in drawn.card_.notes)
-    anyway = unchecked(fleet, train)
-    judged = [judge(model, train, test, averaging_s=AVERAGING_S).test[0] for model in (alone, drawn, anyway)]
+    alone = MixedEffectsModel(FORM).fit(train)
+    anyway = Unchecked(fleet.features, fleet.prior.as_dict(), fleet.box, fleet.own).fit(train)
+    models = (alone, drawn, anyway, make_model("auto").fit(train))
+    judged = [judge(model, train, test, averaging_s=AVERAGING_S).test[0] for model in models]
     seen, with_fleet = alone.evaluate(test), anyway.evaluate(test)
     shown = seen.full & ~seen.outside
     errors = [test.gyro - drift for drift in (seen.drift, drawn.predict(test))]
@@ -72,12 +66,15 @@ def case(fleet: FleetConstants, seed: int, hours: float, far: float) -> dict[str
         "hours": hours,
         "left": left,
         "told": bool(drawn.from_fleet_),
-        "agreement": anyway.regressor_.agreement_,
+        "agreement": anyway.agreement_,
         "nats": {f"{width:g}": round(nats_for_odd(train, hours, width), 3) for width in WIDTHS[1:]},
         "before": judged[0].before.bias_stability,
         "alone": judged[0].after.bias_stability,
         "drawn": judged[1].after.bias_stability,
         "anyway": judged[2].after.bias_stability,
+        "auto": judged[3].after.bias_stability,
+        "rms_alone": judged[0].after.rms,
+        "rms_drawn": judged[1].after.rms,
         "half": left_where(half, seen.full),
         "shown_alone": left_where(errors[0], shown),
         "shown_drawn": left_where(errors[1], shown),

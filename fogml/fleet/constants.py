@@ -1,13 +1,14 @@
 """What the units of a fleet have in common: their constants, and the prior that these make for the next.
 
-Every unit's drift is described by the same linear form. Its rows are condensed to a triangle
-that tells all of them, so a fleet's constants can be put together without its runs.
+Every unit's drift is described by the same linear form, the shared part of a mixed-effects model
+(`fogml.models.mixed_effects`). Its rows are condensed to a triangle that tells all of them, each run's own
+part counting as noise, so a fleet's constants can be put together without its runs.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,15 +17,15 @@ from fogml.errors import InputError
 from fogml.features.parse import parse_features
 from fogml.fleet.covariates import CovariateColumns, CovariateEffects, Covariates
 from fogml.models.box import learn_box
-from fogml.models.coefficient_errors import told_by_rows
+from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects
+from fogml.models.mixed_effects_basis import SizePriors
+from fogml.models.mixed_effects_model import averages_of, composed
 from fogml.models.prior import Prior
-from fogml.models.table import run_rows, table_of_rows
+from fogml.models.table import run_rows
 from fogml.runs.run import FloatArray, Run
 
 FORM = "T^1..3, dT, T*dT"
 """The form that units are compared in, unless another is stated."""
-ROWS = 4000
-"""Rows that a unit's runs are averaged down to."""
 _ROUNDS = 200
 _TOLERANCE = 1e-6
 _FREEDOM = 5.0
@@ -43,8 +44,8 @@ class UnitConstants:
     features
         The form.
     triangle
-        Equations ``[1, features, y]`` that tell of the constants what the rows do, their noise of unit
-        covariance, shape (k + 1, k + 2).
+        Equations ``[1, features, y]`` that tell of the constants what the rows do, their noise, in which the
+        runs' own parts are, of unit covariance, shape (k + 1, k + 2).
     precision
         One over the variance of a row of the triangle's; 1 as it is whitened.
     rows
@@ -55,6 +56,9 @@ class UnitConstants:
         Range of each of the features' atoms.
     covariates
         What is known of the unit's production.
+    own
+        Sizes of the runs' own parts, by their names in `fogml.models.mixed_effects.OWN_PARTS` [deg/h]; that
+        of the shift where there are several runs.
     """
 
     features: str
@@ -65,6 +69,7 @@ class UnitConstants:
     scale: FloatArray
     box: dict[str, list[float]]
     covariates: dict[str, str] = field(default_factory=dict)
+    own: dict[str, float] = field(default_factory=dict)
 
     @classmethod
     def of(
@@ -80,16 +85,19 @@ class UnitConstants:
         form = parse_features(features)
         rows = [run_rows(run, form) for run in runs]
         learn_box(form, [part.atoms for part in rows])
-        table = table_of_rows(rows, form.compose, ROWS)
+        table = composed(averages_of(rows), form)
         if len(table) < 2 * (len(form) + 1):
             raise InputError(f"{runs[0].name}: {len(table)} rows are too few for the constants of {features}")
-        columns = np.column_stack([np.ones(len(table)), table.X])
         scale = np.where(table.X.std(axis=0) > 0.0, table.X.std(axis=0), 1.0)
-        told = told_by_rows(replace(table, X=columns / np.append(1.0, scale)))
-        triangle = np.column_stack([told.columns * np.append(1.0, scale), told.target])
+        # What runs' own parts are like the units tell, not a prior.
+        found = fit_mixed_effects(table, form.terms, SizePriors(own_spread=SizePriors.noise_spread))
+        columns, target = found.told(table, np.column_stack([np.ones(len(table)), table.X / scale]))
+        triangle = np.column_stack([columns * np.append(1.0, scale), target])
+        own = {name: found.sizes[name] for name in OWN_PARTS[int(len(runs) == 1) :]}
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
         known = dict(covariates or {})
-        return cls(form.text, np.asarray(triangle), 1.0, len(table), table.X.mean(axis=0), scale, box, known)
+        shift = table.X.mean(axis=0)
+        return cls(form.text, np.asarray(triangle), 1.0, len(table), shift, scale, box, known, own)
 
     def in_columns(self, shift: FloatArray, scale: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Information and image of the rows in the columns ``[1, (x - shift) / scale]``."""
@@ -129,6 +137,7 @@ class UnitConstants:
                 covariates={
                     str(name): str(value) for name, value in dict(values.get("covariates", {})).items()
                 },
+                own={str(name): float(value) for name, value in dict(values.get("own", {})).items()},
                 **arrays,
             )
             shape = (found.triangle.ndim, found.triangle.shape[-1:], found.scale.shape)
@@ -161,6 +170,8 @@ class FleetConstants:
         distance over the root of k + 1, shape (u,).
     box
         Range of each atom that half of the units cover.
+    own
+        Sizes of runs' own parts, root of the mean square over units [deg/h].
     """
 
     features: str
@@ -170,6 +181,7 @@ class FleetConstants:
     errors: FloatArray
     distances: FloatArray
     box: dict[str, list[float]]
+    own: dict[str, float]
 
     @property
     def names(self) -> list[str]:
@@ -234,7 +246,10 @@ def fleet_constants(units: Sequence[UnitConstants]) -> FleetConstants:
         name: [float(np.median([unit.box[name][end] for unit in units])) for end in (0, 1)]
         for name in units[0].box
     }
-    return FleetConstants(units[0].features, prior, effects, means, errors, np.sqrt(distances / width), box)
+    sizes = {name: [unit.own[name] for unit in units if name in unit.own] for name in OWN_PARTS}
+    own = {name: float(np.sqrt(np.mean(np.square(found)))) for name, found in sizes.items() if found}
+    distances = np.sqrt(distances / width)
+    return FleetConstants(units[0].features, prior, effects, means, errors, distances, box, own)
 
 
 def _of_normal(width: int) -> float:

@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Self
 
+import numpy as np
+
 from fogml.errors import InputError
+from fogml.features.features import Features
 from fogml.features.parse import parse_features
-from fogml.fleet.constants import ROWS, FleetConstants
+from fogml.fleet.constants import FleetConstants
 from fogml.fleet.covariates import CovariateEffects, Covariates
-from fogml.models.feature_model import FeatureModel
+from fogml.models.combination import SharedMember
 from fogml.models.linear import LinearRegressor
-from fogml.models.prior import Prior, PriorRegressor
-from fogml.runs.run import Run
+from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects, linear_regressor
+from fogml.models.mixed_effects_basis import SizePriors
+from fogml.models.mixed_effects_model import MixedEffectsModel
+from fogml.models.prior import Prior, agreement, posterior
+from fogml.models.table import TrainingTable
+from fogml.runs.run import FloatArray, Run
 
 COVERED = 0.25
 """Least share of the fleet's temperatures in a unit's runs if the fleet is followed beyond them."""
@@ -23,8 +30,45 @@ _BEYOND = 0.01
 # Share of the fleet's span that has to lie beyond a unit's own runs to be told.
 
 
-class SharedModel(FeatureModel):
-    """A unit's drift by the fleet's form, its constants drawn to the fleet's.
+@dataclass(frozen=True, eq=False)
+class DrawnMember(SharedMember):
+    """A unit's shared part with its fleet's prior, the sizes of runs' own parts kept.
+
+    Attributes
+    ----------
+    prior
+        The fleet's.
+    shift
+        Size of a run's own shift [deg/h], as several runs of other units tell it.
+    """
+
+    prior: Prior
+    shift: float
+
+    def told(self, table: TrainingTable) -> tuple[FloatArray, FloatArray]:
+        """Information and image of averages of features in the prior's columns."""
+        columns, target = self.found.told(table, self.prior.columns(table.X), self.shift)
+        return columns.T @ columns, columns.T @ target
+
+    def on(self, own: Features, rest: TrainingTable, held: FloatArray) -> FloatArray:
+        """Drift [deg/h] of feature columns held out (n, k), of a fit to the rest's."""
+        return self.prior.columns(held) @ posterior(*self.told(rest), self.prior)[0]
+
+    def regressor(self, table: TrainingTable) -> LinearRegressor:
+        """The shared part given averages of features."""
+        solution, covariance, _ = posterior(*self.told(table), self.prior)
+        raw = self.prior.to_raw()
+        intercept, *coef = raw @ solution
+        return linear_regressor(
+            np.array(coef), intercept, raw @ covariance @ raw.T, self.found.sizes["noise"]
+        )
+
+
+class SharedModel(MixedEffectsModel):
+    """A unit's drift by a mixed-effects model whose shared part is drawn to its fleet's.
+
+    The prior of the shared part's coefficients is how they are spread over the fleet's units; those of the
+    sizes of runs' own parts have the fleet's sizes as medians.
 
     The trained box is the fleet's and the unit's own together: where the unit's runs did not go,
     the fleet's constants tell what to expect. An odd unit is left to its own runs, as if there were
@@ -41,64 +85,87 @@ class SharedModel(FeatureModel):
         As `fogml.models.prior.Prior.as_dict` gives it.
     box
         The fleet's box.
+    own
+        Sizes of runs' own parts [deg/h], as `fogml.fleet.constants.FleetConstants.own` has them.
 
     Attributes
     ----------
+    agreement_ : float
+        Probability of a unit of the fleet lying at least as far out, see `fogml.models.prior.agreement`.
     from_fleet_ : dict
         Temperature to the stretches of it, lower and upper end [degC], that the unit's runs have not
         shown and that are compensated with the fleet's constants; empty for a unit left to its own runs.
     """
 
-    def __init__(self, features: str, prior: dict[str, Any], box: dict[str, list[float]]) -> None:
-        super().__init__(features, PriorRegressor(prior), kind="shared", max_rows=ROWS)
+    def __init__(
+        self,
+        features: str,
+        prior: dict[str, Any],
+        box: dict[str, list[float]],
+        own: Mapping[str, float] | None = None,
+    ) -> None:
+        super().__init__(features, kind="shared")
         self.prior = prior
         self.box = box
+        self.own = dict(own or {})
 
     def fit(self, runs: Run | Sequence[Run]) -> Self:
         """Fit to training runs, as `FeatureModel.fit`."""
         super().fit(runs)
+        if self._alone:
+            return self
+        self.regressor_.covariance_ = self.skill_**2 * self._covariance
         own = self.features_.box
-        covered = min((_span(own[name]) / _span(self.box[name]) for name in self._levels()), default=1.0)
-        if covered < COVERED:
-            return self._alone(
-                runs,
-                f"the runs cover {covered:.0%} of the fleet's temperatures, too little to tell an odd unit",
-            )
-        agreement = getattr(self.regressor_, "agreement_", 0.0)
-        if agreement < ODD:
-            return self._alone(
-                runs,
-                f"this unit is odd: of units like the fleet's, {agreement:.1%} would lie as far out "
-                f"(odd below {ODD:.0%})",
-            )
-        wider = {
-            name: (min(low, self.box[name][0]), max(high, self.box[name][1]))
-            for name, (low, high) in own.items()
-        }
-        self.from_fleet_ = {
-            name: stretches for name in self._levels() if (stretches := _beyond(own[name], self.box[name]))
-        }
-        self.features_.set_box(wider)
-        note = (
-            "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"
+        self.features_.set_box(
+            {
+                name: (min(low, self.box[name][0]), max(high, self.box[name][1]))
+                for name, (low, high) in own.items()
+            }
         )
-        self.card_ = replace(
-            self.card_,
-            box=self.features_.box,
-            slices=None,
-            notes=(*self.card_.notes, note, *self._resting()),
-        )
+        self.card_ = replace(self.card_, box=self.features_.box, slices=None)
         return self
 
-    def _alone(self, runs: Run | Sequence[Run], why: str) -> Self:
-        """Leave the unit to its own runs: the form by least squares, its ridge by cross-validation."""
-        alone = FeatureModel(self.features, LinearRegressor(ridge="auto"), kind=self.kind).fit(runs)
-        for name, value in vars(alone).items():
-            if name.endswith("_"):
-                setattr(self, name, value)
+    def _size_priors(self, table: TrainingTable) -> SizePriors:
+        return size_priors(self.own, table)
+
+    def _shared_part(self, features: Features, table: TrainingTable) -> tuple[SharedMember, LinearRegressor]:
+        prior = Prior.from_dict(self.prior)
+        member = DrawnMember(features, self.fitted_, prior, self.own.get(OWN_PARTS[0], 0.0))
+        own = features.box
+        levels = [atom.text for atom in features.atoms if atom.operator == "value"]
+        covered = min((_span(own[name]) / _span(self.box[name]) for name in levels), default=1.0)
+        self.agreement_ = agreement(*member.told(table), prior)
+        self._alone = self._why_alone(covered)
         self.from_fleet_ = {}
-        self.card_ = replace(self.card_, notes=(*self.card_.notes, f"{why}; it is left to its own runs"))
-        return self
+        if self._alone:
+            self.fitted_ = fit_mixed_effects(table, features.terms)
+            return super()._shared_part(features, table)
+        self.from_fleet_ = {
+            name: stretches for name in levels if (stretches := _beyond(own[name], self.box[name]))
+        }
+        regressor = member.regressor(table)
+        self._covariance = regressor.covariance_
+        return member, regressor
+
+    def _why_alone(self, covered: float) -> str:
+        """Why the unit is left to its own runs, which cover so much of the fleet's temperatures."""
+        if covered < COVERED:
+            return f"the runs cover {covered:.0%} of the fleet's temperatures, too little to tell an odd unit"
+        if self.agreement_ < ODD:
+            return (
+                f"this unit is odd: of units like the fleet's, {self.agreement_:.1%} would lie as far out "
+                f"(odd below {ODD:.0%})"
+            )
+        return ""
+
+    def _fit_notes(self) -> list[str]:
+        notes = super()._fit_notes()
+        if self._alone:
+            return [*notes, f"{self._alone}; it is left to its own runs"]
+        drawn = (
+            "constants are drawn to the fleet's, and the trained box is the fleet's and the unit's together"
+        )
+        return [*notes, drawn, *self._resting()]
 
     def _resting(self) -> list[str]:
         """What the card says of temperatures that the unit's own runs have not shown."""
@@ -111,9 +178,12 @@ class SharedModel(FeatureModel):
             )
         return notes
 
-    def _levels(self) -> list[str]:
-        """Atoms that are temperatures themselves."""
-        return [atom.text for atom in self.features_.atoms if atom.operator == "value"]
+
+def size_priors(own: Mapping[str, float], table: TrainingTable) -> SizePriors:
+    """Priors of a unit's sizes that have its fleet's sizes of runs' own parts [deg/h] as medians."""
+    spread = float(table.y.std()) or 1.0
+    fields = zip(("shift", "slow", "fast"), OWN_PARTS, strict=True)
+    return SizePriors(**{field: own[name] / spread for field, name in fields if name in own})
 
 
 def shared_model(
@@ -134,19 +204,27 @@ def shared_model(
         If the values are no fleet's constants.
     """
     if isinstance(fleet, FleetConstants):
-        return SharedModel(fleet.features, fleet.effects.prior(covariates or {}).as_dict(), fleet.box)
+        prior = fleet.effects.prior(covariates or {}).as_dict()
+        return SharedModel(fleet.features, prior, fleet.box, fleet.own)
     try:
         features, prior, box = str(fleet["features"]), dict(fleet["prior"]), dict(fleet["box"])
         box = {str(name): [float(low), float(high)] for name, (low, high) in box.items()}
+        sizes = fleet.get("own", {})
+        own = {name: float(sizes[name]) for name in OWN_PARTS if name in sizes}
     except (KeyError, TypeError, ValueError):
         raise InputError(
             "the fleet's constants are not understood; was this fleet.json written whole?"
         ) from None
-    Prior.from_dict(prior)
-    parse_features(features)
+    width, form = len(Prior.from_dict(prior).shift), parse_features(features)
+    atoms = {atom.text for atom in form.atoms}
+    if width != len(form) or not atoms <= set(box) or not all(0.0 < size < np.inf for size in own.values()):
+        raise InputError(
+            f"the fleet's constants are not understood: prior of {width} columns, box of {len(box)} inputs "
+            f"or sizes of runs' own parts do not belong to {features}"
+        )
     if "covariates" in fleet:
         prior = CovariateEffects.from_dict(fleet["covariates"]).prior(covariates or {}).as_dict()
-    return SharedModel(features, prior, box)
+    return SharedModel(features, prior, box, own)
 
 
 def _span(ends: Sequence[float]) -> float:

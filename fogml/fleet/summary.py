@@ -48,7 +48,12 @@ def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
     if constants is not None:
         labels, found = constants
         values["constants"] = _constants_json(labels, found)
-        values["shared"] = {"features": found.features, "prior": found.prior.as_dict(), "box": found.box}
+        values["shared"] = {
+            "features": found.features,
+            "prior": found.prior.as_dict(),
+            "box": found.box,
+            "own": found.own,
+        }
         if found.effects.columns.names:
             values["shared"]["covariates"] = found.effects.as_dict()
     return values

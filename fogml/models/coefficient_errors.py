@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -18,60 +17,6 @@ from fogml.signals.whitening import Whitener
 
 ROWS = 8192
 """Rows of all runs that the noise is told from and the columns are looked at."""
-
-
-@dataclass(frozen=True)
-class Told:
-    """What rows tell of coefficients: as many equations as there are, their noise of unit covariance.
-
-    Attributes
-    ----------
-    columns, target
-        The equations ``columns @ coefficients = target + noise``, shapes (k, k) and (k,).
-    noise
-        Covariance of their noise under each noise model that the rows speak for, shape (m, k, k); on average
-        the identity.
-    weights
-        Probabilities of those models, shape (m,).
-    freedom
-        Degrees of freedom behind the variances.
-    """
-
-    columns: FloatArray
-    target: FloatArray
-    noise: FloatArray
-    weights: FloatArray
-    freedom: float
-
-    @property
-    def information(self) -> FloatArray:
-        """Inverse covariance of the coefficients, shape (k, k)."""
-        return self.columns.T @ self.columns
-
-    @property
-    def image(self) -> FloatArray:
-        """Information times the coefficients' estimate, shape (k,)."""
-        return self.columns.T @ self.target
-
-
-def told_by_rows(table: TrainingTable) -> Told:
-    """What a table's values tell of the coefficients of its columns ``X``, by least squares.
-
-    The noise is that of :func:`fogml.models.row_noise.noise_of_rows`; where rows are too few to tell it, all
-    that moves is noise, and white.
-    """
-    basis, root = np.linalg.qr(table.X)
-    noise = noise_of_rows(replace(table, X=_moving(table.X)))
-    if noise is None:
-        spread = max(float(np.std(table.y)), 1e-12)
-        width = len(root)
-        return Told(root / spread, basis.T @ table.y / spread, np.eye(width)[None], np.ones(1), 1.0)
-    shapes = _shapes(basis, table, noise.step_s)
-    half = np.linalg.cholesky(np.einsum("s,sij->ij", noise.weights @ noise.squares, shapes))
-    rows = np.linalg.solve(half, np.column_stack((root, basis.T @ table.y)))
-    whitened = np.array([np.linalg.solve(half, np.linalg.solve(half, shape).T) for shape in shapes])
-    models = np.einsum("ms,sij->mij", noise.squares, whitened)
-    return Told(rows[:, :-1], rows[:, -1], models, noise.weights, noise.freedom)
 
 
 def noise_covariance(
@@ -125,11 +70,6 @@ def noise_covariance(
     back[1:, -len(scale) :] = np.diag(1.0 / scale)
     gain = back @ gain
     return np.asarray(gain @ middle @ gain.T)
-
-
-def _moving(columns: FloatArray) -> FloatArray:
-    """Columns without the constant one, of which a stretch has its own."""
-    return columns[:, np.ptp(columns, axis=0) > 0.0]
 
 
 def _shapes(basis: FloatArray, table: TrainingTable, step_s: float) -> FloatArray:

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky
+from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
 from scipy.optimize import minimize
 
 from fogml.features.terms import Term
@@ -31,6 +31,8 @@ from fogml.runs.run import BoolArray, FloatArray
 _SMALLEST, _LARGEST, _LEAST_NOISE = 1e-4, 30.0, 2e-3
 # Bounds of sizes, for a well-conditioned covariance.
 _STEPS = 40
+OWN_PARTS = ("own shift", "own slow drift", "own faster drift")
+"""Names of the sizes of a run's own parts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +60,36 @@ class MixedEffects:
         """Coefficients and intercept [deg/h] given other rows, with the sizes as they were found."""
         coef, intercept, _ = _posterior(table, self._scale, self._relative)
         return coef, intercept
+
+    def told(
+        self, table: TrainingTable, columns: FloatArray, shift: float = 0.0
+    ) -> tuple[FloatArray, FloatArray]:
+        """What rows tell of coefficients of `columns`: equations whose noise is of unit covariance.
+
+        Noise is all that does not compensate: a run's own parts and white noise, of the sizes found.
+
+        Parameters
+        ----------
+        table
+            Averages, n of them.
+        columns
+            Their columns, the constant one among them, shape (n, k + 1).
+        shift
+            Size of a run's own shift [deg/h] where there is one run, which can't tell it from the constant.
+
+        Returns
+        -------
+        Columns and targets of the equations, shapes (k + 1, k + 1) and (k + 1,).
+        """
+        sizes = np.array([self.sizes[name] for name in OWN_PARTS])
+        if len(np.unique(table.run_index)) == 1:
+            sizes[0] = shift
+        covariance = np.tensordot(sizes**2, _own_kernels(table), 1)
+        covariance[np.diag_indices_from(covariance)] += self.sizes["noise"] ** 2
+        triangle = cholesky(covariance, lower=True)
+        whitened = solve_triangular(triangle, np.column_stack([columns, table.y]), lower=True)
+        rotation, root = np.linalg.qr(whitened[:, :-1])
+        return root, rotation.T @ whitened[:, -1]
 
     def regressor(self) -> LinearRegressor:
         """The shared part as a linear regressor."""
@@ -122,7 +154,7 @@ class _Scale:
         """Sizes [deg/h] by the first term of each group, and of a run's own parts."""
         groups = self.basis.groups
         names = [terms[int(np.argmax(groups == g))].text for g in range(len(self.basis.medians))]
-        names += ["own shift", "own slow drift", "own faster drift", "noise"]
+        names += [*OWN_PARTS, "noise"]
         return dict(zip(names, (self.spread * relative).tolist(), strict=True))
 
 
@@ -164,7 +196,7 @@ def _evidence_maximum(
 ) -> FloatArray:
     """Sizes at the maximum of evidence times prior; kernels of shape (g, n, n), the noise's last."""
     spreads = np.full(len(medians), priors.spread)
-    spreads[-1] = priors.noise_spread
+    spreads[-1 - len(OWN_PARTS) :] = [*[priors.own_spread] * len(OWN_PARTS), priors.noise_spread]
     level = np.full(kernels.shape[1:], priors.offset**2)
     flat, one = kernels.reshape(len(kernels), -1), np.eye(len(z))
     first = np.log(medians)

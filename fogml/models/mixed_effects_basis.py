@@ -28,9 +28,9 @@ class SizePriors:
         Medians of a run's own shift, slow and faster drift.
     noise
         Median of the white noise of the averages.
-    spread, noise_spread
-        Standard deviation of the logarithm of each size, and of the noise's: a factor of 2.2 either way, and
-        of 20.
+    spread, own_spread, noise_spread
+        Standard deviation of the logarithm of each size, of those of a run's own parts, and of the noise's: a
+        factor of 2.2 either way, and of 20.
     offset
         Standard deviation of the constant; wide, so that it is free.
     """
@@ -43,6 +43,7 @@ class SizePriors:
     fast: float = 0.1
     noise: float = 0.05
     spread: float = 0.8
+    own_spread: float = 0.8
     noise_spread: float = 3.0
     offset: float = 5.0
 

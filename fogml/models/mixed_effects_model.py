@@ -22,7 +22,9 @@ from fogml.models.combination import (
 from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.intervals import Intervals
+from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects
+from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s, row_count
 from fogml.models.weights import intervals_of, weights_of
 from fogml.runs.run import Run
@@ -77,16 +79,25 @@ class MixedEffectsModel(FeatureModel):
 
     def _fit_rows(self, rows: Sequence[RunRows], features: Features) -> int:
         table = averages_of(rows)
-        self.fitted_ = fit_mixed_effects(composed(table, features), features.terms)
+        columns = composed(table, features)
+        self.fitted_ = fit_mixed_effects(columns, features.terms, self._size_priors(columns))
         T = temperatures_of(table, features)
-        member = SharedMember(features, self.fitted_)
+        member, shared = self._shared_part(features, columns)
         parts = left_out([member], features, table, left_out_parts(table, T))
         weights = weights_of(parts, 1, self._both_ways)
         self.skill_ = float(weights[0])
         mean = float(table.y.mean())
-        _, self.regressor_ = combined([(features, self.fitted_.regressor())], weights, mean)
+        _, self.regressor_ = combined([(features, shared)], weights, mean)
         self._found = intervals_of(parts, weights, table, self._both_ways)
         return len(table)
+
+    def _size_priors(self, table: TrainingTable) -> SizePriors:
+        """Priors of the sizes, of averages of features."""
+        return SizePriors()
+
+    def _shared_part(self, features: Features, table: TrainingTable) -> tuple[SharedMember, LinearRegressor]:
+        """What compensates, to be refitted and as fitted to averages of features."""
+        return SharedMember(features, self.fitted_), self.fitted_.regressor()
 
     def _interval(self, rows: Sequence[RunRows]) -> Intervals:
         return self._found

@@ -1,21 +1,15 @@
-"""A linear model whose coefficients have a prior: what other units' coefficients were."""
+"""The prior of a unit's coefficients: what other units' coefficients were."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any, ClassVar, Self
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
 from pydantic import Field
-from sklearn.utils.validation import check_is_fitted, validate_data
 
 from fogml.errors import InputError
-from fogml.models.coefficient_errors import Told, told_by_rows
-from fogml.models.linear import LinearRegressor, SavedLinear
-from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
@@ -52,6 +46,12 @@ class Prior:
     def columns(self, X: FloatArray) -> FloatArray:
         """The columns of rows of features, shape (n, k + 1)."""
         return np.column_stack([np.ones(len(X)), (X - self.shift) / self.scale])
+
+    def to_raw(self) -> FloatArray:
+        """Matrix from constant and coefficients in these columns to those in the features' own."""
+        matrix = np.diag(1.0 / np.append(1.0, self.scale))
+        matrix[0, 1:] = -self.shift / self.scale
+        return matrix
 
     def as_dict(self) -> dict[str, Any]:
         """The prior as JSON-ready values."""
@@ -94,129 +94,19 @@ class _SavedPrior(Strict):
     units: float | None = Field(default=None, ge=1.0)
 
 
-class PriorRegressor(LinearRegressor):
-    """Linear model with a normal prior on its coefficients, of a width that the rows may overrule.
-
-    The prior's covariance is multiplied by a factor of at least one, whose distribution makes the
-    prior a t distribution; it is averaged over, weighed by the evidence. A unit like its fleet is
-    drawn to the fleet's mean where its own rows tell little; an odd one makes wide priors likely,
-    and is drawn less. How well the unit agrees with the fleet is told beside, as where rows tell
-    little even an odd unit is drawn far.
-
-    What the rows tell is that of :func:`fogml.models.coefficient_errors.told_by_rows`.
-
-    Parameters
-    ----------
-    prior
-        As `Prior.as_dict` gives it.
-
-    Attributes
-    ----------
-    spread_ : float
-        Factor of the prior's covariance with the greatest weight; 1 for a unit like its fleet.
-    agreement_ : float
-        Probability of a unit of the fleet lying at least as far out, see `agreement`.
-    """
-
-    _parameter_constraints: ClassVar[dict[str, Any]] = {"prior": [None, dict]}
-
-    def __init__(self, prior: dict[str, Any] | None = None) -> None:
-        self.prior = prior
-        self.ridge = 0.0
-        self.fit_intercept = True
-
-    def fit(
-        self,
-        X: ArrayLike,
-        y: ArrayLike,
-        folds: ArrayLike | None = None,
-        groups: ArrayLike | None = None,
-        time: ArrayLike | None = None,
-    ) -> Self:
-        """Fit to rows in time order, of the runs `groups` at times `time` [s]; `folds` are not needed.
-
-        Raises
-        ------
-        InputError
-            If there is no prior, or it is for another number of columns.
-        """
-        inputs, target = validate_data(self, X, y, dtype=np.float64, y_numeric=True)
-        if self.prior is None:
-            raise InputError("a fleet's prior is needed")
-        prior = Prior.from_dict(self.prior)
-        if len(prior.shift) != inputs.shape[1]:
-            raise InputError(
-                f"the fleet's prior is for {len(prior.shift)} columns, {inputs.shape[1]} are given"
-            )
-        columns = prior.columns(inputs)
-        told = told_by_rows(_table(columns, target, groups, time))
-        solution, covariance, self.spread_ = posterior(told.information, told.image, prior)
-        self._told = told
-        self.__dict__.pop("agreement_", None)
-        left = target - columns @ solution
-        variance = float(left @ left) / max(1.0, len(target) - columns.shape[1])
-        to_raw = _to_raw(prior)
-        raw = to_raw @ solution
-        self.intercept_, self.coef_ = float(raw[0]), raw[1:]
-        self.covariance_ = to_raw @ covariance @ to_raw.T
-        self.residual_std_ = float(np.sqrt(variance))
-        self.ridge_, self.rank_ = 0.0, inputs.shape[1]
-        return self
-
-    @cached_property
-    def agreement_(self) -> float:
-        """Probability of a unit of the fleet lying at least as far out, see `agreement`."""
-        check_is_fitted(self)
-        return agreement(self._told, Prior.from_dict(self.prior or {}))
-
-    def refitted(self, X: ArrayLike, y: ArrayLike) -> PriorRegressor:
-        """A new regressor with the same prior fitted to other rows."""
-        check_is_fitted(self)
-        return PriorRegressor(self.prior).fit(X, y)
-
-    def to_saved(self) -> tuple[dict[str, Any], dict[str, NDArray[Any]]]:
-        """The fitted regressor as JSON-ready values and arrays."""
-        values, arrays = super().to_saved()
-        return {**values, "prior": self.prior, "spread": self.spread_, "agreement": self.agreement_}, arrays
-
-    @classmethod
-    def from_saved(cls, values: dict[str, Any], arrays: dict[str, NDArray[Any]]) -> Self:
-        """The regressor that `to_saved` gave.
-
-        Raises
-        ------
-        InputError
-            If it is no such regressor.
-        """
-        saved = strictly(_SavedShared, values, "regressor")
-        plain = LinearRegressor.from_saved({name: values[name] for name in SavedLinear.model_fields}, arrays)
-        Prior.from_dict(saved.prior)
-        model = cls(prior=saved.prior)
-        for name, value in vars(plain).items():
-            if name.endswith("_"):
-                setattr(model, name, value)
-        model.spread_ = saved.spread
-        model.agreement_ = saved.agreement
-        return model
-
-
-class _SavedShared(SavedLinear):
-    """What `PriorRegressor.to_saved` writes beside the arrays."""
-
-    prior: dict[str, Any]
-    spread: float
-    agreement: float
-
-
 def posterior(
     information: FloatArray, image: FloatArray, prior: Prior, spreads: Sequence[float] | FloatArray = _SPREADS
 ) -> tuple[FloatArray, FloatArray, float]:
     """Mean and covariance of coefficients given rows, and the likeliest factor of the prior's covariance.
 
+    The prior's covariance is multiplied by a factor of at least one, whose distribution makes the prior a t
+    distribution; it is averaged over, weighed by the evidence. A unit like its fleet is drawn to the fleet's
+    mean where its own rows tell little; an odd one makes wide priors likely, and is drawn less.
+
     Parameters
     ----------
     information, image
-        ``Z'Z / s^2`` and ``Z'y / s^2`` of the rows, shapes (k + 1, k + 1) and (k + 1,).
+        ``Z'Z`` and ``Z'y`` of rows whose noise is of unit covariance, shapes (k + 1, k + 1) and (k + 1,).
     prior
         What the fleet tells.
     spreads
@@ -240,7 +130,7 @@ def posterior(
     return prior.mean + root @ mean, root @ covariance @ root.T, best
 
 
-def agreement(told: Told, prior: Prior) -> float:
+def agreement(information: FloatArray, image: FloatArray, prior: Prior) -> float:
     """Probability that a unit of the fleet would lie as far from its mean as these rows do, or farther.
 
     The unit's own estimate is compared with the fleet's mean under the covariance of both together
@@ -248,18 +138,17 @@ def agreement(told: Told, prior: Prior) -> float:
     which the rows tell something: all jointly, by the sum of squares, and each for itself, by the
     largest one. What counts is the lesser of the two probabilities, against how small it comes out for
     units of the fleet, drawn: their constants from the t distribution that a mean and a covariance estimated
-    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.6), their noise from the models
-    that the rows speak for, each as often as it is likely.
+    from so many units predict (A. Gelman et al., Bayesian Data Analysis, 3.6).
     0 if the rows tell nothing, as then an odd unit would look the same.
 
     Parameters
     ----------
-    told
-        What the unit's rows tell of its constants.
+    information, image
+        What the unit's rows tell of its constants, as in `posterior`.
     prior
         What the fleet tells.
     """
-    directions, values, seen = _directions(told.information, told.image, prior)
+    _, values, seen = _directions(information, image, prior)
     heard = values > _TOLD
     if not heard.any():
         return 0.0
@@ -267,7 +156,7 @@ def agreement(told: Told, prior: Prior) -> float:
     squares = seen[heard] ** 2 / (precise * (1.0 + precise))
     random = np.random.default_rng(0)
     unit = random.standard_normal((_DRAWS, len(precise)))
-    noise = _noise_drawn(told, directions[:, heard] / np.sqrt(precise), random)
+    noise = random.standard_normal((_DRAWS, len(precise)))
     if np.isfinite(prior.units):
         freedom = random.chisquare(max(prior.units - len(prior.mean), 1.0), _DRAWS)
         unit *= np.sqrt((1.0 + 1.0 / prior.units) * (prior.units - 1.0) / freedom)[:, None]
@@ -294,37 +183,3 @@ def _directions(
     values, vectors = np.linalg.eigh(root.T @ information @ root)
     directions = root @ vectors
     return directions, np.maximum(values, 0.0), directions.T @ (image - information @ prior.mean)
-
-
-def _noise_drawn(told: Told, directions: FloatArray, random: np.random.Generator) -> FloatArray:
-    """Noise of what rows tell of directions, of unit variance on average, shape (_DRAWS, directions)."""
-    along = told.columns @ directions
-    model = random.choice(len(told.weights), _DRAWS, p=told.weights)
-    noise = random.standard_normal((_DRAWS, along.shape[1]))
-    for place in np.unique(model):
-        squares, axes = np.linalg.eigh(along.T @ told.noise[place] @ along)
-        noise[model == place] *= np.sqrt(np.maximum(squares, 0.0))
-        noise[model == place] @= axes.T
-    if np.isfinite(told.freedom):
-        noise *= np.sqrt(told.freedom / random.chisquare(told.freedom, _DRAWS))[:, None]
-    return noise
-
-
-def _table(
-    columns: FloatArray, target: FloatArray, groups: ArrayLike | None, time: ArrayLike | None
-) -> TrainingTable:
-    """Rows of runs `groups` at times; by default rows of one run that follow each other evenly."""
-    count = len(target)
-    run = np.zeros(count, dtype=np.intp) if groups is None else np.unique(groups, return_inverse=True)[1]
-    times = np.arange(count, dtype=np.float64) if time is None else np.asarray(time, dtype=np.float64)
-    return TrainingTable(columns, target, run, times, np.zeros(count, dtype=np.intp))
-
-
-def _to_raw(prior: Prior) -> FloatArray:
-    """Matrix from (constant, coefficients) in the prior's columns to those in the features' own."""
-    width = len(prior.shift)
-    matrix = np.zeros((width + 1, width + 1))
-    matrix[0, 0] = 1.0
-    matrix[0, 1:] = -prior.shift / prior.scale
-    matrix[1:, 1:] = np.diag(1.0 / prior.scale)
-    return matrix

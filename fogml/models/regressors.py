@@ -39,7 +39,6 @@ from fogml.runs.run import FloatArray
 
 FORMS = {
     "linear": "fogml.models.linear:LinearRegressor",
-    "prior": "fogml.models.prior:PriorRegressor",
     "rbf": "fogml.models.rbf:RBFRegressor",
     "rbf-patent": "fogml.models.rbf:PatentRBFRegressor",
 }

@@ -13,11 +13,10 @@ from fogml.errors import InputError
 from fogml.models.linear import LinearRegressor
 from fogml.models.names import PARAMETRIC, make_model
 from fogml.models.parameters import check_parameters
-from fogml.models.prior import PriorRegressor
 from fogml.models.rbf import PatentRBFRegressor, RBFRegressor
 from fogml.models.sklearn_model import sklearn_regressor_class
 
-OWN = (LinearRegressor, PriorRegressor, RBFRegressor, PatentRBFRegressor)
+OWN = (LinearRegressor, RBFRegressor, PatentRBFRegressor)
 NAN, INF = float("nan"), float("inf")
 
 
