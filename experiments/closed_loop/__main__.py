@@ -111,6 +111,7 @@ def page(rows: list[dict[str, Any]], minutes: float) -> str:
     groups = [(kind.replace("_", " "), [r for r in rows if r["kind"] == kind]) for kind in KINDS]
     groups += [
         ("all where the cause is found", [r for r in rows if r["found"]]),
+        ("the same, under a tenth outside training", [r for r in rows if r["found"] and _within(r)]),
         ("all where it is not", [r for r in rows if not r["found"]]),
         ("all", rows),
     ]
@@ -120,22 +121,32 @@ def page(rows: list[dict[str, Any]], minutes: float) -> str:
     below = sum(r["diagnosis"] < r["auto"] for r in rows)
     share = wilson(below, len(rows))
     found = [r for r in rows if r["found"]]
-    over, auto = (
-        float(np.median([r[name] / r["floor"] for r in found])) if found else float("nan")
-        for name in ("diagnosis", "auto")
+    over, auto = (_over_floor(found, name) for name in ("diagnosis", "auto"))
+    within, within_auto = (
+        _over_floor([r for r in found if _within(r)], name) for name in ("diagnosis", "auto")
     )
     outside = 100.0 * float(np.mean([r["outside_training"] for r in rows]))
     lines += [
         "",
         f"Below `auto` on {below} of {len(rows)} units, {100 * (share.value or 0):.0f} % (95 % interval "
         f"{100 * (share.low or 0):.0f} to {100 * (share.high or 0):.0f} %). Where the cause is found, the "
-        f"median is {over:.2f} times the floor from the diagnosis, {auto:.2f} times by `auto`.",
+        f"median is {over:.2f} times the floor from the diagnosis, {auto:.2f} times by `auto`; of those "
+        f"whose third run stays within training but for a tenth, {within:.2f} and {within_auto:.2f} times.",
         "",
         "A model is limited to the temperatures that it was trained on: of the third run's samples "
         f"{outside:.0f} % lie outside on average, where all of these models stay at the edge.",
         "",
     ]
     return "\n".join(lines)
+
+
+def _within(row: dict[str, Any]) -> bool:
+    return bool(row["outside_training"] < 0.1)
+
+
+def _over_floor(rows: list[dict[str, Any]], name: str) -> float:
+    """Median of what a model leaves over the noise floor."""
+    return float(np.median([r[name] / r["floor"] for r in rows])) if rows else float("nan")
 
 
 def _row(name: str, held: list[dict[str, Any]]) -> str:

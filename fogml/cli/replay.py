@@ -35,7 +35,10 @@ class ReplaySettings(Settings):
         option("Truth of a simulated run, in place of its columns.", metavar="FILE", reads=True),
     ] = None
     gyro_axis: Annotated[
-        str | None, option("Of gnss-ins-sim's three axes the gyro's.", "--axis", metavar="x|y|z")
+        str | None,
+        option(
+            "Of gnss-ins-sim's axes the gyro's; -z where it points the other way.", "--axis", metavar="x|y|z"
+        ),
     ] = None
     after: Annotated[
         list[str],

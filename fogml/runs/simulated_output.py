@@ -14,7 +14,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray, Run
 
-AXES = ("x", "y", "z")
+AXES = ("x", "y", "z", "-x", "-y", "-z")
 FINER = 0.75
 """A simulator with a step under this share of the run's is averaged over its samples; else interpolated."""
 BEYOND = 1.5
@@ -28,7 +28,9 @@ def is_simulator_output(path: str | Path) -> bool:
 
 
 def read_gnss_ins_sim(folder: str | Path, axis: str | None) -> tuple[FloatArray, FloatArray]:
-    """Time [s] and rate [deg/h] of one axis in a folder that gnss-ins-sim wrote, each of shape (n,).
+    """Time [s] and rate [deg/h] about one axis in a folder that gnss-ins-sim wrote, each of shape (n,).
+
+    `axis` is one of `AXES`; with a minus, that of a gyro whose input axis points the other way.
 
     Raises
     ------
@@ -47,13 +49,14 @@ def read_gnss_ins_sim(folder: str | Path, axis: str | None) -> tuple[FloatArray,
     rates = []
     for file in files:
         values, units = _columns(file, 3)
-        unit = units[AXES.index(axis)]
+        place = "xyz".index(axis[-1])
+        unit = units[place]
         factor = {"deg/s": 3600.0, "rad/s": float(np.degrees(3600.0)), "deg/h": 1.0}.get(unit)
         if factor is None:
             raise InputError(f"{file}: unit '{unit}' of the rate; deg/s, rad/s or deg/h was expected")
         if len(values) != len(time):
             raise InputError(f"{file}: {len(values)} rows, and {len(time)} in time.csv; they go together")
-        rates.append(factor * values[:, AXES.index(axis)])
+        rates.append((-factor if axis.startswith("-") else factor) * values[:, place])
     return time[:, 0], np.mean(rates, axis=0)
 
 

@@ -30,6 +30,7 @@ def test_a_folder_of_gnss_ins_sim(tmp_path, unit, factor):
     found, rate = read_gnss_ins_sim(tmp_path, "z")
     np.testing.assert_array_equal(found, time)
     np.testing.assert_allclose(rate, factor * 0.002 * (1.0 + time), atol=5e-6 * factor)
+    np.testing.assert_array_equal(read_gnss_ins_sim(tmp_path, "-z")[1], -rate)
     assert is_simulator_output(tmp_path) and not is_simulator_output("nominal")
 
 
