@@ -119,6 +119,7 @@ class UnitWork:
 
     def _diagnose(self, unit: Unit, folder: Path) -> dict[str, Any]:
         from fogml.cli.diagnose_job import DiagnoseSettings, Diagnosis, diagnose_and_write
+        from fogml.fleet.diagnosis import unit_diagnosis
 
         settings = self._for(DiagnoseSettings, unit, folder, runs=list(unit.train), held_out=list(unit.test))
         found = diagnose_and_write(settings, Terminal(quiet=True))
@@ -128,6 +129,7 @@ class UnitWork:
         return {
             "verdict": found.verdict,
             "effects": [item.effect for item in found.found],
+            "diagnosis": unit_diagnosis(found, unit.covariates),
             "worst": None
             if worst is None
             else {

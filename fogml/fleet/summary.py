@@ -11,6 +11,7 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.fleet.constants import LEAST_UNITS, FleetConstants, UnitConstants, fleet_constants
+from fogml.fleet.diagnosis import line_diagnosis
 from fogml.fleet.tasks import DONE
 
 FLEET_SCHEMA = "fogml.fleet/1"
@@ -45,6 +46,11 @@ def fleet_json(outcomes: Sequence[Mapping[str, Any]], settings: Mapping[str, Any
         "outliers": _outliers(judged, constants),
         "again": _again(units),
     }
+    told = [outcome for outcome in outcomes if outcome.get("found", {}).get("diagnosis")]
+    if told:
+        labels = [label_of(outcome) for outcome in told]
+        seed = int(settings.get("seed", 0))
+        values["diagnosis"] = line_diagnosis(labels, [one["found"]["diagnosis"] for one in told], seed)
     if constants is not None:
         labels, found = constants
         values["constants"] = _constants_json(labels, found)

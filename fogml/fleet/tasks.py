@@ -56,6 +56,7 @@ class Found(Strict, extra="ignore"):
     notes: list[str] = []
     worst: Worst | None = None
     constants: dict[str, Any] | None = None
+    diagnosis: dict[str, Any] | None = None
 
 
 class Outcome(Strict, extra="ignore"):

@@ -9,6 +9,7 @@ from urllib.parse import quote
 from fogml.fleet.summary import in_order_of_serial, label_of
 from fogml.fleet.tasks import DONE
 from fogml.report.figures_fleet import by_unit, constants, distribution
+from fogml.report.fleet_diagnosis import apart_facts, line_figure, line_sentences, line_table
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, averages, number, percent, plural
@@ -51,7 +52,22 @@ def fleet_page(fleet: Mapping[str, Any], name: str = "fleet", batch: str | None 
         again=[(f"{item['unit']} ({item['job']})", item["why"]) for item in fleet["again"]],
         table=_table(order),
         batch=batch,
+        line=_line(fleet),
     )
+
+
+def _line(fleet: Mapping[str, Any]) -> dict[str, Any] | None:
+    """What the units' diagnoses tell together; None where none was diagnosed."""
+    line = fleet.get("diagnosis")
+    if line is None:
+        return None
+    causes = bool(line["causes"])
+    return {
+        "sentences": line_sentences(line),
+        "figure": line_figure(line) if causes else None,
+        "table": line_table(line) if causes else None,
+        "apart": apart_facts(line),
+    }
 
 
 def _verdict(fleet: Mapping[str, Any]) -> list[str]:

@@ -27,6 +27,12 @@ _UNIT_COLUMNS = (
 )
 
 
+_CAUSE_COLUMNS = (
+    *("effect", "place", "units_named", "units_told", "prevalence", "shared"),
+    *("amplitude", "amplitude_se", "between_units", "unit", "energy_share", "gap_rms_without"),
+)
+
+
 def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
     """Write a ``fleet.json`` as an Excel workbook that appears whole or not at all.
 
@@ -48,6 +54,10 @@ def fleet_spreadsheet(fleet: Mapping[str, Any], path: str | Path) -> None:
         writer.table(sheet, [head for _, head in _UNIT_COLUMNS], rows)
         sheet.set_column(0, len(_UNIT_COLUMNS) - 1, 16)
         sheet.freeze_panes(1, 1)
+        if "diagnosis" in fleet:
+            sheet = writer.sheet("Causes")
+            rows = [[one[key] for key in _CAUSE_COLUMNS] for one in fleet["diagnosis"]["causes"]]
+            writer.table(sheet, [key.replace("_", " ") for key in _CAUSE_COLUMNS], rows)
         if "constants" in fleet:
             found = fleet["constants"]
             sheet = writer.sheet("Constants")

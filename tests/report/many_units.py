@@ -23,6 +23,24 @@ from tests.monitor.test_watch import service
 UNITS = 200
 
 
+def diagnosed(place: int) -> dict[str, Any]:
+    """A unit's diagnosis, with a cause that the line shares."""
+    rng = np.random.default_rng(place)
+    cause = {
+        "effect": "thermal_hysteresis",
+        "members": ["thermal_hysteresis"],
+        "probability": 0.9,
+        "share": 0.7,
+        "place": "coil",
+        "amplitude": 0.02 * (5.0 if place == 8 else 1.0) + 0.001 * rng.normal(),
+        "se": 0.001,
+        "unit": "deg/h",
+        "times_usual": 0.5,
+    }
+    told = {"causes": [cause], "unknown": 0.05, "undetectable": [], "gap_square": 4e-4, "floor_square": 1e-4}
+    return {**told, "covariates": {}}
+
+
 def fleet_values() -> dict[str, Any]:
     """A fleet of trained and accepted units, one that failed and one that stands out."""
     rng = np.random.default_rng(0)
@@ -43,6 +61,8 @@ def fleet_values() -> dict[str, Any]:
         }
         if place == 4:
             outcome["reason"] = f"{SERIAL.format(4)}-cycle-1.csv, line 77: 3 fields where the header has 4"
+        if place % 10 == 8:
+            outcome |= {"job": "diagnose", "found": {**found, "diagnosis": diagnosed(place)}}
         outcomes.append(outcome)
     return dict(finite_json(fleet_json(outcomes, {})))
 
@@ -60,7 +80,12 @@ def pages_of_many() -> dict[str, str]:
     records = [
         one
         for place in range(UNITS)
-        for one in service(12, step_at=7 if place == 3 else None, seed=place, unit=SERIAL.format(place))
+        for one in service(
+            20 if place == 3 else 12,
+            step_at=12 if place == 3 else None,
+            seed=place,
+            unit=SERIAL.format(place),
+        )
     ]
     monitor = monitor_json(watch(records), runs_between_false_alarms=1000.0, added=0, repeated=0)
     changed = next(unit for unit in monitor["units"] if unit["state"] == "alarm")

@@ -1,0 +1,238 @@
+"""What the diagnoses of a fleet's units tell together: shared causes, units apart, what to change."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from fogml.errors import InputError
+from fogml.fleet.shares import apart, discoveries, prevalence, probability_of_difference, sizes
+from fogml.runs.run import FloatArray
+from fogml.strict import Strict, strictly
+
+FALSE_SHARE = 0.05
+"""Of the units that are said to stand apart, the share that may be wrong in the mean."""
+SHARED = 0.95
+"""A cause is the line's if more than half of its units have it with this probability, and by lot likewise."""
+NAMED = 0.5
+"""A unit has a cause from this probability on, as in its own diagnosis."""
+_RESAMPLES = 400
+"""Lines drawn from the units for an interval: its ends are told to a tenth of its width."""
+Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class Cause(Strict, extra="ignore"):
+    """A cause of a unit's gap, as its diagnosis tells it."""
+
+    effect: str
+    members: list[str]
+    probability: Probability
+    share: float | None
+    place: str
+    amplitude: float
+    se: Annotated[float, Field(ge=0.0)]
+    unit: str
+    times_usual: float | None
+
+
+class UnitDiagnosis(Strict, extra="ignore"):
+    """What a unit's diagnosis tells the fleet: causes, the probability of something unknown, and the gap.
+
+    `gap_square` is its mean square [(deg/h)^2]: what the twin with fitted constants leaves above the floor.
+    """
+
+    causes: list[Cause]
+    unknown: Probability
+    undetectable: list[str]
+    gap_square: Annotated[float, Field(ge=0.0)]
+    floor_square: Annotated[float, Field(ge=0.0)]
+    covariates: dict[str, str] = {}
+
+
+def unit_diagnosis(found: Any, covariates: Mapping[str, str]) -> dict[str, Any]:
+    """What a `fogml.gap.result.Diagnosis` tells the fleet, JSON-ready."""
+    far = [item for item in found.how_far if item.recalibrated is not None]
+    worst = max(far, key=lambda item: item.recalibrated, default=None)
+    floor = 0.0 if worst is None else float(worst.floor) ** 2
+    return UnitDiagnosis(
+        causes=[
+            Cause(
+                effect=one.effect,
+                members=list(one.members),
+                probability=float(one.probability),
+                share=None if one.share is None else float(one.share),
+                place=one.place,
+                amplitude=float(one.amplitude.value),
+                se=float(one.amplitude.se),
+                unit=one.amplitude.unit,
+                times_usual=None if one.times_usual is None else float(one.times_usual),
+            )
+            for one in found.found
+        ],
+        unknown=float(found.unknown.probability),
+        undetectable=list(found.undetectable),
+        gap_square=0.0 if worst is None else max(float(worst.recalibrated) ** 2 - floor, 0.0),
+        floor_square=floor,
+        covariates=dict(covariates),
+    ).model_dump()
+
+
+def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], seed: int = 0) -> dict[str, Any]:
+    """What n units' diagnoses tell together, JSON-ready.
+
+    Parameters
+    ----------
+    labels
+        Serial number and axis of each.
+    told
+        As `unit_diagnosis` gives them.
+    seed
+        Of the intervals' resampling.
+
+    Raises
+    ------
+    InputError
+        If one is none.
+    """
+    units = [_read(label, one) for label, one in zip(labels, told, strict=True)]
+    effects = sorted({cause.effect for unit in units for cause in unit.causes})
+    rng = np.random.default_rng(seed)
+    draws = rng.integers(len(units), size=(_RESAMPLES, len(units)))
+    causes = [_cause(effect, labels, units, draws) for effect in effects]
+    causes.sort(key=lambda one: -one["energy_share"])
+    unknown = prevalence([unit.unknown for unit in units])
+    return {
+        "units": len(units),
+        "causes": causes,
+        "unknown": {"prevalence": unknown.mean, "prevalence_ci90": list(unknown.ci90)},
+        "gap_rms": _rms([unit.gap_square for unit in units]),
+        "apart": _apart(labels, units, causes),
+    }
+
+
+def _read(label: str, told: Mapping[str, Any]) -> UnitDiagnosis:
+    try:
+        return strictly(UnitDiagnosis, told, "diagnosis")
+    except InputError as error:
+        raise InputError(f"{label}: its outcome holds no diagnosis ({error}); run the fleet again") from None
+
+
+def _of(unit: UnitDiagnosis, effect: str) -> Cause | None:
+    return next((cause for cause in unit.causes if cause.effect == effect), None)
+
+
+def _probability(unit: UnitDiagnosis, effect: str) -> float:
+    """That a unit has a cause: of an effect that its diagnosis does not list, none is seen."""
+    cause = _of(unit, effect)
+    return cause.probability if cause is not None else 0.0
+
+
+def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], draws: Any) -> dict[str, Any]:
+    """One cause on the line."""
+    # Units whose runs could not show it say nothing on how common it is.
+    showing = [unit for unit in units if effect not in unit.undetectable or _of(unit, effect) is not None]
+    common = prevalence([_probability(unit, effect) for unit in showing])
+    named = [(label, cause) for label, unit in zip(labels, units) if (cause := _of(unit, effect)) is not None]
+    sure = [(label, cause) for label, cause in named if cause.probability >= NAMED]
+    by_size = sorted(named, key=lambda item: -item[1].probability)
+    line = sizes([c.amplitude for _, c in sure], [c.se for _, c in sure]) if sure else None
+    energy = np.array([_energy(unit, effect) for unit in units])
+    gap = np.array([unit.gap_square for unit in units])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        shares = energy[draws].sum(axis=1) / gap[draws].sum(axis=1)
+    low, high = np.nanquantile(np.where(np.isfinite(shares), shares, 0.0), (0.05, 0.95))
+    return {
+        "effect": effect,
+        "members": sorted({member for _, cause in named for member in cause.members}),
+        "place": by_size[0][1].place,
+        "units_told": len(showing),
+        "units_named": len(sure),
+        "prevalence": common.mean,
+        "prevalence_ci90": list(common.ci90),
+        "shared": bool(common.over_half >= SHARED),
+        "amplitude": None if line is None else line.mean,
+        "amplitude_se": None if line is None else line.se,
+        "between_units": None if line is None or np.isnan(line.between) else line.between,
+        "unit": by_size[0][1].unit,
+        "energy_share": float(energy.sum() / gap.sum()) if gap.sum() > 0.0 else 0.0,
+        "energy_share_ci90": [float(low), float(high)],
+        "gap_rms_without": _rms(gap - energy),
+        "depends_on": _depends(effect, showing),
+    }
+
+
+def _energy(unit: UnitDiagnosis, effect: str) -> float:
+    """What of a unit's gap a cause makes, in the mean over whether it acts [(deg/h)^2]."""
+    cause = _of(unit, effect)
+    if cause is None or cause.share is None:
+        return 0.0
+    return cause.probability * min(max(cause.share, 0.0), 1.0) * unit.gap_square
+
+
+def _rms(squares: Sequence[float] | FloatArray) -> float:
+    return float(np.sqrt(np.maximum(np.mean(squares), 0.0)))
+
+
+def _depends(effect: str, units: Sequence[UnitDiagnosis]) -> list[dict[str, Any]]:
+    """What is known of production that a cause goes with, and how common it is with each of its values."""
+    told = []
+    for name in sorted({name for unit in units for name in unit.covariates}):
+        groups: dict[str, list[float]] = defaultdict(list)
+        for unit in units:
+            if name in unit.covariates:
+                groups[unit.covariates[name]].append(_probability(unit, effect))
+        # Where every unit has a value of its own there is nothing to compare.
+        if not 2 <= len(groups) <= sum(map(len, groups.values())) / 2:
+            continue
+        probability = probability_of_difference(list(groups.values()))
+        if probability >= SHARED:
+            shares = {value: prevalence(group).mean for value, group in sorted(groups.items())}
+            told.append({"name": name, "probability": probability, "prevalence": shares})
+    return told
+
+
+def _apart(
+    labels: Sequence[str], units: Sequence[UnitDiagnosis], causes: Sequence[Mapping[str, Any]]
+) -> list[dict[str, Any]]:
+    """Units whose size of a cause is unlike the others', that have a rare one, or lack a shared one."""
+    told: list[dict[str, Any]] = []
+    tested: list[tuple[str, str, str, float]] = []
+    for cause in causes:
+        effect = cause["effect"]
+        has = [(label, one) for label, unit in zip(labels, units) if (one := _of(unit, effect)) is not None]
+        sure = [(label, one) for label, one in has if one.probability >= NAMED]
+        values, errors = [one.amplitude for _, one in sure], [one.se for _, one in sure]
+        for (label, one), p in zip(sure, apart(values, errors)):
+            size = f"{one.amplitude:.3g} {one.unit}, the line's is {cause['amplitude']:.3g}"
+            tested.append((label, effect, size, float(p)))
+        common = 1.0 - cause["prevalence_ci90"][1]
+        for label, _ in sure:
+            if common > 0.5 and len(units) > 3:
+                why = f"has it, as {cause['units_named']} of {cause['units_told']} units do"
+                told.append({"unit": label, "effect": effect, "kind": "rare", "why": why})
+        if cause["shared"]:
+            lacking = [
+                label
+                for label, unit in zip(labels, units)
+                if _probability(unit, effect) < 1.0 - SHARED and effect not in unit.undetectable
+            ]
+            told += [
+                {
+                    "unit": label,
+                    "effect": effect,
+                    "kind": "without",
+                    "why": "does not show it, most others do",
+                }
+                for label in lacking
+            ]
+    found = discoveries([p for *_, p in tested], FALSE_SHARE)
+    sizes_apart = [
+        {"unit": label, "effect": effect, "kind": "size", "why": why, "p_value": p}
+        for (label, effect, why, p), is_told in zip(tested, found)
+        if is_told
+    ]
+    return [*sizes_apart, *told]

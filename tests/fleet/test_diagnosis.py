@@ -1,0 +1,109 @@
+"""What a line's diagnoses tell together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.fleet.diagnosis import line_diagnosis, unit_diagnosis
+from fogml.fleet.summary import fleet_json
+from fogml.report.fleet_page import fleet_page
+from tests.report.diagnoses import diagnosis
+
+
+def cause(effect: str, probability: float, size: float, share: float = 0.6) -> dict[str, Any]:
+    told = {
+        "effect": effect,
+        "members": [effect],
+        "probability": probability,
+        "share": share,
+        "place": "coil",
+    }
+    return {**told, "amplitude": size, "se": 0.02, "unit": "deg/h", "times_usual": 1.0}
+
+
+def unit(*causes: dict[str, Any], lot: str = "", hidden: tuple[str, ...] = ()) -> dict[str, Any]:
+    told = {"causes": list(causes), "unknown": 0.02, "undetectable": list(hidden)}
+    return {**told, "gap_square": 0.04, "floor_square": 1e-4, "covariates": {"coil_lot": lot} if lot else {}}
+
+
+@pytest.fixture(scope="module")
+def line() -> dict[str, Any]:
+    """Forty units: hysteresis in all but one, one of them far larger; a loop gain in one lot alone."""
+    rng = np.random.default_rng(0)
+    units = []
+    for place in range(40):
+        causes = [cause("thermal_hysteresis", 0.97, 1.0 + 0.1 * rng.normal() + (3.0 if place == 5 else 0.0))]
+        if place == 9:
+            causes = []
+        if place % 4 == 0:
+            causes.append(cause("loop_gain", 0.9, 0.5 + 0.05 * rng.normal(), share=0.3))
+        units.append(unit(*causes, lot="B" if place % 4 == 0 else "A", hidden=("radiation",)))
+    return line_diagnosis([f"FOG-{place}" for place in range(40)], units)
+
+
+def test_what_the_line_shares_and_what_to_change_first(line: dict[str, Any]) -> None:
+    first, second = line["causes"]
+    assert (first["effect"], second["effect"]) == ("thermal_hysteresis", "loop_gain")
+    assert first["shared"] and not second["shared"]
+    assert first["units_named"] == 39 and first["prevalence_ci90"][0] > 0.8
+    assert first["energy_share"] == pytest.approx(39 * 0.97 * 0.6 / 40)
+    assert first["energy_share_ci90"][0] < first["energy_share"] < first["energy_share_ci90"][1]
+    assert first["gap_rms_without"] == pytest.approx(0.2 * np.sqrt(1.0 - first["energy_share"]))
+    assert second["between_units"] == pytest.approx(0.05, abs=0.04)
+    (known,) = second["depends_on"]
+    assert known["name"] == "coil_lot" and known["prevalence"]["B"] > 0.7 > 0.2 > known["prevalence"]["A"]
+    assert not first["depends_on"]
+
+
+def test_units_that_stand_apart(line: dict[str, Any]) -> None:
+    told = {(one["unit"], one["kind"], one["effect"]) for one in line["apart"]}
+    assert ("FOG-5", "size", "thermal_hysteresis") in told
+    assert ("FOG-9", "without", "thermal_hysteresis") in told
+    assert {name for name, kind, _ in told if kind == "rare"} == {f"FOG-{n}" for n in range(0, 40, 4)}
+    assert len([one for one in told if one[1] == "size"]) <= 2
+
+
+def test_units_that_could_not_show_a_cause_say_nothing_of_it() -> None:
+    units = [unit(cause("magnetic", 0.95, 1.0))] * 3 + [unit(hidden=("magnetic",))] * 20
+    told = line_diagnosis([str(n) for n in range(23)], units)["causes"][0]
+    assert told["units_told"] == 3 and told["prevalence"] > 0.7
+    with pytest.raises(InputError, match="run the fleet again"):
+        line_diagnosis(["FOG-1"], [{"causes": []}])
+
+
+def test_it_stands_in_the_fleet_s_page_and_json(line: dict[str, Any]) -> None:
+    outcomes = [
+        {
+            "unit": f"F{n}",
+            "axis": "x",
+            "job": "diagnose",
+            "folder": f"F{n}",
+            "status": "done",
+            "found": {
+                "verdict": "explained",
+                "effects": ["magnetic"],
+                "diagnosis": unit(cause("magnetic", 0.9, 1.0)),
+            },
+        }
+        for n in range(6)
+    ]
+    values = fleet_json(outcomes, {"seed": 0})
+    assert values["diagnosis"]["units"] == 6
+    page = fleet_page(values)
+    assert "Change first: magnetic (coil)" in page
+    assert "diagnosis" not in fleet_json([{**o, "found": {}} for o in outcomes], {})
+    # No cause in any: the page stands.
+    none = [{**o, "found": {"diagnosis": unit()}} for o in outcomes]
+    assert "No cause is shared" in fleet_page(fleet_json(none, {}))
+
+
+def test_a_diagnosis_becomes_what_the_fleet_wants() -> None:
+    found = diagnosis()
+    told = unit_diagnosis(found, {"coil_lot": "B"})
+    assert [one["effect"] for one in told["causes"]] == [one.effect for one in found.found]
+    assert told["covariates"] == {"coil_lot": "B"}
+    line_diagnosis(["FOG-1"], [told])
