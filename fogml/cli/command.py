@@ -91,7 +91,8 @@ class Place(click.Path):
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> Any:
         names = () if self.given is None else self.given.known_names()
-        return [*_beginning(names, incomplete), *super().shell_complete(ctx, param, incomplete)]
+        # In bash the offer of files takes back what was offered before it.
+        return [*super().shell_complete(ctx, param, incomplete), *_beginning(names, incomplete)]
 
 
 def spread_values(arguments: list[str], *options: str) -> list[str]:

@@ -214,6 +214,8 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
         maker = get_completion_class(shell)
         assert maker is not None
         click.echo(maker(ctx.command, {}, "fogml", "_FOGML_COMPLETE").source())
+        if shell == "bash":  # names such as shipped:ring-laser-x are one word
+            click.echo("COMP_WORDBREAKS=${COMP_WORDBREAKS//:}")
         ctx.exit()
 
 

@@ -5,6 +5,9 @@ from __future__ import annotations
 import errno
 import json
 import os
+import pty
+import select
+import shutil
 import signal
 import subprocess
 import sys
@@ -111,18 +114,36 @@ def test_a_shell_gets_its_script(shell):
     assert f"_FOGML_COMPLETE={shell}_complete" in script
 
 
-def test_bash_completes_commands_and_names(tmp_path):
-    words = [("fogml tr", 1, "train"), ("fogml train --model poly", 3, "polynomial")]
-    for line, position, wanted in words:
-        found = run_program(
-            env={
-                **os.environ,
-                "_FOGML_COMPLETE": "bash_complete",
-                "COMP_WORDS": line,
-                "COMP_CWORD": str(position),
-            }
-        )
-        assert wanted in [text.partition(",")[2] for text in found.stdout.split()]
+def test_bash_completes_names_and_files(tmp_path):
+    """An interactive bash, to which Tab is typed."""
+    if shutil.which("bash") is None:
+        pytest.skip("no bash")
+    program = tmp_path / "fogml"
+    program.write_text(f"#!{sys.executable}\nfrom fogml.cli.main import main\nmain()\n")
+    program.chmod(0o755)
+    (tmp_path / "own-run.csv").touch()
+    script = runner.invoke(main.app, ["--completion", "bash"]).stdout
+    (tmp_path / "rc").write_text(f"PATH={tmp_path}:$PATH\ncd {tmp_path}\n{script}\nPS1=ready\n")
+    child, terminal = pty.fork()
+    if child == 0:
+        os.execvp("bash", ["bash", "--noprofile", "--rcfile", str(tmp_path / "rc"), "-i"])
+    steps = [
+        (b"", b"ready"),
+        (b"fogml lab rate --twin tac\t", b"tical "),
+        (b"\x15fogml inspect shipped:r\t", b"ing-laser-"),
+        (b"x own-r\t", b"un.csv "),
+    ]
+    try:
+        for typed, answer in steps:
+            os.write(terminal, typed)
+            heard = b""
+            while answer not in heard:
+                assert select.select([terminal], [], [], 120.0)[0], (typed, heard)
+                heard += os.read(terminal, 65536)
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        os.close(terminal)
 
 
 def test_help_loads_nothing_heavy():
