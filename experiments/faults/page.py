@@ -22,13 +22,18 @@ def write_part(folder: Path, part: str, found: Any) -> None:
         found["notes"] = found["notes"] or known[part]["notes"]
         found["seconds"] += known[part]["seconds"]
     if part == "fuzz" and part in known and found["only"]:
-        # Kinds whose faults were mended are spoiled again alone, with other draws.
+        # Kinds whose faults were mended, and new ones, are spoiled alone, with other draws.
+        alone = known[part].get("alone", {})
+        before = known[part]["kinds"].keys() - {kind for kind, told in alone.items() if told.get("new")}
         found = {
             **known[part],
             "kinds": known[part]["kinds"] | found["kinds"],
             "alone": {
-                **known[part].get("alone", {}),
-                **{kind: {"inputs": found["inputs"], "seed": found["seed"]} for kind in found["kinds"]},
+                **alone,
+                **{
+                    kind: {"inputs": found["inputs"], "seed": found["seed"], "new": kind not in before}
+                    for kind in found["kinds"]
+                },
             },
         }
     known |= {part: {**found, "version": __version__}}
@@ -66,11 +71,7 @@ def _fuzz(found: dict[str, Any]) -> list[str]:
         f"{total['compared']:,} of them the values read were compared with an independent reader's.",
         "",
         *found.get("notes", ()),
-        *[
-            f"{name}: again after what had failed in them was mended, {told['inputs']:,} inputs of seed "
-            f"{told['seed']} with `--only`."
-            for name, told in found.get("alone", {}).items()
-        ],
+        *_alone(found.get("alone", {})),
         "",
         "| kind | inputs | exit 0 | exit 1 | exit 2 | compared | failed |",
         "|---|---:|---:|---:|---:|---:|---|",
@@ -83,6 +84,18 @@ def _fuzz(found: dict[str, Any]) -> list[str]:
         "| failure | means |",
         "|---|---|",
         *[f"| {name} | {meaning} |" for name, meaning in FAULTS.items()],
+    ]
+
+
+def _alone(kinds: dict[str, dict[str, Any]]) -> list[str]:
+    """Which kinds were spoiled alone, by run."""
+    runs: dict[tuple[int, int, bool], list[str]] = {}
+    for name, told in kinds.items():
+        runs.setdefault((told["inputs"], told["seed"], told.get("new", False)), []).append(name)
+    return [
+        f"{', '.join(names)}: {'alone' if is_new else 'again after what had failed in them was mended'}, "
+        f"{inputs:,} inputs of seed {seed} with `--only`."
+        for (inputs, seed, is_new), names in runs.items()
     ]
 
 

@@ -12,6 +12,7 @@ from fogml.readers.spool import Rows, Spool
 
 Slice = Callable[[int, int], Any]
 MOST_COLUMNS = 5000
+"""Of a file: what is said of each is held and sent, 200 bytes or so, before anything is read."""
 
 
 class Column:
@@ -89,18 +90,3 @@ class Container:
         self.arrays.clear()
         if self._spool is not None:
             self._spool.close()
-
-
-class Kept:
-    """The last few results of a function of a key: columns of one group are read together, once."""
-
-    def __init__(self, make: Callable[[Any], Any], most: int = 1) -> None:
-        self.make, self.most = make, most
-        self.held: dict[Any, Any] = {}
-
-    def __call__(self, key: Any) -> Any:
-        if key not in self.held:
-            while len(self.held) >= self.most:
-                self.held.pop(next(iter(self.held)))
-            self.held[key] = self.make(key)
-        return self.held[key]

@@ -7,7 +7,7 @@ import math
 import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
-from functools import partial
+from functools import cache, partial
 from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
@@ -15,15 +15,18 @@ from typing import Any
 import numpy as np
 
 from fogml.readers import mcap_chunks
-from fogml.readers.columns import Column, Container, Kept
+from fogml.readers.columns import Column, Container
 from fogml.readers.spool import Rows
 
 ToFloats = Callable[[Any], Sequence[float]]
 _NUMBER = (bool, int, float, np.number)
 _DEEPEST = 5
+"""Levels of a message; those that ROS 2 ships have three, results of ROS 1 actions six."""
 _LONGEST_ARRAY = 16
+"""Numbers of an array that are columns: vectors, and matrices up to 3 by 4; scans and images are longer."""
 _MOST_FIELDS = 100
-_MOST_TOPICS = 1000
+"""Columns of a topic: the widest type that ROS ships holds 41 numbers (``sensor_msgs/CameraInfo``), an
+``Imu`` 39; lists of a message's own may be of any length."""
 _STAMP = "header.stamp"
 _CLOCK = "time"
 _STAMPS = {("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")}
@@ -121,7 +124,7 @@ class Messages(Container):
 
     def __init__(self) -> None:
         super().__init__()
-        self.kept = Kept(self.unpacked, _MOST_TOPICS)
+        self.kept = cache(self.unpacked)
         self.fields: dict[str, tuple[list[str], Callable[[Any], Sequence[float]], int]] = {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:

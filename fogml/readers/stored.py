@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from fogml.readers.columns import MOST_COLUMNS
+
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 _MOST_NAMES = 10_000
 _MOST_TEXT = 1 << 20
@@ -19,7 +21,6 @@ _USER_BLOCK = 512
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
 _LONGEST_MARK = 100
-_MOST_OF_MATRIX = 64
 _RESERVED = ("units", "facts")
 
 
@@ -284,9 +285,9 @@ class MatrixColumn:
 
 
 def columns_of(name: str, array: Any) -> list[tuple[str, Any]]:
-    """An array under its name; a matrix of few columns as these, counted from 1."""
+    """An array under its name; a matrix as its columns along the longer side, counted from 1."""
     is_numeric = getattr(array, "ndim", 0) == 2 and array.dtype.kind in "fiub"
-    if not is_numeric or not 1 < min(array.shape) <= _MOST_OF_MATRIX:
+    if not is_numeric or not 1 < min(array.shape) <= MOST_COLUMNS:
         return [(name, array)]
     return [(f"{name} column {i + 1}", MatrixColumn(array, i)) for i in range(min(array.shape))]
 

@@ -12,10 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from fogml.readers.columns import Column, Container
+from fogml.readers.columns import MOST_COLUMNS, Column, Container
 from fogml.readers.spool import BLOCK_BYTES, Rows, Spool
 
-_MOST_OF_MATRIX = 64
 _UNIT_PROPERTIES = ("unit_string", "Unit", "unit", "NI_UnitDescription", "Units")
 
 
@@ -49,7 +48,11 @@ class Npz(Container):
             first = rows.read(None, 0, 1)[0]
             self.origin_s = float(first.astype("datetime64[ns]").astype(np.int64) / 1e9)
             self.add_rows("", name, "s", rows, None, partial(_seconds_since, first))
-        elif kind.kind in "fiub" and len(shape) == 2 and 0 < shape[1] <= _MOST_OF_MATRIX:
+        elif (
+            kind.kind in "fiub"
+            and len(shape) == 2
+            and 0 < shape[1] <= min(shape[0], MOST_COLUMNS - len(self.arrays))
+        ):
             names = [f"{name} column {i + 1}" for i in range(shape[1])]
             if by_columns:
                 for column in names:

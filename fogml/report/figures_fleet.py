@@ -18,7 +18,8 @@ from fogml.report.words import number, plural
 _COLUMNS = 2
 _LABELS = 24
 _LONGEST_LABEL = 16
-"""Characters of a serial number on an axis."""
+"""Characters of a serial number on an axis: written upright, 7 px each, they leave two thirds of the
+height of 360 px to the figure."""
 
 
 def distribution(fleet: Mapping[str, Any]) -> Drawing:

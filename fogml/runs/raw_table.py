@@ -22,6 +22,10 @@ FACTS_KEY = "fogml.facts"
 """Key of the set-up facts (JSON) in Parquet schema metadata, HDF5 attributes and MAT variables."""
 
 
+BLOCK_VALUES = 10_000_000
+"""Numbers of a block at most, 80 MB; two blocks are held at once, and messages of robots have 45 columns."""
+
+
 def numbered_row(index: int) -> str:
     """A row by its number from 1."""
     return f"row {index + 1}"
@@ -135,7 +139,7 @@ def stored_blocks(
     rows: int | None,
     columns: Collection[str] | None,
 ) -> Iterator[RawTable]:
-    """Vectors of a stored file in blocks of `rows` rows, whole for None; time, gyro and `columns` alone.
+    """Vectors of a stored file in blocks of `rows` rows at most, whole for None; time, gyro, `columns` alone.
 
     Raises
     ------
@@ -147,7 +151,7 @@ def stored_blocks(
     count = max((max(array.shape) for _, array in vectors), default=0)
     stored.limits.check_size(stored.path, float(count) * len(vectors))
     cells = tuple(cell for cell, _ in vectors)
-    step = rows or max(count, 1)
+    step = min(rows, max(BLOCK_VALUES // max(len(vectors), 1), 1)) if rows else max(count, 1)
     for start in range(0, max(count, 1), step):
         stop = min(start + step, count)
         values = {cell: stored.read(array, start, stop) for cell, array in vectors}

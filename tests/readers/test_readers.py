@@ -11,7 +11,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.readers import READERS, reader_of
-from fogml.runs import reader_process
+from fogml.runs import raw_table, reader_process
 from fogml.runs.reading import file_format, read_blocks, read_run, read_table
 from tests.readers import files
 from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
@@ -215,3 +215,11 @@ def test_messages_of_mcap_come_in_the_order_of_their_times(tmp_path):
         found = list(mcap_chunks.messages(file, chunks, (channels[0], channels[2])))
     assert [time for time, *_ in found] == [time for time, *_ in right]
     assert sorted(found) == sorted(right)
+
+
+def test_a_block_of_many_columns_has_fewer_rows(tmp_path, monkeypatch):
+    monkeypatch.setattr(raw_table, "BLOCK_VALUES", 4 * 25)
+    path = tmp_path / "log.npz"
+    np.savez(path, **{"time [s]": TIME, "gyro [deg/h]": GYRO, "T [degC]": WARM, "more": GYRO})
+    assert [len(block) for block in read_blocks(path, block_rows=30)] == [25, 25, 25, 25, 20]
+    assert [len(block) for block in read_blocks(path, block_rows=30, columns=["T"])] == [30] * 4
