@@ -210,7 +210,8 @@ class Twin:
             amplitude = before.amplitude if before else declared.amplitude.typical(self.grade)
         held = before.shape if before else declared.default_shape(self.grade)
         setting = EffectSetting(amplitude, {**held, **shape})
-        return replace(self, settings={**self.settings, id: setting})
+        suspected = {other: told for other, told in self.suspected.items() if other != id}
+        return replace(self, settings={**self.settings, id: setting}, suspected=suspected)
 
     def without_effect(self, *ids: str) -> Twin:
         """The twin with effects off.

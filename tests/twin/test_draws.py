@@ -58,6 +58,11 @@ def test_drawn_units_scatter_as_the_covariance_says():
     assert drawn[0].uncertainty is None and not drawn[0].suspected
 
 
+def test_what_is_switched_on_is_suspected_no_more():
+    twin = unsure().with_effect("glass_transition")
+    assert not twin.suspected and "glass_transition" in twin.settings
+
+
 def test_without_a_covariance_constants_come_from_their_own_deviations():
     drawn = [drawn_twin(load_twin("nominal"), 1, number).nominal for number in range(1, 301)]
     assert np.std([one.b0 for one in drawn]) == pytest.approx(5.0, rel=0.2)
