@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from fogml.gap.counterfactual_result import Counterfactual, Course
 from fogml.gap.result import (
     CandidateEvidence,
     ConstantFit,
@@ -172,3 +174,30 @@ def every_diagnosis() -> dict[str, Diagnosis]:
         "unknown": diagnosis("unknown", unknown=0.91),
         "no_gap": diagnosis("no_gap", how_far=at_floor, where=Where()),
     }
+
+
+def with_courses(found: Diagnosis) -> Diagnosis:
+    """A diagnosis that kept what effects make of its runs: the loop as found, and one that does not act."""
+    told = []
+    for shown in found.series:
+        loop = shown.replayed_after - shown.replayed_recalibrated
+        mohr, slow = 0.02 * shown.rate_degc_min, 0.1 * loop
+        courses = (
+            Course("thermal_hysteresis", 0.05, "deg/h", True, True, loop),
+            Course("shupe_mohr", 0.5, "deg/h/(degC/min)", False, True, mohr),
+            Course("sensor_lag", 20.0, "s", False, False, slow),
+        )
+        told.append(
+            Counterfactual(
+                run=shown.run,
+                held_out=shown.role == "held_out",
+                averaging_s=shown.averaging_s,
+                time_s=shown.time_s,
+                temperature_degc=shown.temperature_degc,
+                recorded=shown.recorded,
+                replayed=shown.replayed_recalibrated,
+                floor=shown.floor,
+                courses=courses,
+            )
+        )
+    return replace(found, counterfactuals=tuple(told))

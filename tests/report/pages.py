@@ -17,10 +17,11 @@ from fogml.report import (
     noise_page,
     train_page,
 )
+from fogml.report.counterfactual_page import counterfactual_page
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
-from tests.report.diagnoses import diagnosis
+from tests.report.diagnoses import diagnosis, with_courses
 from tests.report.judgements import judgement
 
 VOID = {"meta", "link", "br", "img", "hr", "input", "path", "rect"}
@@ -91,6 +92,7 @@ def every_page() -> dict[str, str]:
         "inspect": inspect_page([recorded_run(), recorded_run(3000)]),
         "noise": noise_page(noise_values()),
         "gap": gap_page(diagnosis()),
+        "what if": counterfactual_page(with_courses(diagnosis())),
         "index": index_page({axis: judgement() for axis in "xyz"}),
         "certificate": certificate(judgement(5), "2026-03-02"),
     }
