@@ -34,6 +34,8 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 _CHUNK = 1 << 22
 _LEAST_MOMENT = 1e-6
+_MANY, _LEAST_ROWS = 8, 4096
+# Samples between two knots from which on running sums are quicker; rows that share theirs.
 
 
 @dataclass(frozen=True)
@@ -101,9 +103,13 @@ def kernel_rate(
     oldest = np.maximum(np.searchsorted(time, time - edge, side="right"), starts)
     most = int(np.max(np.arange(n) - oldest, initial=0)) + 1
     back = np.arange(most)
-    rows = max(1, _CHUNK // most)
+    many = most > _MANY * len(kernel.weights)
+    rows = _LEAST_ROWS + most if many else max(1, _CHUNK // most)
     for low in range(0, n, rows):
         here = np.arange(low, min(low + rows, n))
+        if many:
+            values[here] = unit_s * _rate_by_knots(kernel, time, x, here, oldest[here], window_s)
+            continue
         place = here[:, None] - back
         inside = place >= oldest[here][:, None]
         place = np.maximum(place, 0)
@@ -112,6 +118,44 @@ def kernel_rate(
     pairs = np.arange(n) > oldest
     values *= np.where(full, 1.0, told_share(known / window_s, LEAST_SHARE)) * pairs
     return Windowed(values, full & pairs, counts & pairs)
+
+
+def _rate_by_knots(
+    kernel: Kernel,
+    time: FloatArray,
+    x: FloatArray,
+    rows: NDArray[np.intp],
+    oldest: NDArray[np.intp],
+    window_s: float,
+) -> FloatArray:
+    """Rates [per s] at rows whose windows begin at `oldest`, from running sums between the weights' knots.
+
+    Weights go straight with age between knots, so that each stretch takes differences of the running sums of
+    1, t, t^2, x and t x, however many samples it holds.
+    """
+    first, here = int(oldest[0]), time[rows]
+    t, moved = time[first : rows[-1] + 1] - here[0], x[first : rows[-1] + 1]
+    moved = moved - moved.mean()
+    columns = np.column_stack([np.ones_like(t), t, t * t, moved, t * moved])
+    sums = np.vstack([np.zeros(5), np.cumsum(columns, axis=0)])
+    now, knots = here - here[0], np.linspace(0.0, window_s, len(kernel.weights))
+    end = sums[rows + 1 - first]
+    whole = end - sums[oldest - first]
+    # Of weight, weight times time, weight times x.
+    weight, along, total = np.zeros((3, len(rows)))
+    for i, age in enumerate(knots[1:]):
+        place = np.searchsorted(time, here - age, side="left")
+        begin = sums[np.maximum(place if i < len(knots) - 2 else oldest, oldest) - first]
+        one, of_t, of_tt, of_x, of_tx = (end - begin).T
+        slope = (kernel.weights[i + 1] - kernel.weights[i]) / (knots[1])
+        level = kernel.weights[i] + slope * (now - knots[i])
+        weight += level * one - slope * of_t
+        along += level * of_t - slope * of_tt
+        total += level * of_x - slope * of_tx
+        end = begin
+    mean = weight / whole[:, 0]
+    spread = along - mean * whole[:, 1]
+    return np.divide(total - mean * whole[:, 3], spread, out=np.zeros(len(rows)), where=spread > 0.0)
 
 
 def _rate(kernel: Kernel, age: FloatArray, x: FloatArray, inside: BoolArray, window_s: float) -> FloatArray:

@@ -20,7 +20,7 @@ from fogml.features.traced import larger, smaller, where
 from fogml.models.names import make_model
 from fogml.runs.run import Run
 from fogml.signals.clock import Clock
-from fogml.signals.kernel_windows import Kernel, kernel_rate
+from fogml.signals.kernel_windows import Kernel, KernelStream, kernel_rate
 from fogml.signals.windows import slope
 from fogml.testing import check_feature
 from tests.export.conftest import training_run
@@ -80,6 +80,21 @@ def test_a_kernel_that_falls_in_a_line_is_the_least_squares_slope(jitter):
     np.testing.assert_array_equal(found.full, expected.full)
     np.testing.assert_array_equal(found.counts, expected.counts)
     np.testing.assert_allclose(found.values, expected.values, atol=1e-9)
+
+
+@pytest.mark.parametrize("jitter", [0.0, 0.3])
+def test_windows_of_many_samples_are_those_sample_by_sample(jitter):
+    rng = np.random.default_rng(2)
+    time = 0.2 * np.arange(1500) + 0.2 * jitter * rng.uniform(-1.0, 1.0, 1500)
+    time[700:] += 4.0  # that the window spans
+    time[1000:] += 50.0
+    x, bell = 20.0 + np.cumsum(rng.normal(0.0, 0.02, 1500)), Kernel("falling", (1.0, 0.6, 0.5, -0.2))
+    found = kernel_rate(Clock(time, 0.2), x, 30.0, bell, 60.0)
+    stream = KernelStream(30.0, 0.2, 60.0, bell)
+    values, full, counts = zip(*(stream.step(*sample) for sample in zip(time.tolist(), x.tolist())))
+    np.testing.assert_allclose(found.values, values, atol=1e-8)
+    np.testing.assert_array_equal(found.full, full)
+    np.testing.assert_array_equal(found.counts, counts)
 
 
 @needs_cc
