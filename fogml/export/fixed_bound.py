@@ -172,8 +172,8 @@ def _kernel_error(
     """Bound of what a full window of one's own is off [degC per window], values held being off by `read`.
 
     Of weights w, ages a about their mean and deviations e from the line of the rate r, errors dw, da and dx
-    move the rate by ``sum(dw e + w (r da + dx))/sum(w a)``. A bin of length A, in which weights fall by
-    F and readings rise by R, adds up to a quarter of ``F R`` and ``F A``.
+    move the rate by ``sum(dw e + w (r da + dx))/sum(w a)``, w about its mean. A bin of length A, in
+    which weights fall by F and readings rise by R, adds up to a quarter of ``F R`` and ``F A``.
     """
     length, step = operator.window.length_s, plan.sample_s
     knots = kernel_steps(kernel) * 2.0**-KERNEL_BITS
@@ -182,16 +182,15 @@ def _kernel_error(
     moment = -float(np.mean(weight * (age - age.mean())))
     if moment <= 0.0:
         return float("inf")
-    size, mean = float(np.mean(np.abs(weight))), abs(float(weight.mean()))
+    size = float(np.mean(np.abs(weight - weight.mean())))
     steepest = float(np.abs(np.diff(knots)).max()) * (len(knots) - 1)
     jump, varies, change = _moves(atom, operator, plan)
     off_line = 0.5 * varies + jump
     tick = 1.0 / operator.window_ticks
     placed, unit = 0.25 * tick + 2.0**-19, 2.0**-KERNEL_BITS
     # The edge is drawn in by two ticks, by which weights are off, too.
-    weighed = unit + steepest * (placed + 2.0 * tick)
-    centred = float(np.mean(np.abs(weight - weight.mean())))
-    off = centred * read + weighed * off_line + (size + mean) * (placed * change + 0.5 * _HELD)
+    weighed = 1.5 * unit + steepest * (placed + 2.0 * tick)
+    off = size * read + weighed * off_line + (size + unit) * (placed * change + 0.5 * _HELD)
     if windows.binned:
         bins = length / (windows.bin_samples * step)
         falls = float(np.abs(np.diff(knots)).sum()) / bins
