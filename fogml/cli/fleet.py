@@ -8,6 +8,7 @@ from pydantic import Field
 
 from fogml.cli import options
 from fogml.cli.given import argument, option
+from fogml.tracking import shown_tracker
 
 
 def _usual_form() -> str:
@@ -51,14 +52,20 @@ class FleetSettings(options.LimitSettings):
         str | None, option("Train the units' RBF networks in batches there: cpu, cuda.", metavar="DEVICE")
     ] = None
     batch: Annotated[int, option("Units in one batch.")] = 64
+    track: options.Track = None
     repair: options.Repair = False
     strict: options.Strict = False
     any_unit: options.AnyUnit = False
     out: options.Folder = "fleet-results"
 
+    def as_written(self) -> dict[str, Any]:
+        """The values of a configuration file; a password is never written."""
+        track = None if self.track is None else shown_tracker(self.track)
+        return {**super().as_written(), "track": track}
+
     def for_units(self) -> dict[str, Any]:
         """What units' results depend on."""
-        left_out = {"manifest", "prior", "workers", "cluster", "device", "batch", "out"}
+        left_out = {"manifest", "prior", "workers", "cluster", "device", "batch", "track", "out"}
         values = self.model_dump(mode="json", exclude=left_out)
         if self.device is not None:
             values["parameters"] = {**self.parameters, "device": self.device}

@@ -14,12 +14,13 @@ from fogml.errors import InputError
 from fogml.fleet.engines import run_tasks
 from fogml.fleet.manifest import Unit, read_manifest
 from fogml.fleet.shared import shared_model
-from fogml.fleet.summary import fleet_json
+from fogml.fleet.summary import fleet_json, label_of
 from fogml.fleet.tasks import DONE, Task, full_disk
 from fogml.json_files import finite_json, write_json
 from fogml.outputs import sole_writer, whole_folder
 from fogml.runs.sources import sources_stamp
 from fogml.strict_json import read_json
+from fogml.tracking import Tracker
 
 _SHOWN = 40
 
@@ -114,7 +115,11 @@ def _check_device(settings: FleetSettings) -> None:
 def _run(
     settings: FleetSettings, tasks: Sequence[Task], work: Work, terminal: Terminal
 ) -> list[dict[str, Any]]:
+    tracker = None if settings.track is None else Tracker(settings.track, "fogml fleet", terminal.note)
+
     def told(outcome: dict[str, Any]) -> None:
+        if tracker is not None and outcome["status"] == DONE:
+            _track(tracker, outcome)
         label = f"{outcome['unit']} {outcome['axis']}".strip()
         work.advance(1.0, f"{label} {outcome['status']}")
         if outcome["status"] != DONE:
@@ -125,6 +130,23 @@ def _run(
 
         return run_batched(tasks, settings.batch, told)
     return run_tasks(tasks, workers=settings.workers, cluster=settings.cluster, progress=told)
+
+
+def _track(tracker: Tracker, outcome: dict[str, Any]) -> None:
+    """Tell a tracker of a unit that is done."""
+    found = outcome["found"]
+    worst = found.get("worst") or {}
+    tracker.log(
+        outcome["fingerprint"],
+        label_of(outcome),
+        {key: outcome[key] for key in ("unit", "axis", "job")} | {"model": found.get("model", "")},
+        {name: worst.get(name) for name in ("before", "after", "floor", "outside_training")},
+        {
+            "verdict": str(found.get("verdict", "")),
+            "met": str(found.get("met", "")),
+            "folder": outcome["folder"],
+        },
+    )
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:

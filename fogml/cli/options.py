@@ -120,6 +120,10 @@ Axis = Annotated[
     str | None, option("Of files with gyro_x, gyro_y, gyro_z this one alone; all if none.", metavar="x|y|z")
 ]
 Workers = Annotated[int, option("Processes on this machine.")]
+Track = Annotated[
+    str | None,
+    option("Tell MLflow there of each trial or unit, too (extra mlflow).", metavar="URL|FOLDER"),
+]
 CostOfFalseName = Annotated[
     float,
     Field(gt=0.0),

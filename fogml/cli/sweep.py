@@ -9,6 +9,7 @@ from pydantic import BeforeValidator, Field, ValidationError
 from fogml.cli import options
 from fogml.cli.given import option
 from fogml.cli.settings import Settings
+from fogml.tracking import shown_tracker
 from fogml.tuning.space import Space
 
 
@@ -58,6 +59,7 @@ class SweepSettings(Settings):
         str | None, option("Database of the study, e.g. postgresql://user@host/db.", metavar="URL")
     ] = None
     heartbeat_s: float = 10.0
+    track: options.Track = None
     averaging: options.Averaging = 100.0
     repair: options.Repair = False
     out: options.Folder = "sweep-results"
@@ -67,4 +69,6 @@ class SweepSettings(Settings):
         from fogml.databases import without_password
 
         values = self.model_dump(mode="json", by_alias=True, exclude_none=True)
+        if self.track is not None:
+            values["track"] = shown_tracker(self.track)
         return values if self.storage is None else {**values, "storage": without_password(self.storage)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +15,9 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.run import Run
+from fogml.tracking import Tracker
 from fogml.tuning.plan import OBJECTIVES, Plan, run_identity
+from fogml.tuning.study import IDENTITY
 from fogml.yaml_text import parse_yaml
 
 if TYPE_CHECKING:
@@ -59,6 +62,7 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
 
     if not settings.runs:
         raise InputError("no training run is given; state 'runs' in the file, or --run")
+    tracker = None if settings.track is None else Tracker(settings.track, "fogml sweep", terminal.note)
     if not settings.averaging > 0.0:
         raise InputError(f"averaging {settings.averaging:g} s: a positive number of seconds is needed")
     runs = open_runs(settings.runs, terminal, repair=settings.repair)
@@ -88,9 +92,25 @@ def sweep_and_write(settings: SweepSettings, terminal: Terminal) -> None:
         with terminal.work("drawing"):
             page = sweep_page(values, judgement)
         (folder / "sweep.html").write_text(page, encoding="utf-8")
+    if tracker is not None:
+        _track(tracker, values, str(study.user_attrs.get(IDENTITY)))
     _print(values, terminal)
     terminal.result(values)
     terminal.say(f"Written to {settings.out}: open {Path(settings.out) / 'sweep.html'}")
+
+
+def _track(tracker: Tracker, values: dict[str, Any], identity: str) -> None:
+    """Tell a tracker of the finished trials."""
+    chosen = values["winner"]["number"]
+    for trial in values["trials"]:
+        told = f"{values['study']}\n{identity}\n{trial['number']}"
+        tracker.log(
+            hashlib.sha256(told.encode()).hexdigest(),
+            f"{values['study']} trial {trial['number']}",
+            {"model": trial["model"], "features": trial["features"], **trial["parameters"]},
+            {name: trial[name] for name in ("rms", "bias_stability", "bytes", "operations")},
+            {"state": trial["state"], "study": values["study"], "winner": str(trial["number"] == chosen)},
+        )
 
 
 def best_settings(settings: SweepSettings, study: optuna.Study) -> str:
