@@ -24,7 +24,7 @@ HOURS = {
     "miniseed": (24.0,),
     "ulog": (24.0,),
     "dataflash": (24.0,),
-    "rosbag": (1.0, 2.0),
+    "rosbag": (0.25, 1.0),
     "mcap": (1.0, 4.0),
 }
 """Lengths of each format's logs [h]: a worksheet ends at 1,048,576 rows, ROS takes long to write. Where 24 h

@@ -52,8 +52,9 @@ def write_report(
 
     def make() -> dict[str, Any]:
         limits = None if settings.limits is None else read_limits(settings.limits)
-        model = model_of()
+        # Runs of three gyros are told by reading them, before one model is looked for.
         runs = open_runs(settings.runs, terminal, repair=settings.repair, axis=settings.axis)
+        model = model_of()
         check(runs)
         noise = None
         if settings.noise is not None:

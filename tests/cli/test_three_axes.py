@@ -78,11 +78,12 @@ def test_train_gives_an_axis_what_its_own_file_gives(home, trained, invoke_json,
         (("inspect", "a.csv"), "inspect"),
         (("noise", "a.csv"), "noise"),
         (("compare", "a.csv", "--test", "b.csv", "--models", "none,mean"), "compare"),
-        (("lab", "acceptance", "a.csv"), "acceptance"),
+        (("lab", "acceptance", "a.csv", "--model", "MODELS"), "acceptance"),
     ],
 )
-def test_other_commands_write_a_folder_an_axis(home, invoke, tmp_path, monkeypatch, words, page):
+def test_other_commands_write_a_folder_an_axis(home, trained, invoke, tmp_path, monkeypatch, words, page):
     monkeypatch.chdir(home)
+    words = [trained[0] if word == "MODELS" else word for word in words]
     out = tmp_path / "results"
     printed = invoke(*words, "-o", out).stdout
     assert [f"Axis {axis}" in printed for axis in AXES] == [True] * 3
