@@ -90,8 +90,9 @@ def told(data: Sequence[Mapping[str, Any]]) -> Section:
         [
             "## Memory",
             f"Synthetic logs at {long_logs.RATE_HZ:g} Hz, read from the first block to the last "
-            "(`read_blocks`, a million rows each or ten million numbers, every column), in a process of its own. "
-            "Peaks are resident memory of that process, its libraries among it, and of the one that unpacks the file. "
+            "(`read_blocks`, a million rows each or ten million numbers, every column), in a process of its "
+            "own. Peaks are resident memory of that process, its libraries among it, and of the one that "
+            "unpacks the file. "
             "The error is that of the gyro against what was written, relative. "
             f"Not measured: {', '.join(left) or 'none of the formats'}.",
             table(heads, rows),
