@@ -48,7 +48,7 @@ class Averages:
     averaging_s: float
 
 
-def run_figures(averages: Averages, model: DriftModel) -> dict[str, float]:
+def run_figures(averages: Averages, model: DriftModel, *, outside_deviation: float = 0.0) -> dict[str, float]:
     """Figures of a run by their names, and their standard errors by those with ``_se``.
 
     The noise is fitted to the same averages (`fogml.signals.noise_fit`), so that a standard error counts for
@@ -57,6 +57,8 @@ def run_figures(averages: Averages, model: DriftModel) -> dict[str, float]:
 
     A level at the middle of the trained temperatures needs a slope. What the run does not tell of it is no
     more than what the model states: over the trained range it adds the deviation of the model's intervals.
+    Averages outside training tell a level alone, as well as the model's interval there states
+    (`outside_deviation`, deg/h).
     """
     used = averages.used
     time, left = averages.time[used], averages.left[used]
@@ -82,6 +84,10 @@ def run_figures(averages: Averages, model: DriftModel) -> dict[str, float]:
     # The logarithm of a deviation with so many degrees of freedom: its mean and its variance.
     found["scatter"] = fits[0].innovation - 0.5 * float(digamma(free / 2) - np.log(free / 2))
     found["scatter_se"] = 0.5 * float(np.sqrt(polygamma(1, free / 2)))
+    if outside_deviation:
+        found["level_se"] = float(np.hypot(found["level_se"], outside_deviation))
+        for name in ("temperature_slope", "rate_slope", "scatter"):
+            found[name] = found[f"{name}_se"] = float("nan")
     found["scale_factor"], found["scale_factor_se"] = _scale_factor(averages, noise, models, found)
     return found
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.errors import InputError
+from fogml.intervals import Z90
 from fogml.models.base import OUTSIDE, DriftModel
 from fogml.models.compensation import evaluate_blocks
 from fogml.models.saved import model_hash
@@ -143,8 +144,7 @@ def record_run(
         for name, values in block.columns.items():
             columns.setdefault(name, hashlib.sha256()).update(np.ascontiguousarray(values).data)
         moving = turning(block) if "rate" in block.columns else np.zeros(len(block), dtype=bool)
-        # Outside training the model states nothing that could change.
-        kept = evaluation.full & evaluation.settled & ~evaluation.outside
+        kept = evaluation.full & evaluation.settled
         if moving.any():
             kept &= ~transition_mask(block)
         half = model.intervals_.half_width(0.9, evaluation.excess)
@@ -157,6 +157,7 @@ def record_run(
             reference=block.reference_deg_h,
             half=half,
             moving=moving.astype(np.float64),
+            outside=evaluation.outside.astype(np.float64),
         )
         samples += len(block)
         outside += int(np.sum(evaluation.flag == OUTSIDE))
@@ -166,12 +167,14 @@ def record_run(
     time, mean = means.values()
     rest = mean["moving"] == 0.0
     used = rest if rest.sum() >= LEAST_WINDOWS else np.ones(len(time), dtype=bool)
+    # Outside training the model states little that could change; a run of nothing else tells as little.
+    inside = used & (mean["outside"] < 0.5)
+    is_inside = bool(inside.sum() >= LEAST_WINDOWS)
+    used = inside if is_inside else used
     if used.sum() < LEAST_WINDOWS:
         raise InputError(
-            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full, "
-            f"inside what the model was trained on ({outside / samples:.0%} of the samples lie outside); "
-            f"{LEAST_WINDOWS} are needed to tell what the model leaves: record longer, set --averaging, or "
-            "train on such temperatures"
+            f"{first.name}: holds {int(used.sum())} averages over {averaging_s:g} s whose windows are full; "
+            f"{LEAST_WINDOWS} are needed to tell what the model leaves, record longer or set --averaging"
         )
     facts = first.facts
     digest = hashlib.sha256()
@@ -192,6 +195,7 @@ def record_run(
             averaging_s=averaging_s,
         ),
         model,
+        outside_deviation=0.0 if is_inside else float(np.sqrt(np.mean(half**2))) / Z90,
     )
     return RunRecord(
         key=digest.hexdigest(),

@@ -73,8 +73,11 @@ def test_what_lies_outside_training_tells_nothing(model, tmp_path):
     plain, told = record_run(model, [run]), record_run(model, [hot])
     assert told.outside_training > 0.1
     assert abs(told.level - plain.level) < 5.0 * told.level_se
-    with pytest.raises(InputError, match="train on such temperatures"):
-        record_run(model, [run.with_columns(T=run.temperature() + 200.0)])
+    # A run of nothing else tells its level, about as badly as the model's interval out there says.
+    far = record_run(model, [run.with_columns(T=run.temperature() + 60.0)])
+    assert far.level_se > 5.0 * plain.level_se
+    assert far.level_se == pytest.approx(far.half_width / 1.645, rel=0.5)
+    assert np.isnan(far.scatter) and np.isnan(far.temperature_slope)
 
 
 def test_what_the_unit_compensated_itself_is_taken_as_it_is(model, tmp_path):
