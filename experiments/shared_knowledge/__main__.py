@@ -25,7 +25,7 @@ from fogml.validation.judge import judge
 HERE = Path(__file__).parent
 AVERAGING_S = 100.0
 FLEET = 24
-FRESH = range(9100, 9106)
+FRESH = range(9100, 9104)
 HOURS = (1.5, 2.0, 4.0, 8.0)
 WIDTHS = (1.0, 3.0, 6.0)
 

@@ -33,6 +33,8 @@ _FREEDOM = 5.0
 _WORTH_UNITS = 2.0
 # Units' worth of belief that constants vary independently, and that a covariate tells nothing of them.
 LEAST_UNITS = 3
+ONE_RUN = SizePriors(slow=1e-4)
+"""Priors of sizes where no unit has several runs: a run's slow drift can't be told from that of one cycle."""
 
 
 @dataclass(frozen=True)
@@ -57,8 +59,8 @@ class UnitConstants:
     covariates
         What is known of the unit's production.
     own
-        Sizes of the runs' own parts, by their names in `fogml.models.mixed_effects.OWN_PARTS` [deg/h]; that
-        of the shift where there are several runs.
+        Sizes of the runs' own parts, by their names in `fogml.models.mixed_effects.OWN_PARTS` [deg/h]; shift
+        and slow drift where there are several runs.
     """
 
     features: str
@@ -89,11 +91,12 @@ class UnitConstants:
         if len(table) < 2 * (len(form) + 1):
             raise InputError(f"{runs[0].name}: {len(table)} rows are too few for the constants of {features}")
         scale = np.where(table.X.std(axis=0) > 0.0, table.X.std(axis=0), 1.0)
-        # What runs' own parts are like the units tell, not a prior.
-        found = fit_mixed_effects(table, form.terms, SizePriors(own_spread=SizePriors.noise_spread))
+        # One run can't tell what goes slowly from its temperature; of several the rows tell, not a prior.
+        several = SizePriors(own_spread=SizePriors.noise_spread)
+        found = fit_mixed_effects(table, form.terms, several if len(runs) > 1 else ONE_RUN)
         columns, target = found.told(table, np.column_stack([np.ones(len(table)), table.X / scale]))
         triangle = np.column_stack([columns * np.append(1.0, scale), target])
-        own = {name: found.sizes[name] for name in OWN_PARTS[int(len(runs) == 1) :]}
+        own = {name: found.sizes[name] for name in (OWN_PARTS if len(runs) > 1 else OWN_PARTS[2:])}
         box = {name: [float(low), float(high)] for name, (low, high) in form.box.items()}
         known = dict(covariates or {})
         shift = table.X.mean(axis=0)

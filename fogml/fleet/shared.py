@@ -11,11 +11,11 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.features.features import Features
 from fogml.features.parse import parse_features
-from fogml.fleet.constants import FleetConstants
+from fogml.fleet.constants import ONE_RUN, FleetConstants
 from fogml.fleet.covariates import CovariateEffects, Covariates
 from fogml.models.combination import SharedMember
 from fogml.models.linear import LinearRegressor
-from fogml.models.mixed_effects import OWN_PARTS, fit_mixed_effects, linear_regressor
+from fogml.models.mixed_effects import OWN_PARTS, linear_regressor
 from fogml.models.mixed_effects_basis import SizePriors
 from fogml.models.mixed_effects_model import MixedEffectsModel
 from fogml.models.prior import Prior, agreement, posterior
@@ -71,8 +71,8 @@ class SharedModel(MixedEffectsModel):
     sizes of runs' own parts have the fleet's sizes as medians.
 
     The trained box is the fleet's and the unit's own together: where the unit's runs did not go,
-    the fleet's constants tell what to expect. An odd unit is left to its own runs, as if there were
-    no fleet; so is one whose runs cover less than a quarter of the fleet's temperatures, as it
+    the fleet's constants tell what to expect. An odd unit is left to its own runs, but for the sizes
+    of what is a run's own; so is one whose runs cover less than a quarter of the fleet's temperatures, as it
     could not be told whether it is odd. A unit that is odd only where its runs did not go looks
     like any other: which temperatures rest on the fleet alone is told, in `from_fleet_` and on the
     model's card.
@@ -138,7 +138,6 @@ class SharedModel(MixedEffectsModel):
         self._alone = self._why_alone(covered)
         self.from_fleet_ = {}
         if self._alone:
-            self.fitted_ = fit_mixed_effects(table, features.terms)
             return super()._shared_part(features, table)
         self.from_fleet_ = {
             name: stretches for name in levels if (stretches := _beyond(own[name], self.box[name]))
@@ -183,7 +182,7 @@ def size_priors(own: Mapping[str, float], table: TrainingTable) -> SizePriors:
     """Priors of a unit's sizes that have its fleet's sizes of runs' own parts [deg/h] as medians."""
     spread = float(table.y.std()) or 1.0
     fields = zip(("shift", "slow", "fast"), OWN_PARTS, strict=True)
-    return SizePriors(**{field: own[name] / spread for field, name in fields if name in own})
+    return replace(ONE_RUN, **{field: own[name] / spread for field, name in fields if name in own})
 
 
 def shared_model(

@@ -237,9 +237,21 @@ def test_a_units_shift_from_run_to_run_is_learnt_from_units_of_several_runs():
 def test_an_odd_unit_is_left_to_its_own_run(fleet):
     odd = unit_run(200, draw(200, far=20.0))
     model = shared_model(fleet).fit(odd)
-    plain = MixedEffectsModel(FORM).fit(odd)
     assert any("odd" in note for note in model.card_.notes)
-    np.testing.assert_array_equal(model.predict(odd), plain.predict(odd))
+    np.testing.assert_array_equal(model.regressor_.coef_, model.fitted_.coef * model.skill_)
+
+
+def test_one_cycle_is_not_taken_for_slow_drift():
+    """With noise far below what the form lacks, a rate of one cycle stays a rate."""
+
+    def lagged(seed: int, constants: np.ndarray) -> Run:
+        run = unit_run(seed, constants)
+        return run.with_columns(gyro=run.gyro + 0.02 * np.cos(3.0 * run.time / 3600.0))
+
+    fleet = fleet_constants([UnitConstants.of([lagged(s, draw(s))], FORM) for s in range(5)])
+    assert "own slow drift" not in fleet.own
+    model = shared_model(fleet).fit(lagged(50, MEAN))
+    assert model.regressor_.coef_[-1] == pytest.approx(MEAN[-1], abs=0.03)
 
 
 def test_the_fleet_does_no_harm_to_odd_units(fleet):
