@@ -195,7 +195,7 @@ def _loss(model: DriftModel, plan: Plan, table: Segments, train: Sequence[Run]) 
     rows = training_rows(model, plan, own)
     bias = np.concatenate(
         [
-            table.at(np.interp(rows.time[rows.run == i], run.time, run.columns[table.thermometer]))[0]
+            table.at(np.interp(rows.time[rows.run == i], run.time, run.temperature(table.thermometer)))[0]
             for i, run in enumerate(own)
         ]
     )

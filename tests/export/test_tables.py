@@ -165,6 +165,21 @@ def test_a_drift_that_is_constant_has_parameters(tmp_path, to):
     assert told["coefficients"] == pytest.approx([0.0] * 4, abs=1e-12)
 
 
+def test_the_loss_is_of_the_sensors_that_stand_for_the_coils_temperature(axes, tmp_path):
+    """A run with two coil sensors has no column T: its table leaves what a run of their mean does."""
+    _, run = axes["x"]
+    mean = run.columns["T"]
+    apart = run.with_columns(T1=mean + 0.5, T3=mean - 0.5)
+    pair = Run("pair", {k: v for k, v in apart.columns.items() if k != "T"}, apart.facts)
+    left = []
+    for name, held in (("one", run), ("two", pair)):
+        model = make_model("polynomial", features="T^1..3, dT").fit(held)
+        (tmp_path / name).mkdir()
+        exported = export_tables([model], tmp_path / name, TableSettings(to="segments"), [held])
+        left.append(exported["axes"]["x"]["accuracy"]["rms_exported"])
+    assert left[1] == pytest.approx(left[0], rel=1e-6)
+
+
 def test_what_does_not_go_together_is_told(axes, tmp_path, model_of):
     x = axes["x"][0]
     for models, settings, told in [
