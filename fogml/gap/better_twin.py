@@ -36,7 +36,7 @@ def better_twin(twin: Twin, found: Diagnosis, runs: Sequence[Run]) -> tuple[Twin
     found
         The diagnosis.
     runs
-        Fit runs, for the plant.
+        Fit runs, for the plant; without any it stays as it was.
     """
     source = f"diagnosis of {' and '.join(found.fit)}"
     told, matrices, names = [], [], list[str]()
@@ -78,7 +78,7 @@ def diagnosed_plant(twin: Twin, runs: Sequence[Run]) -> tuple[PlantFit | None, s
     An effect that follows a temperature which no run recorded was found with that temperature as the twin's
     own plant has it; with another plant its numbers would no longer be right, so that one stays.
     """
-    if not all("T_chamber" in run.columns for run in runs):
+    if not runs or not all("T_chamber" in run.columns for run in runs):
         return None, ""
     recorded = set.intersection(*(set(run.columns) for run in runs)) | set(RECORDED)
     asked = {

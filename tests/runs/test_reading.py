@@ -41,6 +41,8 @@ UNITS = [
     ("gyro [°/h]", 0.5, "gyro", 0.5),
     ("gyro [°/s]", 0.5, "gyro", 1800.0),
     ("gyro [rad/s]", 1e-6, "gyro", 1e-6 * 3600 * 180 / np.pi),
+    ("replayed [deg/s]", 0.01, "replayed", 36.0),
+    ("replayed [rad/s]", 1e-6, "replayed", 1e-6 * 3600 * 180 / np.pi),
     ("T [K]", 300.0, "T", 26.85),
     ("T [°C]", 26.85, "T", 26.85),
     ("T_in [K]", 273.15, "T_in", 0.0),
