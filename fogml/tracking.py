@@ -102,29 +102,24 @@ class Tracker:
         parameters, metrics, tags
             What MLflow shows; metrics that are no number are left out.
         """
-        if key not in self._known:
-            self._try(lambda: self._write(key, name, parameters, metrics, tags))
+        if key in self._known:
+            return
 
-    def _write(
-        self,
-        key: str,
-        name: str,
-        parameters: Mapping[str, Any],
-        metrics: Mapping[str, float | None],
-        tags: Mapping[str, str],
-    ) -> None:
-        run = self._client.create_run(self._experiment, run_name=name).info.run_id
-        for parameter, value in parameters.items():
-            self._client.log_param(run, parameter, str(value)[:_LONGEST])
-        for metric, number in metrics.items():
-            if number is not None and math.isfinite(number):
-                self._client.log_metric(run, metric, float(number))
-        for tag, text in tags.items():
-            self._client.set_tag(run, tag, text)
-        # Last: what was told by half is told again.
-        self._client.set_tag(run, KEY, key)
-        self._client.set_terminated(run)
-        self._known.add(key)
+        def tell() -> None:
+            run = self._client.create_run(self._experiment, run_name=name).info.run_id
+            for parameter, value in parameters.items():
+                self._client.log_param(run, parameter, str(value)[:_LONGEST])
+            for metric, number in metrics.items():
+                if number is not None and math.isfinite(number):
+                    self._client.log_metric(run, metric, float(number))
+            for tag, text in tags.items():
+                self._client.set_tag(run, tag, text)
+            # Last: what was told by half is told again.
+            self._client.set_tag(run, KEY, key)
+            self._client.set_terminated(run)
+            self._known.add(key)
+
+        self._try(tell)
 
     def _try(self, action: Callable[[], None]) -> None:
         if self._away:

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from fogml.errors import InputError
 from fogml.fleet.shares import apart, discoveries, prevalence, probability_of_difference, sizes
+from fogml.gap.result import NAMED
 from fogml.runs.run import FloatArray
 from fogml.strict import Strict, strictly
 
@@ -18,8 +19,6 @@ FALSE_SHARE = 0.05
 """Of the units that are said to stand apart, the share that may be wrong in the mean."""
 SHARED = 0.95
 """A cause is the line's if more than half of its units have it with this probability, and by lot likewise."""
-NAMED = 0.5
-"""A unit has a cause from this probability on, as in its own diagnosis."""
 _RESAMPLES = 400
 """Lines drawn from the units for an interval: its ends are told to a tenth of its width."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
