@@ -83,7 +83,9 @@ class AutoModel(DriftModel):
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
         self.choice_ = trial.chosen(scores)
-        self.weighed_ = weigh(group, self.choice_.candidate, self.features, self.seed)
+        self.weighed_ = weigh(
+            group, self.choice_.candidate, self.features, self.seed, trial.rates >= RATES_THAT_TELL
+        )
         self.chosen_ = self.weighed_.model
         notes = (*refusals(group), *self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)

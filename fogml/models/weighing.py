@@ -27,7 +27,7 @@ from fogml.models.combination import (
     left_out_parts,
     temperatures_of,
 )
-from fogml.models.directions import moves_both_ways
+from fogml.models.directions import direction_is_told, moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
@@ -82,7 +82,9 @@ class Weighed:
         return f"made of {shares}: it leaves {rms}"
 
 
-def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: int) -> Weighed:
+def weigh(
+    runs: Sequence[Run], choice: Candidate, features: str | None, seed: int, rates_told: bool
+) -> Weighed:
     """Fit the members, weigh them on what is left out, and put them together.
 
     Parameters
@@ -95,6 +97,9 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
         Features to keep to; None leaves them open.
     seed
         Seed of a network.
+    rates_told
+        Whether the runs hold rates of temperature enough to tell terms in the rate from others; else members
+        that hold more than the simple candidate's must improve on it.
     """
     hashes = hash_ahead(runs)
     shared = {"mixed effects": offered(runs) if features is None else resolve_features(features, runs)}
@@ -114,8 +119,11 @@ def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: in
         members[choice.name] = FittedMember(simple.features_, regressor)
     parts = left_out_parts(table, temperatures_of(table, union))
     lefts = left_out(list(members.values()), union, table, parts)
-    both_ways = moves_both_ways([run.temperature("T") for run in runs])
-    beside = list(members).index(STATIC) if STATIC in members else None
+    motion = [run.temperature("T") for run in runs]
+    both_ways = moves_both_ways(motion)
+    must_improve_on = [STATIC] if len(runs) > 1 else []
+    must_improve_on += [choice.name] if direction_is_told(motion) and not rates_told else []
+    beside = [place for place, name in enumerate(members) if name in must_improve_on]
     weights = weights_of(lefts, len(members), both_ways, beside)
     left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)
     if not left**2 < (1.0 - LEAST_WEIGHT) * mean_left**2:

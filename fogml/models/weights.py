@@ -11,7 +11,8 @@ stacked regression (Breiman, Machine Learning 24, 1996) with weights drawn toget
 the skill :math:`\sum \overline{pz} / \sum \overline{p^2}` of their sum p within 0 and 1: no compensation is
 its limit 0. Of several runs those left out alone are asked: parts of a run are told by the rest of it
 whatever it is that moved the drift, time included. There what a member adds to temperature alone must gain
-beyond its standard error (`confirmed`): memory or a rate that one run tells by luck does harm on the next. Of
+beyond its standard error (`confirmed`): memory or a rate that one run tells by luck does harm on the next. So
+must, where the runs hold too few rates of temperature, what it adds to the terms in the rate. Of
 one run blocks of time are asked where its temperature moves both ways, as a half or a direction left out says
 how a fit of the rest goes on, which is not how a fit of both does; else halves, which are all that there is.
 """
@@ -42,7 +43,7 @@ thermal cycle, simulated tactical units)."""
 
 
 def weights_of(
-    parts: Sequence[LeftOut], members: int, both_ways: bool, beside: int | None = None
+    parts: Sequence[LeftOut], members: int, both_ways: bool, beside: Sequence[int] = ()
 ) -> FloatArray:
     """Weights of members that left-out parts confirm, shape (m,); equal shares where there are none.
 
@@ -55,17 +56,18 @@ def weights_of(
     both_ways
         Whether temperature moves both ways in training.
     beside
-        Place of the member of temperature alone, which others must improve on (`confirmed`); None: none is.
+        Places of members that others must improve on, one after the other (`confirmed`).
     """
-    runs = [part for part in parts if part.kind == "runs"]
-    if runs and beside is not None and members > 1:
-        kept = confirmed(runs, beside)
+    asked = asked_of(parts, both_ways)
+    if asked and len(beside) and members > 1:
+        kept = np.ones(members, dtype=np.bool_)
+        for place in beside:
+            kept &= confirmed(asked, place) | ~kept[place]
         parts = [replace(part, predicted=part.predicted[:, kept]) for part in parts]
         weights = np.zeros(members)
         weights[kept] = weights_of(parts, int(kept.sum()), both_ways)
         return weights
     equal = np.full(members, 1.0 / members)
-    asked = asked_of(parts, both_ways)
     square, product = DRAWN_TOGETHER * (np.eye(members) - 1.0 / members), np.zeros(members)
     for part in asked:
         least = float(np.mean((part.told[:, None] - part.predicted) ** 2, axis=0).min())
@@ -88,15 +90,15 @@ def weights_of(
     return weights * skill_of(asked, weights)
 
 
-def confirmed(runs: Sequence[LeftOut], beside: int) -> BoolArray:
-    """Which members' gains over one of them the K runs left out confirm, shape (m,); that one is among them.
+def confirmed(parts: Sequence[LeftOut], beside: int) -> BoolArray:
+    """Which members' gains over one of them the K parts left out confirm, shape (m,); that one is among them.
 
     The mean of the logarithm of the ratio of rms, that one's over a member's, must exceed its standard error:
     of two runs both must gain.
     """
-    left = np.array([np.mean((part.told[:, None] - part.predicted) ** 2, axis=0) for part in runs])
+    left = np.array([np.mean((part.told[:, None] - part.predicted) ** 2, axis=0) for part in parts])
     gains = 0.5 * np.log(np.maximum(left[:, [beside]], 1e-300) / np.maximum(left, 1e-300))
-    error = gains.std(axis=0, ddof=1) / np.sqrt(len(runs)) if len(runs) > 1 else 0.0
+    error = gains.std(axis=0, ddof=1) / np.sqrt(len(parts)) if len(parts) > 1 else 0.0
     found = np.asarray(gains.mean(axis=0) > error)
     found[beside] = True
     return found

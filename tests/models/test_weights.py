@@ -30,11 +30,29 @@ def test_what_a_member_adds_to_temperature_must_gain_on_both_of_two_runs():
     def weight_of(*sizes):
         other = told + np.array(sizes)[:, None] * rng.normal(size=told.shape)
         runs = [part(np.column_stack(columns), z) for *columns, z in zip(plain, other, told)]
-        return weights_of(runs, 2, True, beside=0)[1]
+        return weights_of(runs, 2, True, beside=[0])[1]
 
     assert weight_of(0.1, 0.1) > 0.8
     # Far better on one run by luck, a little worse on the other: on both together it would win.
     assert weight_of(0.02, 0.33) == 0.0
+
+
+@pytest.mark.parametrize("kind", ["runs", "blocks"])
+def test_a_member_that_ties_with_one_it_must_improve_on_gets_no_weight(kind):
+    rng = np.random.default_rng(3)
+    told = rng.normal(size=(10, 300))
+    plain, same = told + 0.3 * rng.normal(size=told.shape), told + 0.3 * rng.normal(size=told.shape)
+    better = told + 0.2 * rng.normal(size=told.shape)
+
+    def weights(*members, beside):
+        parts = [part(np.column_stack(columns), z, kind) for *columns, z in zip(*members, told)]
+        return weights_of(parts, len(members), True, beside)
+
+    tied = weights(plain, same, beside=[])
+    assert tied == pytest.approx([0.5, 0.5], abs=0.1)
+    assert weights(plain, same, beside=[0])[1] == 0.0
+    found = weights(plain, same, better, beside=[0])
+    assert found[1] == 0.0 and found[2] > found[0] > 0.0
 
 
 def test_skill_of_few_runs_counts_beyond_its_standard_error():
