@@ -58,6 +58,8 @@ class RunPlan:
         Of what a method draws.
     options
         What the method is asked besides, by name.
+    answer
+        The file that a method writes for a case.
     """
 
     folder: BlindFolder
@@ -72,7 +74,8 @@ class RunPlan:
     only: tuple[str, ...] | None = None
     into: Path | None = None
     seed: int = 0
-    options: dict[str, float] = field(default_factory=dict)
+    options: dict[str, Any] = field(default_factory=dict)
+    answer: str = "gap.json"
 
     def __post_init__(self) -> None:
         i, n = self.shard
@@ -240,8 +243,8 @@ def _one(shared: _Shared, worker: Worker, name: str) -> bool:
         answer = worker.ask(
             {"case": name, "out": out.name, "seed": plan.seed, "options": plan.options}, plan.limit_s
         )
-        if answer["done"] and not (out / "gap.json").is_file():
-            answer |= {"done": False, "reason": "no answer", "message": "no gap.json was written"}
+        if answer["done"] and not (out / plan.answer).is_file():
+            answer |= {"done": False, "reason": "no answer", "message": f"no {plan.answer} was written"}
     except WorkerLost as lost:
         usable = False
         seconds = plan.limit_s if lost.reason == "timed out" else None

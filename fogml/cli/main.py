@@ -88,6 +88,7 @@ COMMANDS = {
         "Programmes that make wanted parameters identifiable, with expected standard errors.",
     ),
     "blind": (".blind:COMMANDS", "The check on withheld effects: make cases, answer them, score."),
+    "benchmark": (".benchmark:COMMANDS", "The open benchmark: make a round, let methods answer it, score."),
     "docs": (".docs:DocsSettings", "The documentation, without a network: list, read, or write as one page."),
 }
 """Name of each command: where its settings are, and its help in one line."""

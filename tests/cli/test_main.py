@@ -66,8 +66,8 @@ def test_the_line_in_the_list_is_the_command_s_own(name):
 def test_every_command_has_help_and_the_common_options(words, found):
     result = runner.invoke(main.app, [*words, "--help"])
     assert result.exit_code == 0
-    # A blind suite's folder, and that of the page, is named first and holds everything.
-    own_folder = words in (["blind", "make"], ["blind", "run"], ["app"])
+    # A blind suite's or a round's folder, and that of the page, is named first and holds everything.
+    own_folder = words == ["app"] or (words[0] in ("blind", "benchmark") and words[-1] in ("make", "run"))
     for option in ("--config", "--seed", "--json", "--quiet", *(() if own_folder else ("--out",))):
         assert option in result.stdout
 

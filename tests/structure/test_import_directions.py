@@ -25,13 +25,15 @@ ALLOWED = {
     "twin": GROUND,
     "gap": GROUND | {"twin"},
     "blind": GROUND | {"twin", "gap"},
+    "benchmark": FIRST | {"models", "validation", "blind"},
     "tuning": FIRST | {"models", "validation"},
     "export": FIRST | {"models", "validation"},
     "lab": FIRST | {"models", "validation", "twin"},
     "fleet": FIRST | {"models", "validation", "tuning", "twin", "gap"},
     "monitor": FIRST | {"models"},
     "report": FIRST
-    | {"models", "validation", "twin", "gap", "blind", "tuning", "export", "lab", "fleet", "monitor"},
+    | {"models", "validation", "twin", "gap", "blind", "benchmark", "tuning", "export", "lab", "fleet"}
+    | {"monitor"},
     "app": set(),
     "testing": FIRST | {"models", "validation", "twin", "gap"},
 }

@@ -85,7 +85,8 @@ def _share(hit: Callable[[Mark], bool]) -> Callable[[Sequence[Mark]], Estimate]:
     return lambda marks: proportion([hit(m) for m in marks])
 
 
-def _each_kept(marks: Sequence[Mark]) -> Estimate:
+def each_kept(marks: Sequence[Mark]) -> Estimate:
+    """The share of missing effects that may be named and are in a named class."""
     hits = []
     for m in marks:
         held = {id for item in m.named for id in item.members}
@@ -93,12 +94,13 @@ def _each_kept(marks: Sequence[Mark]) -> Estimate:
     return proportion(hits)
 
 
-def _false(marks: Sequence[Mark]) -> Estimate:
+def false_names(marks: Sequence[Mark]) -> Estimate:
+    """The share of named effects that are false."""
     # A failed case is one false name: not to answer must not be the better answer.
     return proportion([x for m in marks for x in ([True] if m.failure else [not i.right for i in m.named])])
 
 
-def _within_one(estimate: Estimate) -> Estimate:
+def within_one(estimate: Estimate) -> Estimate:
     """A mean of probabilities, its interval cut at 0 and 1."""
     low, high = estimate.low, estimate.high
     return replace(
@@ -143,7 +145,7 @@ WANTED = (
         "pair_exact", "two effects, both d′ > 10: exact",
         _of("two", low=_STRONG), _share(lambda m: m.exact), low=0.80,
     ),
-    Wanted("each_kept", "each of two or three effects kept", _of("two", "three"), _each_kept),
+    Wanted("each_kept", "each of two or three effects kept", _of("two", "three"), each_kept),
     Wanted(
         "unknown_misnamed", "unknown, d′ > 10: a wrong name",
         _of(*_UNKNOWN, low=_STRONG), _share(lambda m: m.wrong_name), high=0.08,
@@ -156,10 +158,10 @@ WANTED = (
         "beside_unknown_false", "known beside an unknown: a false name",
         _of("unknown_and_known"), _share(lambda m: m.wrong_name), high=0.10,
     ),
-    Wanted("false_names", "named effects that are false", _always, _false, high=0.06),
+    Wanted("false_names", "named effects that are false", _always, false_names, high=0.06),
     Wanted(
         "mass_on_true", "mean probability on the true cause, one cause, d′ > 10 (as DX 2025)",
-        _of("one", *_UNKNOWN, low=_STRONG), lambda marks: _within_one(mean([mass_on_true(m) for m in marks])),
+        _of("one", *_UNKNOWN, low=_STRONG), lambda marks: within_one(mean([mass_on_true(m) for m in marks])),
         low=0.90, format="number",
     ),
     Wanted(

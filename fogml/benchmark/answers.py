@@ -1,0 +1,126 @@
+"""What an entry answers to a drift case: written by a method, or by hand, and read with every fault told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fogml.benchmark.rounds import ANSWER
+from fogml.blind.folders import OUTCOME, CaseFiles, read_json
+from fogml.errors import InputError
+from fogml.json_files import write_json
+from fogml.models.base import DriftModel
+from fogml.models.names import make_model
+from fogml.runs.reading import read_run
+from fogml.runs.run import FloatArray
+from fogml.validation.run_errors import run_errors
+
+HEADER = ("drift [deg/h]", "half_width [deg/h]")
+ABOUT = "about.json"
+"""What a method tells beside its answer: ``bytes`` of what it would carry into firmware."""
+_DIGITS = "%.10g"
+
+
+@dataclass(frozen=True)
+class DriftAnswer:
+    """The drift at each sample of a held-out run [deg/h], and half-widths of its 90 % interval if told.
+
+    ``failure`` says why a method gave none.
+    """
+
+    drift: FloatArray | None = None
+    half_width: FloatArray | None = None
+    bytes: int | None = None
+    failure: str = ""
+
+
+def drift_model(case: CaseFiles, out: Path, *, model: str = "auto", features: str | None = None) -> None:
+    """Answer a case by a drift model of fogml, or a regressor of scikit-learn, by its name."""
+    answer_by(make_model(model, features, case.seed), case, out)
+
+
+def answer_by(model: DriftModel, case: CaseFiles, out: Path) -> None:
+    """Fit any drift model to the training runs of a case, and write what it says of the held-out run."""
+    model.fit([read_run(path) for path in case.fit])
+    found = run_errors(model, read_run(case.held_out[0]))
+    # A model without intervals of its own tells none.
+    told = found.half_width if np.any(found.half_width > 0.0) else None
+    write_drift(out, found.drift, told, model.weight_bytes() or None)
+
+
+def write_drift(
+    out: Path, drift: FloatArray, half_width: FloatArray | None = None, bytes: int | None = None
+) -> None:
+    """Write an answer into the folder of a case.
+
+    Parameters
+    ----------
+    out
+        The folder.
+    drift
+        What is to be taken from the output at each sample, its constant included [deg/h], shape (n,).
+    half_width
+        Half-widths of the 90 % interval of the drift's averages [deg/h], shape (n,).
+    bytes
+        Size of the model that gave it.
+    """
+    columns = [drift] if half_width is None else [drift, half_width]
+    header = ",".join(HEADER[: len(columns)])
+    np.savetxt(out / ANSWER["drift"], np.column_stack(columns), _DIGITS, ",", header=header, comments="")
+    if bytes is not None:
+        write_json(out / ABOUT, {"bytes": bytes})
+
+
+def read_drift(folder: Path, samples: int) -> DriftAnswer:
+    """The answer in the folder of a case, to a held-out run of so many samples.
+
+    Raises
+    ------
+    InputError
+        If it is missing, of another length, or not a finite number somewhere; names file, column and row.
+    """
+    path = folder / ANSWER["drift"]
+    outcome = read_json(folder / OUTCOME) if (folder / OUTCOME).is_file() else {}
+    if outcome.get("done") is False:
+        return DriftAnswer(failure=f"{outcome.get('reason')}: {outcome.get('message')}")
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; every case needs an answer")
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    cells = tuple(cell.strip() for cell in lines[0].split(",")) if lines else ()
+    if cells not in (HEADER, HEADER[:1]):
+        expected = f"'{','.join(HEADER)}', the second column if there are intervals"
+        raise InputError(f"{path}, row 1: the header is '{','.join(cells)[:80]}', expected {expected}")
+    if len(lines) - 1 != samples:
+        raise InputError(
+            f"{path}: {len(lines) - 1} rows below the header, expected {samples}: one for each row of "
+            "held-out-1.csv"
+        )
+    values = np.empty((samples, len(cells)))
+    for row, line in enumerate(lines[1:]):
+        values[row] = _numbers(line, cells, path, row + 2)
+    about = read_json(folder / ABOUT) if (folder / ABOUT).is_file() else {}
+    told = about.get("bytes")
+    if told is not None and not (isinstance(told, int) and told >= 0):
+        raise InputError(f"{folder / ABOUT}: key 'bytes' is {told!r}, expected a whole number of bytes")
+    return DriftAnswer(values[:, 0], values[:, 1] if len(cells) > 1 else None, told)
+
+
+def _numbers(line: str, cells: tuple[str, ...], path: Path, row: int) -> list[float]:
+    parts = line.split(",")
+    if len(parts) != len(cells):
+        raise InputError(f"{path}, row {row}: {len(parts)} cells, expected {len(cells)}")
+    found = []
+    for text, cell in zip(parts, cells):
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value) or (cell == HEADER[1] and value < 0.0):
+            least = ", not below 0" if cell == HEADER[1] else ""
+            raise InputError(
+                f"{path}, column '{cell}', row {row}: '{text.strip()[:40]}', expected a finite number{least}"
+            )
+        found.append(value)
+    return found

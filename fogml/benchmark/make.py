@@ -1,0 +1,143 @@
+"""Making a round: cases, what is kept, and the hashes between."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+import shutil
+from collections.abc import Callable, Iterable
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import fogml
+from fogml.benchmark.drift_cases import DriftCase, real_cases, synthetic_cases, write_case
+from fogml.benchmark.rounds import RULES, SCHEMA, SEED, TRACKS, Track, TrackFolder, commitment
+from fogml.blind.folders import BlindFolder
+from fogml.blind.make import make_cases
+from fogml.blind.realities import MIX
+from fogml.blind.truth import read_truth
+from fogml.blind.without import leave_out_relatives
+from fogml.errors import InputError
+from fogml.json_files import write_json
+from fogml.outputs import scratch_folder, whole_folder
+
+LEAST_D_PRIME = 10.0
+"""Causes of the diagnosis track are at least so strong: whitened length beside the constants."""
+SAMPLE_S = 10.0
+_APART = 7
+
+
+def make_round(
+    directory: str | Path,
+    *,
+    seed: int = SEED,
+    closed: bool = False,
+    drift: int = 24,
+    diagnosis: int = 24,
+    real: bool = True,
+    workers: int = 2,
+    step: Callable[[str], None] = lambda words: None,
+) -> dict[str, Any]:
+    """Make a round in a folder; what its ``round.json`` holds.
+
+    Parameters
+    ----------
+    directory
+        Folder that holds no round yet.
+    seed
+        Of all synthetic cases, where the round is open.
+    closed
+        Draw seed and salt from the system instead: they stand in ``kept/key.json`` alone.
+    drift, diagnosis
+        Synthetic cases of each track.
+    real
+        Whether the drift track has the real legs.
+    workers
+        Processes.
+    step
+        Told what is being made.
+
+    Raises
+    ------
+    InputError
+        If a number is not possible, or the folder holds a round.
+    """
+    if drift < (not real) or diagnosis < 1:
+        raise InputError("a round needs a case of each track at least: --drift, --diagnosis, --real")
+    _check_free(Path(directory))
+    if closed:
+        seed = secrets.randbits(120)
+    with scratch_folder() as scratch:
+        step("drift cases")
+        # Another seed than the diagnosis track's: its held-out runs are handed out whole.
+        made = list(synthetic_cases(drift, seed + _APART, scratch / "drift", workers))
+        step("diagnosis cases")
+        suite = BlindFolder(scratch / "diagnosis")
+        make_cases(suite.path, diagnosis, seed, SAMPLE_S, workers, None, least_d_prime=LEAST_D_PRIME, of=MIX)
+        leave_out_relatives(suite, workers)
+        return write_round(directory, chain(real_cases() if real else (), made), suite, seed, closed=closed)
+
+
+def write_round(
+    directory: str | Path, drift: Iterable[DriftCase], suite: BlindFolder, seed: int, *, closed: bool = False
+) -> dict[str, Any]:
+    """Write a round of any drift cases, a laboratory's own among them, and a blind suite of any reality.
+
+    Parameters
+    ----------
+    directory
+        Folder that holds no round yet.
+    drift
+        Cases of the drift track.
+    suite
+        Cases and truths of the diagnosis track; they are copied.
+    seed
+        Stated where the round is open.
+    closed
+        Whether seed and salt are kept.
+
+    Raises
+    ------
+    InputError
+        If the folder holds a round.
+    """
+    home = Path(directory)
+    _check_free(home)
+    salt = (
+        secrets.token_hex(32) if closed else hashlib.sha256(f"fogml open round {seed}".encode()).hexdigest()
+    )
+    with whole_folder(home) as staging:
+        folders = {track: TrackFolder(staging, track) for track in TRACKS}
+        told: dict[Track, dict[str, Any]] = {"drift": {}, "diagnosis": {}}
+        for number, case in enumerate(drift, start=1):
+            name = f"{number:04d}"
+            write_case(case, folders["drift"].cases / name, folders["drift"].truth / name)
+            about = {"group": case.group, "label": case.label, "averaging_s": case.averaging_s}
+            told["drift"][name] = about
+        for source, target in (
+            (suite.cases, folders["diagnosis"].cases),
+            (suite.truth, folders["diagnosis"].truth),
+        ):
+            shutil.copytree(source, target)
+        for name in suite.names():
+            told["diagnosis"][name] = {"group": read_truth(suite.truth / f"{name}.json").reality}
+        for track, folder in folders.items():
+            for name, values in told[track].items():
+                values["answer_sha256"] = commitment(salt, folder.kept(name))
+        values = {
+            "schema": SCHEMA,
+            "version": fogml.__version__,
+            "seed": None if closed else seed,
+            "closed": closed,
+            "rules": list(RULES),
+            "tracks": told,
+        }
+        write_json(staging / "handout" / "round.json", values, indent=1)
+        write_json(staging / "kept" / "key.json", {"seed": seed, "salt": salt}, indent=1)
+    return values
+
+
+def _check_free(home: Path) -> None:
+    if (home / "handout").exists():
+        raise InputError(f"{home}: holds a round already; choose another folder")

@@ -1,0 +1,131 @@
+"""A round of the benchmark: what is handed out, what is kept, and hashes that bind the one to the other.
+
+::
+
+    DIR/handout/round.json           cases, rules, a salted hash of each answer
+    DIR/handout/drift/NNNN/          fit-1.csv … held-out-1.csv, its gyro column 0 in every row
+    DIR/handout/diagnosis/NNNN/      as `fogml blind make` makes it
+    DIR/kept/                        key.json (seed and salt), drift/NNNN/held-out-1.csv, diagnosis/NNNN.*
+    DIR/entries/NAME/TRACK/NNNN/     drift.csv or gap.json; about.json, outcome.json
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from fogml.blind.folders import BlindFolder, read_json
+from fogml.errors import InputError
+
+Track = Literal["drift", "diagnosis"]
+TRACKS: tuple[Track, ...] = ("drift", "diagnosis")
+ANSWER = {"drift": "drift.csv", "diagnosis": "gap.json"}
+"""What a method writes for a case, by track."""
+SCHEMA = "fogml.benchmark_round/1"
+SEED = 2026
+"""Of the round that everyone can make: its answers are the same for all."""
+RULES = (
+    "The gyro of a drift case's held-out run is 0 in every row: it is what is asked for.",
+    "A method may use the files of the case that it answers, and what was known before the round.",
+    "One setting for all cases of a track; nothing is chosen by a score of this round.",
+    "Every case is answered. A case on which a method fails is told as failed, and counts as no compensation "
+    "or as a wrong answer.",
+    "Real legs and rounds whose seed is stated are open: who looks can see the answers, and an entry says "
+    "that its author did not. Of a closed round nobody but its keeper can.",
+)
+
+
+@dataclass(frozen=True)
+class TrackFolder(BlindFolder):
+    """One track of a round, laid out for what runs and scores blind suites.
+
+    Attributes
+    ----------
+    track
+        Name of the track.
+    """
+
+    track: Track = "diagnosis"
+
+    @property
+    def cases(self) -> Path:
+        """What is handed out."""
+        return self.path / "handout" / self.track
+
+    @property
+    def truth(self) -> Path:
+        """What is kept."""
+        return self.path / "kept" / self.track
+
+    def answers(self, method: str = "") -> Path:
+        """An entry's answers."""
+        return self.path / "entries" / method / self.track
+
+    def methods(self) -> tuple[str, ...]:
+        """Names of the entries that answer this track."""
+        found = (self.path / "entries").glob(f"*/{self.track}")
+        return tuple(sorted(path.parent.name for path in found if path.is_dir()))
+
+    def kept(self, case: str) -> tuple[Path, ...]:
+        """Files that hold the answer of a case."""
+        if self.track == "drift":
+            return (self.truth / case / "held-out-1.csv",)
+        return (self.truth / f"{case}.json", self.truth / f"{case}.npz")
+
+
+def commitment(salt: str, files: tuple[Path, ...]) -> str:
+    """SHA-256 over a salt and the files of an answer, in hexadecimal digits.
+
+    Without the salt nobody can try likely answers until one has the hash that was published.
+
+    Raises
+    ------
+    InputError
+        If a file is missing.
+    """
+    found = hashlib.sha256(salt.encode("ascii"))
+    for path in files:
+        if not path.is_file():
+            raise InputError(f"{path}: no such file; the kept folder of the round is not complete")
+        with path.open("rb") as file:
+            found.update(hashlib.file_digest(file, "sha256").digest())
+    return found.hexdigest()
+
+
+def read_round(directory: str | Path) -> dict[str, Any]:
+    """``handout/round.json`` of a round.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    path = Path(directory) / "handout" / "round.json"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; make a round first: fogml benchmark make {directory}")
+    values = read_json(path)
+    if values.get("schema") != SCHEMA:
+        raise InputError(f"{path}: schema '{values.get('schema')}' is not {SCHEMA}; make the round anew")
+    return values
+
+
+def check_kept(directory: str | Path, told: dict[str, Any]) -> None:
+    """Hold what was kept against the hashes that were handed out.
+
+    Raises
+    ------
+    InputError
+        If the key or an answer is missing, or is another one than was bound.
+    """
+    path = Path(directory) / "kept" / "key.json"
+    if not path.is_file():
+        raise InputError(f"{path}: no such file; only who keeps a round's answers can score it")
+    salt = read_json(path)["salt"]
+    for track in TRACKS:
+        folder = TrackFolder(Path(directory), track)
+        for case, values in told["tracks"][track].items():
+            files = folder.kept(case)
+            if commitment(salt, files) != values["answer_sha256"]:
+                raise InputError(f"{files[0]}: is not the answer that round.json binds; it was changed")

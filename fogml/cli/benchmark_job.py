@@ -1,0 +1,98 @@
+"""The jobs of ``fogml benchmark``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from fogml.cli.benchmark import MakeSettings, RunSettings, ScoreSettings
+from fogml.cli.terminal import Terminal
+from fogml.errors import InputError
+from fogml.json_files import write_json
+from fogml.outputs import whole_file, whole_folder
+
+
+def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
+    """Make a round, and say what to hand out."""
+    from fogml.benchmark.make import make_round
+    from fogml.benchmark.score import round_hash
+
+    home = Path(settings.folder())
+    with terminal.work("making a round", total=2) as work:
+        told = make_round(
+            home,
+            seed=settings.seed,
+            closed=settings.closed,
+            drift=settings.drift,
+            diagnosis=settings.diagnosis,
+            real=settings.real,
+            workers=settings.workers,
+            step=lambda words: work.advance(doing=words),
+        )
+    config = settings.in_full().yaml("benchmark make", "make.yaml")
+    with whole_file(home / "kept" / "make.yaml") as partial:
+        partial.write_text(config, encoding="utf-8")
+    counts = {track: len(cases) for track, cases in told["tracks"].items()}
+    terminal.result({"directory": str(home), "round": round_hash(home), **counts})
+    terminal.say(
+        f"{counts['drift']} drift cases, {counts['diagnosis']} diagnosis cases. Hand out {home / 'handout'}, "
+        f"keep {home / 'kept'}; answer: fogml benchmark run {home} --method auto"
+    )
+
+
+def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
+    """Answer a track by each method, and say how many cases failed."""
+    from fogml.benchmark.entries import entry_plan
+    from fogml.blind.run import run_cases
+
+    if not settings.methods:
+        raise InputError("no method is given; name one: --method auto")
+    if len(settings.methods) > 1 and settings.name:
+        raise InputError("--name: the answers of several methods can't have one name")
+    told: dict[str, Any] = {}
+    config = settings.in_full().yaml("benchmark run", "run.yaml")
+    for method in settings.methods:
+        plan = entry_plan(
+            settings.folder(),
+            settings.track,
+            method,
+            name=settings.name,
+            features=settings.features,
+            code=Path(settings.code) if settings.code else None,
+            workers=settings.workers,
+            limit_s=settings.limit,
+            retry=settings.retry,
+            seed=settings.seed,
+        )
+        with terminal.work(method, total=len(plan.left())) as work:
+
+            def progress(case: str, work: Any = work, method: str = method) -> None:
+                work.advance(doing=f"{method}: {case}")
+
+            answered, failed = run_cases(plan, progress)
+        plan.answers.mkdir(parents=True, exist_ok=True)
+        with whole_file(plan.answers / "run.yaml") as partial:
+            partial.write_text(config, encoding="utf-8")
+        told[str(plan.name)] = {"answered": answered, "failed": failed}
+        terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
+    terminal.result(told)
+
+
+def score_and_write(settings: ScoreSettings, terminal: Terminal) -> None:
+    """Score a round, write ``score.json`` and its page."""
+    from fogml.benchmark.score import score_round
+    from fogml.report.benchmark_page import benchmark_page, diagnosis_table, drift_table
+
+    home = Path(settings.folder())
+    with terminal.work("scoring", total=1):
+        values = score_round(home, settings.entries, workers=settings.workers)
+    out = Path(settings.out) if settings.out else home
+    with whole_folder(out, shared=True) as staging:
+        write_json(staging / "score.json", values, indent=1)
+        (staging / "score.html").write_text(benchmark_page(values), encoding="utf-8")
+        settings.write_into(staging, "benchmark score")
+    for table in (drift_table(values), diagnosis_table(values)):
+        if table is not None:
+            terminal.table(table.caption, [c[0] for c in table.columns], [r.cells for r in table.rows])
+    terminal.result(values)
+    terminal.say(f"Written to {out}: open {out / 'score.html'}")

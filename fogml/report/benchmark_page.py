@@ -1,0 +1,224 @@
+"""The page of ``fogml benchmark score``: every entry of both tracks, the rules, what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import plotly.graph_objects as go
+
+from fogml.benchmark.diagnosis_score import FIGURES
+from fogml.benchmark.drift_score import ALL, SETTLING_S
+from fogml.report import style
+from fogml.report.axes import log_axis
+from fogml.report.page import Drawing, render
+from fogml.report.tables import Column, Row, Table
+from fogml.report.words import MISSING, number, percent, plural
+
+_WORDS = (
+    (
+        "rms / nothing",
+        "rms of averages of the held-out run with the drift taken off, over the rms with only the training "
+        "runs' mean taken off; geometric mean over the cases",
+    ),
+    ("harmful", "cases where that rms exceeds doing nothing by more than the noise floor of the run"),
+    ("coverage", "share of averages within the stated 90 % interval"),
+    ("width", "full width of that interval over the rms of doing nothing, geometric mean"),
+    (
+        "start",
+        f"the first {SETTLING_S:g} s of a held-out run enter no figure; averages are over 100 s of synthetic "
+        "runs, 10 s of the thermal cycle, 20 s of the cold start",
+    ),
+    ("known cause", "one that a candidate of the catalogue stands for; named: probability of 0.5 or more"),
+    ("unknown", "a cause that no candidate stands for: told as unknown with 0.5 or more and no wrong name"),
+    (
+        "DX 2025",
+        "the probability that an answer puts on the true cause, what is listed scaled to 1 where it is more; "
+        "a class shares its probability evenly",
+    ),
+    (
+        "in brackets",
+        "95 % intervals: Wilson's for shares, of the central limit theorem for means and logarithms, order "
+        "statistics for medians; cases are taken as independent, which axes of one unit are not",
+    ),
+)
+
+
+def benchmark_page(values: Mapping[str, Any]) -> str:
+    """The self-contained HTML page of a ``score.json`` (schema ``fogml.benchmark/1``)."""
+    drift = drift_table(values)
+    return render(
+        "benchmark.html",
+        title="Benchmark",
+        verdict=_verdict(values),
+        drift=drift,
+        ratios=_ratios(values) if drift else None,
+        drift_groups=drift_groups(values),
+        diagnosis=diagnosis_table(values),
+        rules=values["round"]["rules"],
+        about=_about(values),
+        words=_WORDS,
+    )
+
+
+def _ranked(values: Mapping[str, Any]) -> list[str]:
+    entries = values["drift"]
+    return sorted(entries, key=lambda name: entries[name]["figures"][ALL]["ratio"]["value"])
+
+
+def _verdict(values: Mapping[str, Any]) -> list[str]:
+    sentences = []
+    if values["drift"]:
+        best = _ranked(values)[0]
+        ratio = values["drift"][best]["figures"][ALL]["ratio"]["value"]
+        sentences.append(f"{best} leaves least of the drift: {number(ratio)} of what doing nothing leaves.")
+    if values["diagnosis"]:
+        mass = {
+            name: one["figures"][ALL]["mass_on_true"]["value"] for name, one in values["diagnosis"].items()
+        }
+        best = max(mass, key=lambda name: mass[name] if mass[name] is not None else -1.0)
+        if mass[best] is not None:
+            sentences.append(
+                f"{best} puts most probability on the true cause: {number(mass[best])} on average."
+            )
+    return sentences
+
+
+def drift_table(values: Mapping[str, Any]) -> Table | None:
+    """Every entry of the drift track over all cases, the least ratio first; None without one."""
+    if not values["drift"]:
+        return None
+    rows = []
+    for name in _ranked(values):
+        told = values["drift"][name]["figures"][ALL]
+        rows.append(
+            Row(
+                (
+                    name,
+                    _estimate(told["ratio"]),
+                    number(told["worst"]),
+                    _share(told["harmful"]),
+                    _estimate(told["coverage"]),
+                    _estimate(told["width"]),
+                    MISSING if told["bytes"] is None else f"{told['bytes']:.0f}",
+                    str(told["failed"]),
+                )
+            )
+        )
+    columns: tuple[Column, ...] = (
+        ("Entry", "", "text"),
+        ("Rms / nothing", "", "figure"),
+        ("Worst", "", "figure"),
+        ("Harmful", "", "figure"),
+        ("Coverage of 90 %", "", "figure"),
+        ("Width / nothing", "", "figure"),
+        ("Model", "byte", "figure"),
+        ("Failed", "", "figure"),
+    )
+    count = plural(len(values["cases"]["drift"]), "case")
+    return Table(columns, tuple(rows), f"Drift models, {count}, all groups together.")
+
+
+def drift_groups(values: Mapping[str, Any]) -> Table | None:
+    """What each entry of the drift track leaves by data; None without one."""
+    if not values["drift"]:
+        return None
+    names = _ranked(values)
+    groups = [group for group in values["drift"][names[0]]["figures"] if group != ALL]
+    rows = []
+    for name in names:
+        figures = values["drift"][name]["figures"]
+        rows.append(Row((name, *(_estimate(figures[group]["ratio"]) for group in groups))))
+    counts = [values["drift"][names[0]]["figures"][group]["cases"] for group in groups]
+    heads = tuple((f"{group} ({count})", "", "figure") for group, count in zip(groups, counts))
+    return Table((("Entry", "", "text"), *heads), tuple(rows), "Rms / nothing by data; cases in brackets.")
+
+
+def diagnosis_table(values: Mapping[str, Any]) -> Table | None:
+    """Every entry of the diagnosis track; None without one."""
+    entries = values["diagnosis"]
+    if not entries:
+        return None
+    rows = []
+    for key, (words, _) in FIGURES.items():
+        parts = [one["figures"][ALL][key] for one in entries.values()]
+        share = key in ("found", "false", "unknown", "quiet")
+        rows.append(Row((words, *((_share if share else _estimate)(part) for part in parts))))
+    rows.append(Row(("cases that failed", *(str(one["figures"][ALL]["failed"]) for one in entries.values()))))
+    count = plural(len(values["cases"]["diagnosis"]), "case")
+    heads = tuple((name, "", "figure") for name in entries)
+    return Table((("Figure", "", "text"), *heads), tuple(rows), f"Diagnoses, {count}, synthetic.")
+
+
+def _estimate(told: Mapping[str, Any]) -> str:
+    if told["value"] is None:
+        return MISSING
+    if told["low"] is None:
+        return number(told["value"], 2)
+    return f"{number(told['value'], 2)} ({number(told['low'], 2)} … {number(told['high'], 2)})"
+
+
+def _share(told: Mapping[str, Any]) -> str:
+    if told["value"] is None:
+        return MISSING
+    hits = round(told["value"] * told["n"])
+    return f"{hits} of {told['n']} ({percent(told['low'])} … {percent(told['high'])})"
+
+
+def _ratios(values: Mapping[str, Any]) -> Drawing:
+    names = _ranked(values)
+    told = {name: values["drift"][name]["figures"][ALL]["ratio"] for name in names}
+    groups = [group for group in values["drift"][names[0]]["figures"] if group != ALL]
+    figure = go.Figure()
+    shown: list[float] = [1.0]
+    for place, group in enumerate(groups):
+        x = [values["drift"][name]["figures"][group]["ratio"]["value"] for name in names]
+        shown += x
+        look = place % len(style.SERIES)
+        marker = {"symbol": style.MARKERS[look], "size": 9, "color": style.SERIES[look]}
+        figure.add_trace(go.Scatter(x=x, y=names, mode="markers", name=group, marker=marker))
+    figure.add_trace(
+        go.Scatter(
+            x=[told[name]["value"] for name in names],
+            y=names,
+            mode="markers",
+            name="all, with 95 % interval",
+            marker={"symbol": "line-ns-open", "size": 16, "color": style.BLACK, "line": {"width": 3}},
+            error_x={
+                "type": "data",
+                "symmetric": False,
+                "array": [(t["high"] or t["value"]) - t["value"] for t in told.values()],
+                "arrayminus": [t["value"] - (t["low"] or t["value"]) for t in told.values()],
+                "color": style.BLACK,
+            },
+        )
+    )
+    figure.add_vline(x=1.0, line=style.FLOOR_LINE)
+    ends = [v for t in told.values() for v in (t["low"], t["high"]) if v]
+    figure.update_xaxes(
+        title_text="rms / doing nothing, logarithmic",
+        **log_axis(0.9 * min(*shown, *ends), 1.1 * max(*shown, *ends)),
+    )
+    figure.update_yaxes(autorange="reversed")
+    style.styled(figure, 190 + 34 * len(names))
+    words = "; ".join(f"{name} {number(told[name]['value'], 2)}" for name in names)
+    return Drawing(
+        figure,
+        alt=f"What each entry leaves over what doing nothing leaves, the best first: {words}.",
+        caption="Geometric means by data, and of all cases. Dashed: as good as doing nothing.",
+    )
+
+
+def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    told = values["round"]
+    seed = "closed: kept by who made it" if told["closed"] else f"open, seed {told['seed']}"
+    return [
+        ("round", seed),
+        ("SHA-256 of round.json", told["handout_sha256"]),
+        ("made by, scored by", f"fogml {told['made_by']}, fogml {values['version']}"),
+        (
+            "data",
+            "synthetic units of realities that share no code with the twin; legs of recordings of MEMS units "
+            "(no fibre-optic gyro) that ship, MIT licence",
+        ),
+    ]
