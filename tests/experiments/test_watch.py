@@ -1,4 +1,4 @@
-"""No watched figure is half as much again as at the release that is recorded; and the watch itself can see."""
+"""No watched figure is half as much again as at the recorded release; and the watch itself can see."""
 
 from __future__ import annotations
 
