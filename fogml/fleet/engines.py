@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import as_completed
+from concurrent.futures import Future, as_completed
 from contextlib import contextmanager
 from pathlib import Path
 from secrets import token_hex
@@ -18,8 +18,8 @@ from fogml.processes import worker_pool
 Outcome = dict[str, Any]
 Progress = Callable[[Outcome], None]
 _ANSWER_S = 10
-_BROKEN_POOLS = 2
-# Pools that may break before units are run one by one, to find the one that breaks them.
+_SUSPECTS_EACH = 2
+# Units for each worker that a broken pool may have been at: the first that are left, as they begin in turn.
 
 
 def run_tasks(
@@ -83,31 +83,39 @@ def _in_processes(tasks: Sequence[Task], workers: int, keep: Callable[[Task, Out
         from joblib.externals.loky.process_executor import BrokenProcessPool
 
         with worker_pool(processes) as pool:
-            futures = {pool.submit(run_task, task): task for task in some}
+            futures: dict[Future[Outcome], Task] = {}
+            unbroken = True
+            try:
+                for task in some:
+                    futures[pool.submit(run_task, task)] = task
+            except BrokenProcessPool:
+                unbroken = False
             try:
                 for future in as_completed(futures):
                     task = futures[future]
-                    outcome = future.result()
+                    try:
+                        outcome = future.result()
+                    except BrokenProcessPool:
+                        # Others that were done before are still to be told of.
+                        unbroken = False
+                        continue
                     del left[task.unit.folder]
                     keep(task, outcome)
-            except BrokenProcessPool:
-                return False
             except InputError:
                 # What others are writing comes to its end: killed, they would leave it half-written.
                 for future in futures:
                     future.cancel()
                 pool.shutdown(wait=True)
                 raise
-        return True
+        return unbroken
 
     try:
-        for _ in range(_BROKEN_POOLS):
-            if not left or run(list(left.values()), workers):
-                return
-        for task in list(left.values()):
-            if not run([task], 1):
-                del left[task.unit.folder]
-                keep(task, lost(task, "ended its process: out of memory, or killed"))
+        while left and not run(list(left.values()), workers):
+            # One by one, to find the one that breaks them; the rest then go on side by side.
+            for task in list(left.values())[: _SUSPECTS_EACH * workers]:
+                if not run([task], 1):
+                    del left[task.unit.folder]
+                    keep(task, lost(task, "ended its process: out of memory, or killed"))
     finally:
         # What workers that were ended had begun to write: above the home, too, where it was not there yet.
         homes = {Path(task.home) for task in tasks}

@@ -10,6 +10,8 @@ import subprocess
 import sys
 import time
 from collections import Counter
+from concurrent.futures import Future
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -87,6 +89,40 @@ def test_a_unit_that_ends_its_process_is_found(tmp_path):
     times = Counter(noted(tmp_path / "out"))
     assert set(times) == {f"done FOG-00{n}" for n in (0, 1, 3)}
     assert max(times.values()) <= 3
+
+
+def test_after_a_broken_pool_the_rest_go_on_side_by_side(tmp_path, monkeypatch):
+    """Units one by one cost a process each: those that the pool may have been at alone are run so."""
+    from joblib.externals.loky.process_executor import BrokenProcessPool
+
+    pools = []
+
+    class Breaking:
+        """Runs in this process; from a deadly unit on, as a pool whose process was killed."""
+
+        def __init__(self):
+            self.broken = False
+
+        def submit(self, job, task):
+            future = Future()
+            self.broken = self.broken or task.unit.name in ("FOG-002", "FOG-012")
+            if self.broken:
+                future.set_exception(BrokenProcessPool())
+            else:
+                future.set_result(job(task))
+            return future
+
+    @contextmanager
+    def pool(processes):
+        pools.append(processes)
+        yield Breaking()
+
+    monkeypatch.setattr("fogml.fleet.engines.worker_pool", pool)
+    outcomes = run_tasks(tasks(tmp_path, 20, quick), workers=2)
+    failed = [outcome["unit"] for outcome in outcomes if outcome["status"] == "failed"]
+    assert failed == ["FOG-002", "FOG-012"]
+    assert pools == [2, 1, 1, 1, 1, 2, 1, 1, 1, 1, 2]
+    assert set(Counter(noted(tmp_path / "out")).values()) == {1}
 
 
 def test_what_an_ended_worker_had_half_written_is_removed(tmp_path):
