@@ -114,8 +114,13 @@ def bytes_per_sample(results: Mapping[str, Any]) -> dict[str, float]:
     return found
 
 
-def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Server | None = None) -> str:
-    """The page, in Markdown."""
+def scale_page(
+    results: Mapping[str, Any],
+    load: Load | None = None,
+    server: Server | None = None,
+    fleet: Mapping[str, Any] | None = None,
+) -> str:
+    """The page, in Markdown; `fleet` is what ``fleet_run.json`` holds, if a fleet was run."""
     load, server = load or Load(), server or Server()
     found, missing = costs(results, load)
     machine = results["machine"]
@@ -133,6 +138,7 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
         f"{machine.get('threads', 'all cores')}; what was merged later{elsewhere} is told in `results.md`), "
         "taken as core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was "
         "run at this size.",
+        *(() if fleet is None else _real_run(fleet, load)),
     ]
     if missing:
         lines += ["", f"Not measured, so not in the sums: {'; '.join(missing)}."]
@@ -180,6 +186,40 @@ def scale_page(results: Mapping[str, Any], load: Load | None = None, server: Ser
     lines += _breaks_first(load, server, hours, stored, memory)
     lines += _drivers(found, total)
     return "\n".join(lines) + "\n"
+
+
+def fleet_found(folder: Path) -> Mapping[str, Any] | None:
+    """What `experiments.benchmarks.fleet_run` found, if it lies in a folder."""
+    path = folder / "fleet_run.json"
+    return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def _real_run(fleet: Mapping[str, Any], load: Load) -> list[str]:
+    """What a fleet of synthetic units did while it was killed, beside one left alone."""
+    units, killed = fleet["units"], fleet["killed"]
+    each = fleet["core_s"]["alone"] / units
+    kills = ", ".join(f"{count} × {what}" for what, count in killed["kills"].items())
+    ends = ", ".join(f"{count} × {status}" for status, count in killed["ends"].items())
+    differ = fleet["differ"]
+    same = (
+        f"all {fleet['files']:,} files of units and fleet are the same, bit for bit (of workbooks what is in "
+        "them; the name of the folder apart)"
+        if not differ
+        else f"**{len(differ)} of {fleet['files']:,} files differ**, the first {differ[0]}"
+    )
+    return [
+        "",
+        "## A real run with kills",
+        "",
+        f"{units} synthetic units of two runs each, trained, judged and reported by `fogml fleet "
+        f"--workers 2` (`python -m experiments.benchmarks.fleet_run DIR`, fogml {fleet['version']}, "
+        f"{fleet['date']}). While it ran: {kills} killed at random moments; the same command was given "
+        f"{killed['starts']} times (exit statuses: {ends}). {fleet['done']} of {units} units done. Beside "
+        f"the same fleet left alone, {same}; partial files left: {len(killed['partial'])}. Left alone it "
+        f"takes {each:.2g} core-seconds a unit, of 260 rows a run: nearly all of it is the unit's report, "
+        f"page and workbook, whatever the length of the runs. {load.units:,} units a month are "
+        f"{each * load.units / 3600.0:.2g} core-hours of that.",
+    ]
 
 
 def _breaks_first(
@@ -251,7 +291,7 @@ def main() -> None:
     """Write the page anew."""
     results = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
     with whole_file(HERE / "scale.md") as partial:
-        partial.write_text(scale_page(results), encoding="utf-8")
+        partial.write_text(scale_page(results, fleet=fleet_found(HERE)), encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -27,13 +27,14 @@ from fogml.report.tables import Table
 
 HERE = Path(__file__).parent
 ROOT = HERE.parents[1]
+_METHODS = "experiments.open_benchmark.methods"
 DRIFT: dict[str, dict[str, Any]] = {
     "auto": {"method": "auto"},
     "constant": {"method": "mean"},
     "cubic in T": {"method": "polynomial", "features": "T^1..3"},
-    "Gaussian process": {"method": "sklearn.gaussian_process.GaussianProcessRegressor", "features": "T, dT"},
+    "Gaussian process": {"method": f"{_METHODS}:gaussian_process", "code": ROOT},
     "boosting": {"method": "sklearn.ensemble.HistGradientBoostingRegressor", "features": "T, dT"},
-    "GRU": {"method": "experiments.open_benchmark.methods:gru", "code": ROOT},
+    "GRU": {"method": f"{_METHODS}:gru", "code": ROOT},
 }
 """What each entry of the drift track is called, and how it is run."""
 DIAGNOSIS = {"fogml diagnose": {"method": "diagnosis"}, "greedy BIC": {"method": "bic"}}

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from experiments.benchmarks.peer_model import Budget, PeerModel
+from experiments.benchmarks.peers import peer_of
 from experiments.thermal_cycle.recurrent import Recurrent
 from fogml.benchmark.answers import answer_by
 from fogml.blind.folders import CaseFiles
+
+
+def gaussian_process(case: CaseFiles, out: Path) -> None:
+    """scikit-learn's, on at most 600 averages of T, its rate and their product, tuned by its evidence."""
+    answer_by(PeerModel(peer_of("gaussian-process"), Budget(), case.seed), case, out)
 
 
 def gru(case: CaseFiles, out: Path) -> None:

@@ -9,16 +9,17 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from fogml.benchmark.answers import read_drift, write_drift
+from fogml.benchmark.answers import answer_by, read_drift, write_drift
 from fogml.benchmark.drift_cases import DriftCase
 from fogml.benchmark.drift_score import SETTLING_S, geometric_mean
-from fogml.benchmark.entries import entry_name, entry_plan
+from fogml.benchmark.entries import entry_name
 from fogml.benchmark.make import make_round, write_round
 from fogml.benchmark.rounds import TrackFolder
 from fogml.benchmark.score import score_round
-from fogml.blind.run import run_cases
+from fogml.blind.folders import case_files
 from fogml.cli.main import app
 from fogml.errors import InputError
+from fogml.models.names import make_model
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from tests.blind.suites import HandMade, make_suite
@@ -37,16 +38,21 @@ def chamber_run(name: str, seed: int, ends: tuple[float, ...]) -> Run:
 
 @pytest.fixture(scope="module")
 def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A round of one drift case and one diagnosis case, answered by a cubic and by who abstains."""
+    """A round of one drift case and one diagnosis case, answered by a cubic, and by hand."""
     home = tmp_path_factory.mktemp("round")
     train = (chamber_run("a", 1, (20.0, -20.0, 60.0)), chamber_run("b", 2, (60.0, -20.0, 30.0)))
     case = DriftCase("own", "unit 1", train, chamber_run("c", 3, (0.0, 50.0, 0.0)), AVERAGING_S)
     thermal = {"thermal_hysteresis": (0.5, {"half_width": 10.0})}
     suite = make_suite(home / "suite", [HandMade("one", thermal)])
     write_round(home / "round", [case], suite, 5)
-    drift = entry_plan(home / "round", "drift", "polynomial", features="T^1..3", name="cubic")
-    named = entry_plan(home / "round", "diagnosis", "abstain")
-    assert [run_cases(plan) for plan in (drift, named)] == [(1, 0), (1, 0)]
+    cubic = TrackFolder(home / "round", "drift").answers("cubic") / "0001"
+    quiet = TrackFolder(home / "round", "diagnosis").answers("quiet") / "0001"
+    for folder in (cubic, quiet):
+        folder.mkdir(parents=True)
+    answer_by(
+        make_model("polynomial", "T^1..3"), case_files(home / "round" / "handout" / "drift" / "0001"), cubic
+    )
+    (quiet / "gap.json").write_text('{"verdict": "no_gap", "unknown": {"probability": 0.0}, "which": []}')
     return home / "round"
 
 
@@ -89,18 +95,22 @@ def test_the_drift_score_is_that_of_averages_by_hand(made: Path) -> None:
 
 
 def test_the_diagnosis_score_tells_who_names_nothing(made: Path) -> None:
-    figures = score_round(made, ["abstain"])["diagnosis"]["abstain"]["figures"]["all"]
+    figures = score_round(made, ["quiet"])["diagnosis"]["quiet"]["figures"]["all"]
     assert figures["found"]["value"] == 0.0 and figures["found"]["n"] == 1
     assert figures["mass_on_true"]["value"] == 0.0
     assert figures["false"]["value"] is None
 
 
-def test_a_failed_case_counts_as_doing_nothing(made: Path, tmp_path: Path) -> None:
-    plan = entry_plan(made, "drift", "polynomial", features="T9", name="broken")
-    assert run_cases(plan) == (1, 1)
-    told = score_round(made, ["broken"])["drift"]["broken"]
+def test_a_failed_case_counts_as_doing_nothing(made: Path) -> None:
+    for track in ("drift", "diagnosis"):
+        broken = TrackFolder(made, track).answers("broken") / "0001"
+        broken.mkdir(parents=True)
+        (broken / "outcome.json").write_text('{"done": false, "reason": "error", "message": "no fit"}')
+    values = score_round(made, ["broken"])
+    told = values["drift"]["broken"]
     assert told["figures"]["all"]["ratio"]["value"] == 1.0 and told["figures"]["all"]["failed"] == 1
-    assert "T9" in told["cases"][0]["failure"]
+    assert told["cases"][0]["failure"] == "error: no fit"
+    assert values["diagnosis"]["broken"]["figures"]["all"]["false"]["value"] == 1.0
 
 
 @pytest.mark.parametrize(
@@ -168,7 +178,7 @@ def test_the_commands_answer_and_score(made: Path, tmp_path: Path) -> None:
     ran = runner.invoke(app, ["benchmark", "run", str(made), "--method", "mean", "--workers", "1", "--json"])
     assert ran.exit_code == 0, ran.output
     assert json.loads(ran.stdout) == {"mean": {"answered": 1, "failed": 0}}
-    entries = ["--entry", "mean", "--entry", "cubic", "--entry", "abstain"]
+    entries = ["--entry", "mean", "--entry", "cubic", "--entry", "quiet"]
     scored = runner.invoke(app, ["benchmark", "score", str(made), *entries, "-o", str(tmp_path), "--json"])
     assert scored.exit_code == 0, scored.output
     values = json.loads((tmp_path / "score.json").read_text())
