@@ -107,11 +107,11 @@ def drift_table(values: Mapping[str, Any]) -> Table | None:
         )
     columns: tuple[Column, ...] = (
         ("Entry", "", "text"),
-        ("Rms / nothing", "", "figure"),
+        ("Rms / nothing", "", "figure pair"),
         ("Worst", "", "figure"),
-        ("Harmful", "", "figure"),
-        ("Coverage of 90 %", "", "figure"),
-        ("Width / nothing", "", "figure"),
+        ("Harmful", "", "figure pair"),
+        ("Coverage of 90 %", "", "figure pair"),
+        ("Width / nothing", "", "figure pair"),
         ("Model", "byte", "figure"),
         ("Failed", "", "figure"),
     )
@@ -130,7 +130,7 @@ def drift_groups(values: Mapping[str, Any]) -> Table | None:
         figures = values["drift"][name]["figures"]
         rows.append(Row((name, *(_estimate(figures[group]["ratio"]) for group in groups))))
     counts = [values["drift"][names[0]]["figures"][group]["cases"] for group in groups]
-    heads = tuple((f"{group} ({count})", "", "figure") for group, count in zip(groups, counts))
+    heads = tuple((f"{group} ({count})", "", "figure pair") for group, count in zip(groups, counts))
     return Table((("Entry", "", "text"), *heads), tuple(rows), "Rms / nothing by data; cases in brackets.")
 
 
@@ -146,7 +146,7 @@ def diagnosis_table(values: Mapping[str, Any]) -> Table | None:
         rows.append(Row((words, *((_share if share else _estimate)(part) for part in parts))))
     rows.append(Row(("cases that failed", *(str(one["figures"][ALL]["failed"]) for one in entries.values()))))
     count = plural(len(values["cases"]["diagnosis"]), "case")
-    heads = tuple((name, "", "figure") for name in entries)
+    heads = tuple((name, "", "figure pair") for name in entries)
     return Table((("Figure", "", "text"), *heads), tuple(rows), f"Diagnoses, {count}, synthetic.")
 
 

@@ -8,9 +8,13 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from fogml.benchmark.diagnosis_score import diagnosis_figures
+from fogml.benchmark.drift_score import DriftMark, drift_figures
+from fogml.benchmark.rounds import RULES
 from fogml.blind.scoring.values import score_values
 from fogml.report import blind_page
 from fogml.report.axes_page import axes_page
+from fogml.report.benchmark_page import benchmark_page
 from fogml.report.catalogue_page import catalogue_page
 from fogml.report.effect_card import effect_page
 from fogml.report.plan_page import plan_page
@@ -32,6 +36,37 @@ def written(name: str) -> dict:
     return dict(json.loads((DATA / f"{name}.json").read_text(encoding="utf-8")))
 
 
+def benchmark(serial: str) -> str:
+    """Entries that help and that do harm, with intervals and without, one of a long name."""
+    groups = ("thermal cycle, MEMS", "synthetic, second reality")
+    drift = {
+        name: [
+            DriftMark(f"{k:04d}", groups[k % 2], 2.0, 2.0 * left * (1.0 + 0.3 * (k % 3)), 0.05, *stated)
+            for k in range(8)
+        ]
+        for name, left, stated in (
+            ("auto", 0.3, (0.9, 1.5, 404)),
+            (f"network of {serial}", 1.4, (None, None, None)),
+        )
+    }
+    marks = marks_of(range(1, 41))
+    return benchmark_page(
+        {
+            "version": "0.2.0",
+            "round": {
+                "seed": 7,
+                "closed": False,
+                "made_by": "0.2.0",
+                "rules": list(RULES),
+                "handout_sha256": "0f" * 32,
+            },
+            "cases": {"drift": dict.fromkeys(range(8)), "diagnosis": dict.fromkeys(range(40))},
+            "drift": {name: {"figures": drift_figures(own)} for name, own in drift.items()},
+            "diagnosis": {name: {"figures": diagnosis_figures(own)} for name, own in marks.methods.items()},
+        }
+    )
+
+
 def procedure_pages() -> dict[str, str]:
     """Name to HTML of each page."""
     shown = [effects()[id] for id in ("shupe_pure", "loop_gain")]
@@ -42,6 +77,7 @@ def procedure_pages() -> dict[str, str]:
         "sweep": sweep_page(written("sweep"), judgement()),
         "plan": plan_page(written("plan")),
         "blind": blind_page(score_values(marks_of(range(1, 41)))),
+        "benchmark": benchmark(serial),
         "effect": effect_page(drawn[0][0], [drawn[0][1]], *drawn[0][2:]),
         "catalogue": catalogue_page(drawn),
         "misalignment": lab.misalignment(),

@@ -23,7 +23,17 @@ NAMED_BUTTONS = {"Zoom", "Pan", "Zoom in", "Zoom out", "Reset axes", "Download p
 KINDS = (
     *("train", "train of five", "compare", "inspect", "noise", "gap", "what if", "index", "certificate"),
     *("acceptance", "batch", "fleet", "monitor", "monitored unit"),
-    *("sweep", "plan", "blind", "effect", "catalogue", "misalignment", "north", "north of a recording"),
+    *(
+        "sweep",
+        "plan",
+        "blind",
+        "benchmark",
+        "effect",
+        "catalogue",
+        "misalignment",
+        "north",
+        "north of a recording",
+    ),
     *("rate", "train with navigation", "axes", "axes accepted"),
 )
 LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
