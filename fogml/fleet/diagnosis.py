@@ -10,9 +10,10 @@ import numpy as np
 from pydantic import Field
 
 from fogml.errors import InputError
-from fogml.fleet.shares import apart, discoveries, prevalence, probability_of_difference, sizes
+from fogml.fleet.shares import apart, discoveries, prevalence, probability_of_difference
 from fogml.gap.result import NAMED
 from fogml.runs.run import FloatArray
+from fogml.signals.random_effects import random_effects
 from fogml.strict import Strict, strictly
 
 FALSE_SHARE = 0.05
@@ -138,7 +139,7 @@ def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], d
     named = [(label, cause) for label, unit in zip(labels, units) if (cause := _of(unit, effect)) is not None]
     sure = [(label, cause) for label, cause in named if cause.probability >= NAMED]
     by_size = sorted(named, key=lambda item: -item[1].probability)
-    line = sizes([c.amplitude for _, c in sure], [c.se for _, c in sure]) if sure else None
+    line = random_effects([c.amplitude for _, c in sure], [c.se for _, c in sure]) if sure else None
     energy = np.array([_energy(unit, effect) for unit in units])
     gap = np.array([unit.gap_square for unit in units])
     with np.errstate(invalid="ignore", divide="ignore"):

@@ -1,10 +1,9 @@
-"""How common a cause is on a line, how large it is there, and which units differ: from each unit's posterior.
+"""How common a cause is on a line, and which units differ: from each unit's posterior.
 
 Units are exchangeable. How many of n have a cause is a sum of independent events with the units' own
 probabilities (Poisson-binomial); the share of the line is then Beta distributed for each count, with
-Jeffreys' prior. Sizes are normal about the line's mean with a deviation between units and each unit's
-standard error (random effects), both by restricted likelihood. A unit stands apart where its size does not
-fit what the others foretell; of all units told so no more than the stated share is wrong in the mean (Y.
+Jeffreys' prior. A unit stands apart where its size does not fit what the others foretell
+(`fogml.signals.random_effects`); of all units told so no more than the stated share is wrong in the mean (Y.
 Benjamini & Y. Hochberg, J. R. Stat. Soc. B 57, 1995).
 """
 
@@ -15,12 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 from scipy.special import betaln
 from scipy.stats import beta
 from scipy.stats import t as student
 
 from fogml.runs.run import FloatArray
+from fogml.signals.random_effects import random_effects
 
 JEFFREYS = 0.5
 
@@ -32,15 +32,6 @@ class Prevalence:
     mean: float
     ci90: tuple[float, float]
     over_half: float
-
-
-@dataclass(frozen=True)
-class Sizes:
-    """A cause's size on the line: mean with its standard error, and deviation between units."""
-
-    mean: float
-    se: float
-    between: float
 
 
 def count_distribution(probabilities: ArrayLike) -> FloatArray:
@@ -84,33 +75,6 @@ def _log_evidence(counts: FloatArray) -> float:
     return float(np.logaddexp.reduce(np.log(counts[held]) + each[held]))
 
 
-def sizes(values: ArrayLike, errors: ArrayLike) -> Sizes:
-    """Mean and deviation between units of n sizes with standard errors, by restricted likelihood."""
-    x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
-    if len(x) == 1:
-        return Sizes(float(x[0]), float(se[0]), float("nan"))
-    if not np.all(se > 0.0):
-        # One that is told exactly: the values' own deviation is all there is.
-        deviation = float(x.std(ddof=1))
-        return Sizes(float(x.mean()), deviation / np.sqrt(len(x)), deviation)
-
-    def mean_of(variance: float) -> tuple[float, float]:
-        weights = 1.0 / (variance + se**2)
-        return float(weights @ x / weights.sum()), float(weights.sum())
-
-    def negative(variance: float) -> float:
-        mean, total = mean_of(variance)
-        spread = variance + se**2
-        return 0.5 * float(np.sum(np.log(spread) + (x - mean) ** 2 / spread)) + 0.5 * np.log(total)
-
-    # No deviation is larger than that of the values themselves, by a margin for few.
-    top = 10.0 * float(np.var(x, ddof=1)) + 1e-300
-    found = minimize_scalar(lambda root: negative(root**2), bounds=(0.0, np.sqrt(top)), method="bounded")
-    variance = float(found.x**2) if found.fun < negative(0.0) else 0.0
-    mean, total = mean_of(variance)
-    return Sizes(mean, float(1.0 / np.sqrt(total)), float(np.sqrt(variance)))
-
-
 def apart(values: ArrayLike, errors: ArrayLike) -> FloatArray:
     """Two-sided p-value of each of n sizes against what the others foretell, shape (n,); 1 of under four."""
     x, se = np.asarray(values, dtype=np.float64), np.asarray(errors, dtype=np.float64)
@@ -119,7 +83,7 @@ def apart(values: ArrayLike, errors: ArrayLike) -> FloatArray:
         return told
     for place in range(len(x)):
         others = np.arange(len(x)) != place
-        line = sizes(x[others], se[others])
+        line = random_effects(x[others], se[others])
         spread = np.sqrt(line.between**2 + se[place] ** 2 + line.se**2)
         if spread > 0.0:
             told[place] = 2.0 * student.sf(abs(x[place] - line.mean) / spread, len(x) - 2)

@@ -1,4 +1,4 @@
-"""Shares of a line and its sizes: against closed forms, other arithmetic and simulated lines."""
+"""Shares of a line: against closed forms, other arithmetic and simulated lines."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from fogml.fleet.shares import (
     discoveries,
     prevalence,
     probability_of_difference,
-    sizes,
 )
 
 PROBABILITIES = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6)
@@ -60,23 +59,6 @@ def test_lots_that_differ_are_told_and_equal_ones_are_not():
     assert probability_of_difference([few, few]) < 0.3
     # What says nothing of units says nothing of lots.
     assert probability_of_difference([[0.5] * 20, [0.5] * 20]) == pytest.approx(0.5)
-
-
-def test_sizes_are_the_line_s():
-    rng = np.random.default_rng(1)
-    found = []
-    for _ in range(60):
-        se = rng.uniform(0.5, 2.0, size=25)
-        found.append(sizes(5.0 + 1.0 * rng.normal(size=25) + se * rng.normal(size=25), se))
-    means, errors = np.array([f.mean for f in found]), np.array([f.se for f in found])
-    assert np.mean(means) == pytest.approx(5.0, abs=0.15)
-    assert np.std(means) == pytest.approx(np.mean(errors), rel=0.3)
-    assert np.sqrt(np.mean([f.between**2 for f in found])) == pytest.approx(1.0, abs=0.15)
-    # With no error of their own: mean and deviation.
-    x = rng.normal(size=9)
-    plain = sizes(x, np.zeros(9))
-    assert (plain.mean, plain.between) == pytest.approx((x.mean(), x.std(ddof=1)))
-    assert sizes([2.0, 2.0], [0.0, 0.0]).mean == 2.0
 
 
 def test_units_that_stand_apart_are_told_and_few_others():

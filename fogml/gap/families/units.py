@@ -15,7 +15,6 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from fogml.errors import InputError
 from fogml.gap.families.answer import LISTED, answered, inferred
@@ -24,7 +23,8 @@ from fogml.gap.families.priors import Priors
 from fogml.gap.families.search import Explanation
 from fogml.gap.result import Diagnosis, Estimate
 from fogml.gap.twin_model import AnyModel
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
+from fogml.signals.random_effects import random_effects
 from fogml.twin.twin import Twin
 
 SCHEMA = "fogml.gap_units/1"
@@ -210,13 +210,19 @@ def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[Share
         sizes = {u: f.amplitude for u, d in by_unit.items() for f in d.found if f.effect == id}
         if probability < LISTED or not sizes:
             continue
-        mean, spread, next_unit = transferred(
-            np.array([s.value for s in sizes.values()]), np.array([s.se for s in sizes.values()])
-        )
         unit = next(iter(sizes.values())).unit
-        estimate = None if mean is None else Estimate(*mean, unit)
-        causes.append(SharedCause(id, probability, sizes, estimate, spread, next_unit, unit))
+        causes.append(SharedCause(id, probability, sizes, *_going_over(sizes, unit), unit))
     return tuple(sorted(causes, key=lambda c: -c.probability))
+
+
+def _going_over(
+    sizes: dict[str, Estimate], unit: str
+) -> tuple[Estimate | None, float | None, tuple[float, float] | None]:
+    """Mean, spread from unit to unit, and where the next unit's size lies; None of one unit."""
+    if len(sizes) < 2:
+        return None, None, None
+    held = random_effects([s.value for s in sizes.values()], [s.se for s in sizes.values()])
+    return Estimate(held.mean, held.se, unit), held.between, held.next_value()
 
 
 def _prior(told: Sequence[_Told], names: frozenset[str]) -> float:
@@ -224,34 +230,3 @@ def _prior(told: Sequence[_Told], names: frozenset[str]) -> float:
     return sum(
         next(float(t.found.search.log_odds[t.families[id]]) for t in told if id in t.families) for id in names
     )
-
-
-def transferred(
-    values: FloatArray, errors: FloatArray
-) -> tuple[tuple[float, float] | None, float | None, tuple[float, float] | None]:
-    """Mean with its standard error, spread from unit to unit, and 90 % interval of the next unit's value.
-
-    The spread is such that the weighed squares about the mean are what is expected of them (R. C. Paule and
-    J. Mandel, J. Res. NBS 87 (1982) 377); the interval by Student's t of as many units.
-    """
-    k = len(values)
-    if k < 2:
-        return None, None, None
-
-    def excess(variance: float) -> float:
-        weights = 1.0 / (errors**2 + variance)
-        centre = float(weights @ values / weights.sum())
-        return float(weights @ (values - centre) ** 2) - (k - 1)
-
-    errors = np.maximum(errors, 1e-12 * (1.0 + np.abs(values)))
-    low, high = 0.0, float(np.ptp(values)) ** 2 * k + 1e-300
-    if excess(low) > 0.0:
-        for _ in range(200):
-            middle = 0.5 * (low + high)
-            low, high = (middle, high) if excess(middle) > 0.0 else (low, middle)
-    else:
-        high = 0.0
-    weights = 1.0 / (errors**2 + high)
-    mean, se = float(weights @ values / weights.sum()), float(weights.sum() ** -0.5)
-    reach = float(student.ppf(0.95, k - 1)) * float(np.hypot(se, np.sqrt(high)))
-    return (mean, se), float(np.sqrt(high)), (mean - reach, mean + reach)

@@ -1,12 +1,11 @@
 """Several units: causes shared, sizes each unit's own, what the next unit may have."""
 
-import numpy as np
 import pytest
 
 from fogml.errors import InputError
 from fogml.gap.families import units
 from fogml.gap.families.answer import diagnose
-from fogml.gap.families.units import diagnose_units, transferred
+from fogml.gap.families.units import diagnose_units
 from fogml.gap.model import EffectValue
 from fogml.runs.facts import Facts
 
@@ -44,18 +43,6 @@ def test_weak_causes_of_two_units_are_surer_together_whatever_their_order(monkey
         assert told > own
     assert cause.next_unit[0] < 0.12 < cause.next_unit[1]
     assert "the next unit's lies between" in both[0].lines()[0]
-
-
-def test_what_goes_over_with_equal_errors_is_the_plain_mean_and_what_the_variance_has_above_them():
-    values, errors = np.array([1.0, 1.6, 2.2, 1.2]), np.full(4, 0.2)
-    (mean, se), spread, (low, high) = transferred(values, errors)
-    assert mean == pytest.approx(values.mean())
-    assert spread**2 == pytest.approx(values.var(ddof=1) - 0.04)
-    assert se == pytest.approx(np.sqrt(values.var(ddof=1) / 4.0))
-    assert low < values.min() and high > values.max() - 0.1
-    # Units that agree better than their errors have no spread of their own.
-    assert transferred(np.array([1.0, 1.01]), np.array([0.2, 0.2]))[1] == 0.0
-    assert transferred(np.array([1.0]), np.array([0.2])) == (None, None, None)
 
 
 def test_units_that_are_not_told_or_have_no_run_to_fit_on_are_refused():

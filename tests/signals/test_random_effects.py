@@ -1,0 +1,45 @@
+"""Mean and deviation between units: against simulated lines and closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.signals.random_effects import random_effects
+
+
+def test_they_are_the_line_s():
+    rng = np.random.default_rng(1)
+    found = []
+    for _ in range(60):
+        se = rng.uniform(0.5, 2.0, size=25)
+        found.append(random_effects(5.0 + 1.0 * rng.normal(size=25) + se * rng.normal(size=25), se))
+    means, errors = np.array([f.mean for f in found]), np.array([f.se for f in found])
+    assert np.mean(means) == pytest.approx(5.0, abs=0.15)
+    assert np.std(means) == pytest.approx(np.mean(errors), rel=0.3)
+    assert np.sqrt(np.mean([f.between**2 for f in found])) == pytest.approx(1.0, abs=0.15)
+    # With no error of their own: mean and deviation.
+    x = rng.normal(size=9)
+    plain = random_effects(x, np.zeros(9))
+    assert (plain.mean, plain.between) == pytest.approx((x.mean(), x.std(ddof=1)))
+    assert random_effects([2.0, 2.0], [0.0, 0.0]).mean == 2.0
+
+
+def test_with_equal_errors_it_is_the_plain_mean_and_what_the_variance_has_above_them():
+    values, errors = np.array([1.0, 1.6, 2.2, 1.2]), np.full(4, 0.2)
+    held = random_effects(values, errors)
+    assert held.mean == pytest.approx(values.mean())
+    assert held.between**2 == pytest.approx(values.var(ddof=1) - 0.04, rel=1e-4)
+    assert held.se == pytest.approx(np.sqrt(values.var(ddof=1) / 4.0), rel=1e-4)
+    # Units that agree better than their errors have no spread of their own.
+    assert random_effects([1.0, 1.01], [0.2, 0.2]).between == pytest.approx(0.0, abs=1e-3)
+
+
+def test_the_next_unit_lies_where_it_is_said_to():
+    rng = np.random.default_rng(4)
+    inside = 0
+    for _ in range(400):
+        units = 3.0 + 0.5 * rng.normal(size=7)
+        low, high = random_effects(units[:6] + 0.2 * rng.normal(size=6), np.full(6, 0.2)).next_value()
+        inside += low <= units[6] <= high
+    assert 0.85 < inside / 400 < 0.96
