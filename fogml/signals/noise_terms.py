@@ -211,7 +211,9 @@ def _interval(search: NoiseSearch, name: str, level: float) -> tuple[float, floa
     model = search.candidates[0].model
     shape = model.design(search.best.log_corner)[0][:, names.index(name)]
     # The scale on which the term alone would be told from the others' scatter.
-    information = 0.5 * float(np.sum(model.freedom * (shape / search.best.density) ** 2))
+    used = search.best.used
+    share = shape[used] / search.best.density[used]
+    information = 0.5 * float(np.sum(model.freedom[used] * share**2))
     scale = allowed / np.sqrt(information) if information > 0.0 else max(value, 1e-300)
     fits: dict[int, SpectrumFit] = {}
     least = search.profile_loss(name, value, fits)

@@ -243,7 +243,7 @@ class SpectrumModel:
         constants, covariance = np.empty(0), np.empty((0, 0))
         loss = 0.0
         if s.columns.shape[1]:
-            weight = np.where(self.used, 1.0 / density, 0.0)[: self._single]
+            weight = (self.used / np.where(self.used, density, 1.0))[: self._single]
             weighed = s.columns * weight[:, None]
             information = weighed.T @ s.columns
             size = np.sqrt(np.maximum(np.diag(information), 1e-300))
