@@ -36,6 +36,7 @@ class DiagnoseSettings(Settings):
         option("Effect that is no candidate; may be repeated.", metavar="EFFECT", known=options.EFFECTS),
     ] = []
     cost_of_false_name: options.CostOfFalseName = 1.0
+    next_run: options.NextRun = True
     rehearse: Annotated[bool, option("Tell what these runs would name of each candidate.", "--rehearse")] = (
         False
     )

@@ -66,6 +66,7 @@ def diagnose_and_write(settings: DiagnoseSettings, terminal: Terminal) -> Diagno
                 noise=noise,
                 without=settings.without,
                 seed=settings.seed,
+                plan=settings.next_run,
                 rehearsed=settings.rehearse,
                 cost_of_false_name=settings.cost_of_false_name,
                 courses=True,

@@ -46,6 +46,7 @@ class FleetSettings(options.LimitSettings):
         option("Limits of acceptance reports (YAML), as of 'lab acceptance'.", metavar="FILE", reads=True),
     ] = None
     twin: options.Twin = "nominal"
+    next_run: options.NextRun = True
     workers: options.Workers = 1
     cluster: Annotated[str | None, option("Scheduler of a Dask cluster.", metavar="tcp://HOST:PORT")] = None
     device: Annotated[

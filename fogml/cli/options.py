@@ -129,6 +129,13 @@ CostOfFalseName = Annotated[
     Field(gt=0.0),
     option("What a false name costs over a missed one: the greater, the surer a name.", metavar="RATIO"),
 ]
+NextRun = Annotated[
+    bool,
+    option(
+        "Look for the programme of a run that would tell more; no takes half the time.",
+        "--next-run/--no-next-run",
+    ),
+]
 Twin = Annotated[
     str,
     option("Twin file, or one that ships.", metavar="TWIN", reads=True, known=TWINS),
