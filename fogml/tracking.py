@@ -22,6 +22,8 @@ _QUIET = {
     # MLflow tells its makers of its use unless told not to; fogml's promise is that nothing goes anywhere.
     "MLFLOW_DISABLE_TELEMETRY": "true",
     "DO_NOT_TRACK": "true",
+    # Its notes on tables it makes are none of the command's.
+    "MLFLOW_LOGGING_LEVEL": "WARNING",
     # A server that is away is not worth minutes.
     "MLFLOW_HTTP_REQUEST_MAX_RETRIES": "1",
     "MLFLOW_HTTP_REQUEST_TIMEOUT": "10",
