@@ -24,16 +24,21 @@ class Files:
             left.unlink()
 
     def told(self) -> list[dict[str, Any]]:
-        """Names and sizes, and whether a file is a run rather than a side file."""
+        """Name, path from the app's folder and size of each, and whether it is a run or a side file."""
         found = [p for p in self.folder.iterdir() if p.is_file() and not p.name.startswith(".")]
         return [
-            {"name": p.name, "bytes": p.stat().st_size, "run": p.suffix.lower() not in NO_RUNS}
+            {
+                "name": p.name,
+                "path": f"files/{p.name}",
+                "bytes": p.stat().st_size,
+                "run": p.suffix.lower() not in NO_RUNS,
+            }
             for p in sorted(found, key=lambda p: p.name)
         ]
 
     def paths(self, runs: bool) -> list[str]:
         """Paths from the app's folder: of runs, or of the other files."""
-        return [f"files/{one['name']}" for one in self.told() if one["run"] is runs]
+        return [one["path"] for one in self.told() if one["run"] is runs]
 
     def place(self, name: str) -> Path:
         """Where a file of a name lies.

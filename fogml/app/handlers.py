@@ -18,7 +18,7 @@ from tornado.web import HTTPError, RequestHandler, stream_request_body
 
 import fogml
 from fogml.app.jobs import command_line
-from fogml.app.state import App
+from fogml.app.state import OFFERED, App
 from fogml.errors import FogmlError, InputError
 
 STATIC = Path(__file__).parent / "static"
@@ -163,10 +163,9 @@ class _State(_Handler):
             "folder": str(app.home),
             "upload_bytes": app.limits.upload_bytes,
             "version": fogml.__version__,
-            "files": app.files.told(),
+            "files": app.files_told(),
             "jobs": [app.jobs.told(name) for name in reversed(app.jobs.names())],
-            "models": app.jobs.models(),
-            "twins": app.jobs.twins(),
+            "offered": {takes: app.offered(takes) for takes in OFFERED},
         }
         if self.get_query_argument("forms", None) is not None:
             values["forms"] = app.forms

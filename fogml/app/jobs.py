@@ -15,7 +15,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from fogml.app.runner import CANCELLED, ENDED, PROCESS, write_whole
+from fogml.app.runner import CANCELLED, ENDED, PROCESS, tell
 from fogml.errors import InputError
 from fogml.processes import process_is_alive
 
@@ -52,12 +52,14 @@ class Jobs:
             name = f"{number:04d}"
             try:
                 (self.folder / name).mkdir()
+                # Some commands write a file rather than a folder.
+                (self.folder / name / "results").mkdir()
                 break
             except FileExistsError:
                 number += 1
         words = words_of(f"jobs/{name}/results")
         made = datetime.now(UTC).isoformat(timespec="seconds")
-        write_whole(self.folder / name / "job.json", {"words": words, "made": made})
+        tell(self.folder / name / "job.json", {"words": words, "made": made})
         self.start_waiting()
         return name
 
@@ -122,19 +124,25 @@ class Jobs:
             "files": sorted(shown, key=lambda path: (not path.endswith(".html"), path.count("/"), path)),
         }
 
-    def models(self) -> list[str]:
-        """Folders of models that jobs have written, the newest first."""
-        found = [
-            str(card.parent.relative_to(self.home))
-            for name in self.names()
-            for card in (self.folder / name / "results").rglob("model/model.json")
-        ]
-        return sorted(found, reverse=True)
+    def written(self, pattern: str) -> list[str]:
+        """Paths from the app's folder of what jobs have written by a pattern of names, newest first."""
+        homes = [self.folder / name / "results" for name in reversed(self.names())]
+        return [str(path.relative_to(self.home)) for home in homes for path in sorted(home.glob(pattern))]
 
-    def twins(self) -> list[str]:
-        """Twins that diagnoses have written, the newest first."""
-        found = [(self.folder / name / "results" / "twin.yaml") for name in self.names()]
-        return sorted((str(path.relative_to(self.home)) for path in found if path.is_file()), reverse=True)
+    def runs(self) -> list[dict[str, Any]]:
+        """Runs that were imported, as `fogml.app.files.Files.told` tells of files."""
+        jobs = [(self.folder / name, _read(self.folder / name / "job.json") or {}) for name in self.names()]
+        found = [
+            place
+            for folder, job in jobs
+            if "import" in job.get("words", [])[:1]
+            for place in sorted((folder / "results").glob("*.csv"))
+        ]
+        paths = [str(place.relative_to(self.home)) for place in found]
+        return [
+            {"name": path, "path": path, "bytes": place.stat().st_size, "run": True}
+            for path, place in zip(paths, found)
+        ]
 
     def cancel(self, name: str) -> None:
         """End a job: at first by asking its command, which leaves nothing half written; again: at once."""
@@ -145,7 +153,7 @@ class Jobs:
             return
         (folder / CANCELLED).touch()
         if state == "waiting":
-            write_whole(folder / ENDED, {"status": 130, "seconds": 0.0})
+            tell(folder / ENDED, {"status": 130, "seconds": 0.0})
             return
         process = _read(folder / PROCESS)
         if process is None or not process_is_alive(process["pid"], process["started"]):

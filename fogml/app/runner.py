@@ -16,20 +16,25 @@ import time
 from pathlib import Path
 from typing import Any
 
+from fogml.json_files import write_json
+from fogml.outputs import whole_file
 from fogml.processes import process_start
 
 PROCESS, ENDED, CANCELLED = "process.json", "ended.json", "cancelled"
 
 
-def write_whole(path: Path, values: Any, *, once: bool = False) -> bool:
-    """Write JSON that is there whole or not at all; with `once`, whether it was not there before."""
-    partial = path.with_name(f"{path.name}.{os.getpid()}")
-    partial.write_text(json.dumps(values), encoding="utf-8")
-    if not once:
-        os.replace(partial, path)
-        return True
+def tell(path: Path, values: Any) -> None:
+    """Write JSON that is there whole or not at all."""
+    with whole_file(path) as partial:
+        write_json(partial, values)
+
+
+def _claim(folder: Path, process: Any) -> bool:
+    """Say that a job runs; False if that was said before."""
+    partial = folder / f"{PROCESS}.{os.getpid()}"
+    write_json(partial, process)
     try:
-        os.link(partial, path)
+        os.link(partial, folder / PROCESS)
     except FileExistsError:
         return False
     finally:
@@ -43,7 +48,7 @@ def begin(folder: Path) -> None:
     pid = os.fork()
     if pid:
         process = {"pid": pid, "started": process_start(pid), "child": None}
-        os.write(told, b"1" if write_whole(folder / PROCESS, process, once=True) else b"0")
+        os.write(told, b"1" if _claim(folder, process) else b"0")
         return
     os.setsid()
     if os.read(heard, 1) == b"1":
@@ -64,12 +69,12 @@ def run(folder: Path) -> None:
         child = subprocess.Popen(
             command, cwd=folder.parents[1], stdin=subprocess.DEVNULL, stdout=out, stderr=err
         )
-        write_whole(folder / PROCESS, {**process, "child": child.pid})
+        tell(folder / PROCESS, {**process, "child": child.pid})
         if (folder / CANCELLED).exists():
             with contextlib.suppress(ProcessLookupError):
                 child.terminate()
         status = child.wait()
-    write_whole(folder / ENDED, {"status": status, "seconds": time.monotonic() - began})
+    tell(folder / ENDED, {"status": status, "seconds": time.monotonic() - began})
 
 
 if __name__ == "__main__":

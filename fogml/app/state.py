@@ -6,12 +6,14 @@ import secrets
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
 from fogml.app.files import Files
 from fogml.app.jobs import Jobs
 
+OFFERED = ("model", "models", "twin", "file", "profile", "manifest", "fleet")
+"""Kinds of inputs that the page offers as lists; runs are chosen beside their names."""
 WordsOf = Callable[[str, Mapping[str, Any], Callable[[str], Sequence[str]], str], list[str]]
 
 
@@ -50,13 +52,30 @@ class App:
 
     def words(self, command: str, values: Mapping[str, Any], results: str) -> list[str]:
         """The words of a command line, with paths of this folder alone."""
-        known = {
-            "run": lambda: self.files.paths(runs=True),
-            "file": lambda: self.files.paths(runs=False),
-            "model": self.jobs.models,
-            "twin": lambda: [*self.jobs.twins(), *self.files.paths(runs=False)],
-        }
-        return self._words_of(command, values, lambda takes: known[takes](), results)
+        return self._words_of(command, values, self.offered, results)
+
+    def files_told(self) -> list[dict[str, Any]]:
+        """Files that were dropped, and runs that were imported."""
+        return [*self.files.told(), *self.jobs.runs()]
+
+    def offered(self, takes: str) -> list[str]:
+        """Paths that an input of a kind may name."""
+        others = self.files.paths(runs=False)
+        match takes:
+            case "run":
+                return [one["path"] for one in self.files_told() if one["run"]]
+            case "model":
+                return _folders(self.jobs.written("**/model/model.json"))
+            case "models":
+                return [*self.offered("model"), *_folders(self.offered("fleet"))]
+            case "fleet":
+                return self.jobs.written("fleet.json")
+            case "twin":
+                return [*self.jobs.written("twin.yaml"), *others]
+            case "manifest":
+                return [*others, *self.files.paths(runs=True)]
+            case _:
+                return others
 
     def idle(self) -> bool:
         """Whether no page has asked for as long as allowed, and no job runs or waits."""
@@ -64,3 +83,7 @@ class App:
         if idle is None or time.monotonic() - self.asked_at < idle:
             return False
         return all(self.jobs.state(name) not in ("waiting", "running") for name in self.jobs.names())
+
+
+def _folders(paths: Sequence[str]) -> list[str]:
+    return [str(PurePosixPath(path).parent) for path in paths]

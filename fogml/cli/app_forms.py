@@ -12,18 +12,21 @@ from fogml.cli.settings import SHIPPED, Settings, given_settings
 from fogml.errors import InputError, quoted
 
 INPUTS: Mapping[str, Mapping[str, str]] = {
+    "import": {"file": "run", "profile": "profile"},
     "inspect": {"runs": "run"},
     "noise": {"run": "run"},
     "train": {"runs": "run", "test": "run", "noise": "run"},
     "compare": {"runs": "run", "test": "run", "noise": "run"},
     "diagnose": {"runs": "run", "held_out": "run", "noise": "run", "twin": "twin"},
     "export": {"model": "model", "train": "run", "matrix": "file"},
-    "monitor": {"model": "model", "runs": "run"},
+    "monitor": {"model": "models", "runs": "run"},
+    "fleet": {"manifest": "manifest", "prior": "fleet", "twin": "twin", "acceptance_limits": "file"},
 }
 """Commands of the app in the order of work, and what each of their settings that name files takes."""
 LABELS = {
     ("train", "runs"): "train",
     ("compare", "runs"): "train",
+    ("import", "file"): "read",
     ("diagnose", "runs"): "fit",
     ("monitor", "runs"): "new",
     ("train", "test"): "judge",
@@ -32,7 +35,10 @@ LABELS = {
 }
 FIXED = {"monitor": ["--store", "store"]}
 """What the app adds: units in service share one store in the app's folder."""
-LEFT_OUT = frozenset({"out", "store"})
+LEFT_OUT = frozenset({"out", "store", "cluster", "track"})
+"""Settings that the app makes itself, or that ask another machine."""
+NAMED = frozenset({"twin", "profile"})
+"""What an input takes that a name may stand for: what ships is listed beside the folder's."""
 
 
 def forms() -> list[dict[str, Any]]:
@@ -55,7 +61,7 @@ def _form(command: str, settings: type[Settings]) -> dict[str, Any]:
             "label": LABELS.get((command, key), key.replace("_", " ")),
             "help": given[key].help,
             "several": "list" in str(settings.model_fields[key].annotation),
-            "known": list(given[key].known_names()) if takes == "twin" else [],
+            "known": list(given[key].known_names()) if takes in NAMED else [],
         }
         for key, takes in INPUTS[command].items()
     ]
@@ -131,12 +137,14 @@ def words_of(
             named += [name, *paths] if given[key].spread else [w for path in paths for w in (name, path)]
     for key, field in form.items():
         named += _setting(key, given[key], field, values.get(key))
-    return [command, *places, *named, *FIXED.get(command, []), "--out", results]
+    # Of a draft --out names the file itself.
+    out = f"{results}/profile.yaml" if command == "import" and values.get("draft") else results
+    return [command, *places, *named, *FIXED.get(command, []), "--out", out]
 
 
 def _checked(path: str, takes: str, known: Callable[[str], Sequence[str]], given: Given) -> str:
     """A path that the app offers, or a name that ships."""
-    ships = given.known_names() if path.startswith(SHIPPED) or takes == "twin" else ()
+    ships = given.known_names() if path.startswith(SHIPPED) or takes in NAMED else ()
     if path not in ships and path not in known(takes):
         raise InputError(f"{quoted(path)} is no {takes} of the app's folder; choose one that is listed")
     return str(PurePosixPath(path)) if path not in ships else path

@@ -135,6 +135,64 @@ def test_from_files_to_firmware_past_a_bad_file_and_a_killed_server(browser: Bro
     app.kill()
 
 
+def pick(page: Opened, key: str, value: str) -> None:
+    """Choose from a list, once it holds the value."""
+    field = f"document.querySelector('#choices select[data-key={key}], #settings select[data-key={key}]')"
+    wait(page, f"{field} && [...{field}.options].some((one) => one.value === {value!r})")
+    page.tell(f"{field}.value = {value!r}; {field}.dispatchEvent(new Event('change'))")
+    wait(page, f"document.getElementById('line').textContent.includes({value!r})")
+
+
+def switch_off(page: Opened, key: str) -> None:
+    """Untick a setting that is ticked."""
+    page.tell(f"document.querySelector('#settings input[data-key={key}]').click()")
+    wait(page, f"document.getElementById('line').textContent.includes('--no-{key.replace('_', '-')}')")
+
+
+def test_from_a_logger_s_file_to_a_diagnosis_and_a_fleet(browser: Browser, tmp_path: Path) -> None:
+    """What is imported is a run as any other; a table of units finds the runs beside it."""
+    write_runs(tmp_path)
+    rows = csv_text(2).splitlines()[1:]
+    (tmp_path / "log.csv").write_text("Timestamp;Rate;Temp\n" + "\n".join(rows).replace(",", ";") + "\n")
+    (tmp_path / "logger.yaml").write_text(
+        "schema: fogml.import/1\ndescription: one axis\nseparator: semicolon\nsignature: Temp\ncolumns:\n"
+        "  time: {source: Timestamp, unit: s}\n  gyro: {unit: deg/h}\n  T: {source: Temp, unit: degC}\n"
+        "axes: {x: Rate}\nfacts: {unit: FOG-1}\n"
+    )
+    table = "unit,job,train,test,axis\nFOG-1,train,a.csv,b.csv,x\nFOG-1,diagnose,a.csv,b.csv,x\n"
+    (tmp_path / "line.csv").write_text(table)
+    app = Running(tmp_path / "lab")
+    page = browser.open_at(app.address)
+    wait(page, "document.querySelector('[data-command=import]')")
+    choose(page, *sorted(tmp_path.glob("*.csv")), *sorted(tmp_path.glob("*.yaml")))
+    wait(page, "document.querySelectorAll('#files tbody tr').length === 7")
+    click(page, "[data-command=import]")
+    pick(page, "profile", "files/logger.yaml")
+    run_it(page, "import", file=["log.csv"])
+    job(page, "0001", "done")
+    imported = "jobs/0001/results/log-x.csv"
+    wait(page, f"document.querySelector('[data-file=\"{imported}\"]')")
+
+    click(page, "[data-command=diagnose]")
+    switch_off(page, "next_run")
+    click(page, f'[data-key=held_out][data-file="{imported}"]')
+    line = run_it(page, "diagnose", runs=["a.csv"])
+    assert f"--held-out {imported}" in line
+    job(page, "0002", "done")
+    names = "[...document.querySelectorAll('[data-job=\"0002\"] .results a')].map((a) => a.textContent)"
+    wait(page, f"{names}.includes('gap.html')")
+
+    click(page, "[data-command=fleet]")
+    pick(page, "manifest", "files/line.csv")
+    switch_off(page, "next_run")
+    run_it(page, "fleet")
+    wait(page, "document.querySelector('[data-job=\"0003\"][data-state=done]')")
+    wait(page, "document.querySelector('[data-job=\"0003\"] .results a.page')")
+    assert not page.tell(f"({LAYOUT})(false)")
+    assert not page.console
+    app.kill()
+
+
 def test_two_hundred_units_are_found_and_chosen(browser: Browser, tmp_path: Path) -> None:
     files = tmp_path / "lab" / "files"
     files.mkdir(parents=True)

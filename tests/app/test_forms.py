@@ -14,7 +14,11 @@ KNOWN = {
     "run": ["files/a.csv", "files/b c.csv"],
     "model": ["jobs/0001/results/model"],
     "file": ["files/m.yaml"],
+    "models": ["jobs/0001/results/model"],
     "twin": ["jobs/0002/results/twin.yaml"],
+    "profile": ["files/logger.yaml"],
+    "manifest": ["files/line.csv"],
+    "fleet": ["jobs/0004/results/fleet.json"],
 }
 
 
@@ -44,7 +48,7 @@ def test_every_form_gives_a_command_line_that_is_taken(command: str) -> None:
     for one in form["inputs"]:
         held = told[one["key"]]
         assert list(held if isinstance(held, (tuple, list)) else [held]) == values[one["key"]], one
-    assert told["out"] == "jobs/0003/results"
+    assert told["out"] == "jobs/0003/results" + "/profile.yaml" * (command == "import")
     changed = [one["key"] for one in form["settings"] if told[one["key"]] in (None, ())]
     assert not changed
     # What is as it is without is not said.
@@ -55,7 +59,8 @@ def test_every_form_gives_a_command_line_that_is_taken(command: str) -> None:
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "files/../../x.csv", "files/none.csv", "a.csv", "--out=x"])
 def test_paths_are_those_that_are_listed(path: str) -> None:
-    for command, key in (("inspect", "runs"), ("export", "model"), ("diagnose", "twin"), ("train", "noise")):
+    inputs = "fleet manifest, import profile, inspect runs, export model, diagnose twin, train noise"
+    for command, key in (one.split() for one in inputs.split(", ")):
         with pytest.raises(InputError, match="choose one that is listed"):
             words(command, **{key: [path]})
 
@@ -64,8 +69,9 @@ def test_values_are_no_options_and_other_settings_are_refused() -> None:
     assert settings(words("train", features="--out=/tmp/x"))["features"] == "--out=/tmp/x"
     assert words("diagnose", twin=["nominal"])[1:3] == ["--twin", "nominal"]
     assert "shipped:thermal-cycle-1-y" in words("inspect", runs=["shipped:thermal-cycle-1-y"])
-    for key in ("out", "config", "store", "nothing"):
+    others = "monitor out, monitor store, fleet cluster, fleet track, train config, train nothing"
+    for command, key in (one.split() for one in others.split(", ")):
         with pytest.raises(InputError, match="no setting"):
-            words("monitor", **{key: "x"})
+            words(command, **{key: "x"})
     with pytest.raises(InputError, match="no command"):
-        words("fleet")
+        words("blind")

@@ -1,7 +1,7 @@
 "use strict";
 // The server holds everything; a page shows what it says once a second, so that any number of pages agree.
 const byId = (id) => document.getElementById(id);
-const state = { forms: [], files: [], jobs: [], models: [], twins: [], command: "inspect", values: {}, open: new Set(), shown: {} };
+const state = { forms: [], files: [], jobs: [], offered: {}, command: "inspect", values: {}, open: new Set(), shown: {} };
 
 function element(name, attributes, ...children) {
   const made = document.createElement(name);
@@ -67,12 +67,12 @@ function drawFiles() {
   }), element("th", { class: "size" }, "size"), element("th", {}, ""));
   const rows = shown.map((file) => element("tr", {}, element("td", { class: "name" }, file.name),
     ...inputs.map((input) => element("td", { class: "use" }, ...(file.run ? [element("input", {
-      type: "checkbox", checked: chosen(input.key).includes(`files/${file.name}`), "data-file": file.name, "data-key": input.key,
-      "aria-label": `${file.name}: ${input.label}`, onchange: (event) => choose(input, `files/${file.name}`, event.target.checked),
+      type: "checkbox", checked: chosen(input.key).includes(file.path), "data-file": file.name, "data-key": input.key,
+      "aria-label": `${file.name}: ${input.label}`, onchange: (event) => choose(input, file.path, event.target.checked),
     })] : []))),
     element("td", { class: "size" }, sizeWords(file.bytes)),
-    element("td", {}, element("button", { type: "button", class: "small plain", "aria-label": `Remove ${file.name}`,
-      onclick: () => removeFile(file.name) }, "×"))));
+    element("td", {}, ...(file.path === file.name ? [] : [element("button", { type: "button", class: "small plain",
+      "aria-label": `Remove ${file.name}`, onclick: () => removeFile(file.name) }, "×")]))));
   byId("files").replaceChildren(...(state.files.length ? [element("table", {}, element("thead", {}, head), element("tbody", {}, ...rows))] : []));
 }
 
@@ -86,7 +86,7 @@ function choose(input, path, wanted) {
 }
 
 function chooseAll(key, runs) {
-  const paths = runs.map((one) => `files/${one.name}`);
+  const paths = runs.map((one) => one.path);
   const all = paths.every((path) => chosen(key).includes(path));
   valuesNow()[key] = all ? chosen(key).filter((path) => !paths.includes(path)) : [...new Set([...chosen(key), ...paths])];
   drawFiles();
@@ -110,11 +110,13 @@ function drawForm() {
   showLine();
 }
 
+const NONE = { model: ["none yet: train one first", "choose a model"], models: ["none yet: train one first", "choose a model, or a fleet"], manifest: ["none yet: drop a table of units", "choose a table of units"],
+  profile: ["none", "choose a profile, or tick draft"] };
+
 function drawChoices() {
-  const offered = { model: state.models, twin: state.twins, file: state.files.filter((one) => !one.run).map((one) => `files/${one.name}`) };
   byId("choices").replaceChildren(...form().inputs.filter((input) => input.takes !== "run").map((input) => {
-    const names = [...input.known, ...offered[input.takes]];
-    const none = input.takes === "model" ? (names.length ? "choose a model" : "none yet: train one first") : "as it is";
+    const names = [...input.known, ...state.offered[input.takes]];
+    const none = NONE[input.takes]?.[names.length ? 1 : 0] ?? "as it is";
     const held = chosen(input.key)[0] || "";
     const list = element("select", { "data-key": input.key, onchange: (event) => { valuesNow()[input.key] = event.target.value ? [event.target.value] : []; showLine(); } },
       element("option", { value: "" }, none), ...names.map((name) => element("option", { value: name, selected: name === held }, name)));
@@ -213,7 +215,7 @@ async function refresh(first = false) {
     if (byId("fault").dataset.away) { fault(""); delete byId("fault").dataset.away; }
     if (same === last) return;
     last = same;
-    const files = JSON.stringify([told.files, told.models, told.twins]) !== JSON.stringify([state.files, state.models, state.twins]);
+    const files = JSON.stringify([told.files, told.offered]) !== JSON.stringify([state.files, state.offered]);
     const ended = state.jobs.filter((old) => told.jobs.some((job) => job.name === old.name && job.state !== old.state)).map((job) => job.name);
     Object.assign(state, told);
     byId("place").textContent = `${told.folder} · fogml ${told.version}`;
