@@ -233,11 +233,13 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     terminal.table(f"{title} ({averaging})", ["run", "bias", "bias stability", "range", "rms"], rows)
     if judgement.beside:
         from fogml.report.tables import beside_table
+        from fogml.validation.advice import which_to_use
 
         table = beside_table(judgement)
         assert table is not None
         heads = [heading.lower() for heading, _, _ in table.columns]
         terminal.table("Beside other models, rms [deg/h]", heads, [list(row.cells) for row in table.rows])
+        terminal.say(which_to_use(judgement)[1])
     terminal.say(own_noise_by(worst_run(judgement.test)))
     for run in judgement.test:
         for name in _TOLD_BY_SOME:

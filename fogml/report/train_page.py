@@ -31,7 +31,7 @@ from fogml.report.verdict import (
     worst_run,
 )
 from fogml.report.words import averages, listed, number, percent, plural, stated, unit_of
-from fogml.validation.advice import advice_on
+from fogml.validation.advice import advice_on, which_to_use
 from fogml.validation.results import Judgement, RunJudgement
 
 
@@ -81,6 +81,7 @@ def train_page(
         sections=[_section(index, run, judgement) for index, run in enumerate(judgement.test, start=1)],
         test_table=runs_table(judgement.test),
         beside=beside_table(judgement),
+        which=which_to_use(judgement)[1],
         repeatability=repeatability_table(judgement.repeatability),
         unseen=unseen(judgement),
         train_table=runs_table(

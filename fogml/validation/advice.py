@@ -29,6 +29,9 @@ class Asked:
         due: a hundredth, as less is a sample or two at the ends of a range.
     mostly_outside
         The same from which on the judgement is of another model than the one in use: over half.
+    beside
+        Share of the rms on the worst test run by which a model judged beside has to leave less before it is
+        named instead: two fits of one unit differ by as much from run to run.
     coverage
         Share of a test run's averages that the model's 90 % interval holds, below which the interval can't
         be relied on. Averages that follow each other are alike, so that a run may hold 0.8 by chance.
@@ -36,6 +39,7 @@ class Asked:
 
     outside: float = 0.01
     mostly_outside: float = 0.5
+    beside: float = 0.05
     coverage: float = 0.8
 
 
@@ -99,6 +103,26 @@ def advice_on(judgement: Judgement, asked: Asked | None = None) -> Advice:
     return Advice(gravest.grade, gravest.brief, tuple(one.sentence for one in found), gravest.next_step)
 
 
+def which_to_use(judgement: Judgement, asked: Asked | None = None) -> tuple[str | None, str]:
+    """The model judged beside that is the better one, None if there is none, and that in a sentence.
+
+    By the worst test run of each, on the same rows.
+    """
+    margin = (asked or Asked()).beside
+    own = max(run.after.rms for run in judgement.test)
+    left = {name: max(run.after.rms for run in runs) for name, runs in judgement.beside.items()}
+    if not left:
+        return None, ""
+    best = min(left, key=lambda name: left[name])
+    kind = judgement.model["kind"]
+    told = f"{best} leaves {left[best]:.3g} deg/h rms on its worst test run, {kind} {own:.3g}"
+    if left[best] < (1.0 - margin) * own:
+        return best, f"Use {best}: {told}."
+    if own < (1.0 - margin) * left[best]:
+        return None, f"Use this model rather than {best}: {told}."
+    return None, f"Use either: {told}, which is no difference that another run would be sure to repeat."
+
+
 def coverage(run: RunJudgement) -> float | None:
     """Share of a run's averages that lie within the model's 90 % interval; None where it states none."""
     series = run.series
@@ -112,6 +136,9 @@ def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     yield from _one_way(judgement)
     for run in judgement.test:
         yield from _of_run(run, asked)
+    better, told = which_to_use(judgement, asked)
+    if better is not None:
+        yield Reason("do_not_use", f"{better} leaves less", told, f"Train {better} in its place.")
     yield from _limits(judgement)
     yield from _one_temperature(judgement)
     yield from _another_unit(judgement)

@@ -356,6 +356,9 @@ def test_a_found_cause_is_compensated(runs, diagnosed, gap, tmp_path, monkeypatc
     assert report["model"]["causes"].keys() == {"thermal_hysteresis"}
     assert report["beside"]["auto"]["test"][0]["rows_used"] == report["test"][0]["rows_used"]
     assert "Beside other models" in printed.stdout
+    # Which of the two to use stands on the terminal and on the page.
+    assert "Use this model rather than auto" in printed.stdout
+    assert "Use this model rather than auto" in (tmp_path / "out" / "report.html").read_text()
     run_program("export", tmp_path / "out", "--to", "json", "-o", tmp_path / "json")
 
 

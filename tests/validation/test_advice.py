@@ -10,7 +10,7 @@ import pytest
 
 from fogml.report.verdict import advice_words
 from fogml.runs.findings import Finding
-from fogml.validation.advice import Asked, advice_on, coverage
+from fogml.validation.advice import Asked, advice_on, coverage, which_to_use
 from fogml.validation.report_json import judgement_json
 from fogml.validation.results import Judgement, RunJudgement
 from tests.report.judgements import judgement
@@ -74,6 +74,26 @@ def test_each_reason_alone_decides(make: Callable[[], Judgement], grade: str, br
     found = advice_on(judged)
     assert (found.grade, found.brief) == (grade, brief)
     assert found.next_step
+
+
+def beside(times: float) -> Judgement:
+    """A judgement beside another model that leaves so many times as much."""
+    base = replace(judgement(), design_index=None, limits=())
+    (run,) = base.test
+    other = replace(run, after=replace(run.after, rms=times * run.after.rms))
+    return replace(base, beside={"auto": (other,)})
+
+
+def test_of_two_models_the_one_that_leaves_less_is_named() -> None:
+    better = advice_on(beside(0.9))
+    assert (better.grade, better.brief) == ("do_not_use", "auto leaves less")
+    assert better.reasons[0].startswith("Use auto: ") and better.next_step == "Train auto in its place."
+    assert advice_on(beside(1.1)).grade == "use"
+    assert which_to_use(beside(1.1))[1].startswith("Use this model rather than auto")
+    for times in (0.97, 1.03):
+        assert which_to_use(beside(times))[0] is None and advice_on(beside(times)).grade == "use"
+        assert which_to_use(beside(times))[1].startswith("Use either")
+    assert which_to_use(judgement()) == (None, "")
 
 
 def test_another_unit_needs_care() -> None:
