@@ -38,6 +38,14 @@ class MonitorSettings(Settings):
     false_alarm_every: Annotated[
         float, option("Least mean number of a unit's runs until a false alarm.", metavar="RUNS")
     ] = Field(1000.0, ge=1.0)
+    wander: Annotated[
+        bool,
+        option(
+            "Take a bias that wanders as flicker for no change; without, smaller steps are found, and "
+            "wandering raises alarms.",
+            "--wander/--no-wander",
+        ),
+    ] = True
     bias_limit: Annotated[
         float | None,
         option("Change of the bias that asks for a calibration (the model's interval).", metavar="DEG/H"),

@@ -14,6 +14,7 @@ from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.json_files import finite_json, write_json
 from fogml.models.base import DriftModel
+from fogml.monitor.evidence import ChangePrior
 from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.record import RunRecord, record_run
 from fogml.monitor.store import open_store
@@ -42,11 +43,17 @@ def monitor_and_write(settings: MonitorSettings, terminal: Terminal) -> bool:
         held = store.records()
     if not held:
         raise InputError("no run is given, and the store holds none; name the runs to monitor")
-    units = watch(held, runs_between_false_alarms=settings.false_alarm_every, bias_limit=settings.bias_limit)
+    units = watch(
+        held,
+        runs_between_false_alarms=settings.false_alarm_every,
+        bias_limit=settings.bias_limit,
+        prior=ChangePrior() if settings.wander else ChangePrior().steady(),
+    )
     values = finite_json(
         monitor_json(
             units,
             runs_between_false_alarms=settings.false_alarm_every,
+            wander=settings.wander,
             added=added,
             repeated=len(records) - added,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -46,6 +46,10 @@ class ChangePrior:
     between: tuple[float, ...] = (0.0, 0.1, 0.5, 0.9, 1.0)
     wander: tuple[float, ...] = (0.0, 1 / 16, 1 / 4, 1.0)
     longest_wander: float = 1000.0
+
+    def steady(self) -> ChangePrior:
+        """The same where figures are known not to wander between runs."""
+        return replace(self, wander=(0.0,))
 
 
 def flicker_covariance(t: FloatArray, longest: float) -> FloatArray:

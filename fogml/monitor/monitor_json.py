@@ -16,7 +16,12 @@ SCHEMA = "fogml.monitor/1"
 
 
 def monitor_json(
-    units: Sequence[UnitWatch], *, runs_between_false_alarms: float, added: int, repeated: int
+    units: Sequence[UnitWatch],
+    *,
+    runs_between_false_alarms: float,
+    wander: bool = True,
+    added: int,
+    repeated: int,
 ) -> dict[str, Any]:
     """What is known of units in service.
 
@@ -26,12 +31,15 @@ def monitor_json(
         As `fogml.monitor.watch.watch` gives them.
     runs_between_false_alarms
         Least mean number of a unit's runs until a false alarm.
+    wander
+        Whether a bias that wanders counted as no change.
     added, repeated
         Runs that are new, and runs that the store held before.
     """
     return {
         "schema": SCHEMA,
         "runs_between_false_alarms": runs_between_false_alarms,
+        "wander": wander,
         "runs": {"added": added, "repeated": repeated},
         "figures": dict(FIGURES),
         "units": [_unit(unit) for unit in units],

@@ -38,6 +38,12 @@ def monitor_page(monitor: Mapping[str, Any]) -> str:
         f"{plural(len(units), 'unit')} with {plural(runs, 'run')}; where runs are alike and "
         f"independent, one in {every:g} gives a false alarm, at most."
     )
+    verdict.append(
+        "A bias that wanders as flicker counts as no change, so that steps of a few deviations are found "
+        "late or not at all; --no-wander finds them."
+        if monitor["wander"]
+        else "The bias is taken not to wander from run to run (--no-wander): one that does raises alarms."
+    )
     return render(
         "monitor.html",
         title="Units in service",

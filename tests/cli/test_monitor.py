@@ -37,6 +37,10 @@ def test_a_unit_that_changes_is_noticed_once_and_for_all(service, tmp_path, invo
     # The same again, with no run: what the store holds.
     again = invoke("monitor", "--config", out / "monitor.config.yaml", status=1)
     assert "The bias moves by" in again.stdout
+    assert "--no-wander finds them" in (out / "monitor.html").read_text()
+    steady = invoke_json("monitor", model, "-o", out, "--no-wander", status=1)
+    assert told["wander"] and not steady["wander"]
+    assert steady["units"][0]["alarms"][0]["onset"] == "FOG-1-09.csv"
     assert len(list((out / "units").iterdir())) == 1
 
 

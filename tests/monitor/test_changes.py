@@ -12,6 +12,7 @@ from scipy.stats import multivariate_normal
 from fogml.errors import InputError
 from fogml.monitor.changes import change_chart
 from fogml.monitor.evidence import ChangePrior, flicker_covariance
+from fogml.signals.random_noise import flicker_noise
 
 
 def _marginal(y, column, size, covariance):
@@ -102,6 +103,22 @@ def test_a_step_is_found_where_it_is(size):
     assert held.mean() > 0.85
     assert within.mean() > 0.7
     assert np.median(delay) <= (6 if size == 4.0 else 1)
+
+
+def test_where_nothing_wanders_small_steps_are_found_and_where_it_does_alarms_are_raised():
+    rng = np.random.default_rng(6)
+    found = dict.fromkeys(("step", "step, steady", "wandering, steady"), 0)
+    for _ in range(20):
+        level, wandering = rng.normal(size=30), flicker_noise(rng, 30, 1.0)
+        level[15:] += 3.0
+        for name, values, prior in (
+            ("step", level, ChangePrior()),
+            ("step, steady", level, ChangePrior().steady()),
+            ("wandering, steady", wandering, ChangePrior().steady()),
+        ):
+            found[name] += bool(change_chart({"level": values}, np.arange(30.0), 1000.0, prior).changes)
+    assert found["step, steady"] >= 18 > 12 >= found["step"]
+    assert found["wandering, steady"] >= 3
 
 
 def test_a_ramp_is_told_from_a_step_and_runs_that_do_not_tell_are_passed_over():
