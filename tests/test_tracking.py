@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import sys
 from types import ModuleType, SimpleNamespace
 from typing import Any
@@ -117,6 +118,22 @@ def test_a_fleet_tells_of_its_units_and_its_results_are_the_same(store, tmp_path
     # Done before: nothing is told twice.
     run_program(*common, tmp_path / "out", "--quiet", "--track", place)
     assert len(store[place]) == 2
+
+
+def test_mlflow_itself_keeps_what_it_is_told(tmp_path, monkeypatch) -> None:
+    """Read back with MLflow's own client, where it is installed."""
+    mlflow = pytest.importorskip("mlflow", reason="MLflow is not installed: pip install -e '.[mlflow]'")
+    manifest, store = write_fleet(tmp_path, 2), str(tmp_path / "mlruns")
+    common = ("fleet", manifest, "--model", "mean", "--quiet", "--out", tmp_path / "out", "--track", store)
+    run_program(*common)
+    run_program(*common)
+    client = mlflow.MlflowClient(tracking_uri=store)
+    experiment = client.get_experiment_by_name("fogml fleet")
+    runs = client.search_runs([experiment.experiment_id])
+    assert sorted(run.data.params["unit"] for run in runs) == ["FOG-000", "FOG-001"]
+    assert {run.info.status for run in runs} == {"FINISHED"}
+    told = json.loads((tmp_path / "out" / "fleet.json").read_text())["units"]
+    assert sorted(run.data.metrics["after"] for run in runs) == sorted(unit["after"] for unit in told)
 
 
 def test_without_mlflow_it_is_said_before_any_work(monkeypatch, tmp_path) -> None:
