@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+from pathlib import Path
+from shutil import which
+
 import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.runs.simulated_output import at_times_of, is_simulator_output, read_gnss_ins_sim
+from tests.cli.conftest import run_program
 
 
 def write_gnss(folder, seeds=(0, 1), unit="deg/s", rows=401):
@@ -63,3 +70,17 @@ def test_what_is_wrong_is_named(tmp_path):
     write_gnss(tmp_path, seeds=(0,), unit="mdps")
     with pytest.raises(InputError, match="unit 'mdps'"):
         read_gnss_ins_sim(tmp_path, "x")
+
+
+@pytest.mark.skipif(which("octave") is None, reason="Octave is not installed")
+def test_the_guide_s_example_for_matlab_runs_in_octave(tmp_path):
+    guide = (Path(__file__).parents[2] / "docs" / "closing-the-loop.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```matlab\n(names = .*?)```", guide, flags=re.DOTALL)
+    (tmp_path / "model.m").write_text(example)
+    run_program("simulate", "--programme", "four-positions", "--sample", "10", "-o", tmp_path / "run-a.csv")
+    command = ["octave", "--no-gui", "--quiet", "--norc", "model.m"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True, timeout=60)
+    own = tmp_path / "own-a.csv"
+    run_program("replay", tmp_path / "matlab-a.csv", tmp_path / "run-a.csv", "-o", own)
+    columns = read_run(own).columns
+    np.testing.assert_allclose(columns["replayed"], 9.66 + 2e-3 * (columns["T_in"] - 25.0), rtol=1e-9)
