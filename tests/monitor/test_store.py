@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import numpy as np
 import pytest
 
-from experiments.faults.postgres import free_port
+from experiments.faults.postgres import free_port, postgres, program, restart
 from fogml.errors import InputError
 from fogml.monitor.record import RunRecord
 from fogml.monitor.store import FILE, open_store
@@ -85,6 +87,27 @@ def test_a_database_of_several_stations(database):  # noqa: F811
     same(first.records(), others(4))
     first.close()
     second.close()
+
+
+def test_a_database_that_ends_as_by_a_crash_and_comes_back_has_every_run_once():
+    if program("initdb") is None:
+        pytest.skip("PostgreSQL is not installed (.ci/run installs it): no initdb found")
+    # Not pytest's own folder: its parents are closed to the user that the server runs as.
+    with TemporaryDirectory(prefix="fogml-postgres-") as name, ThreadPoolExecutor(1) as pool:
+        folder = Path(name)
+        folder.chmod(0o755)
+        with postgres(folder / "server") as url:
+            store = open_store(url, 60.0)
+            added = store.add(others(2))
+            away = pool.submit(restart, folder / "server")
+            count = 2
+            while not away.done():
+                count += 1
+                added += store.add(others(count))
+            away.result()
+            same(store.records(), others(count))
+            assert added == count > 2
+            store.close()
 
 
 def test_a_store_that_is_away_is_waited_for_and_then_said(tmp_path):
