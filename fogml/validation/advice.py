@@ -134,13 +134,13 @@ def coverage(run: RunJudgement) -> float | None:
 def _reasons(judgement: Judgement, asked: Asked) -> Iterator[Reason]:
     yield from _not_judged(judgement)
     yield from _one_way(judgement)
+    yield from _one_temperature(judgement)
     for run in judgement.test:
         yield from _of_run(run, asked)
     better, told = which_to_use(judgement, asked)
     if better is not None:
         yield Reason("do_not_use", f"{better} leaves less", told, f"Train {better} in its place.")
     yield from _limits(judgement)
-    yield from _one_temperature(judgement)
     yield from _another_unit(judgement)
 
 
@@ -230,8 +230,9 @@ def _limits(judgement: Judgement) -> Iterator[Reason]:
 def _one_temperature(judgement: Judgement) -> Iterator[Reason]:
     held = _temperatures(judgement.train)
     if held and _span(held) < LEAST_SPAN_DEGC:
+        used = _temperatures(judgement.test)
         yield Reason(
-            "use_with_care",
+            "do_not_use" if used and _span(used) >= LEAST_SPAN_DEGC else "use_with_care",
             "trained at one temperature",
             f"Temperature spans {_span(held):.2g} degC in training: what is compensated holds at "
             f"{float(np.mean(held[0])):.3g} degC alone.",

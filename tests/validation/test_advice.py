@@ -37,6 +37,13 @@ def narrow() -> Judgement:
     return replace(base, train=(replace(run, series=flat),))
 
 
+def used_there(judged: Judgement) -> Judgement:
+    """A judgement whose test run stays at the temperature trained at."""
+    (run,), (trained,) = judged.test, judged.train
+    kept = replace(run.series, temperature=trained.series.temperature)
+    return replace(judged, test=(replace(run, series=kept),))
+
+
 def overconfident() -> Judgement:
     base = judgement()
     (run,) = base.test
@@ -64,7 +71,13 @@ def test_nothing_against_is_use() -> None:
         (lambda: judgement(outside=0.7), "do_not_use", "70% of b.csv is outside of what was trained"),
         (lambda: judgement(limit=1e-3), "do_not_use", "rms over its limit"),
         (overconfident, "use_with_care", "its interval does not hold on b.csv"),
-        (narrow, "use_with_care", "trained at one temperature"),
+        (narrow, "do_not_use", "trained at one temperature"),
+        (lambda: used_there(narrow()), "use_with_care", "trained at one temperature"),
+        (
+            lambda: replace(narrow(), test=judgement(left=3.0).test),
+            "do_not_use",
+            "trained at one temperature",
+        ),
     ],
 )
 def test_each_reason_alone_decides(make: Callable[[], Judgement], grade: str, brief: str) -> None:
