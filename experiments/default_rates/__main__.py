@@ -162,7 +162,7 @@ Data: **synthetic** (units drawn by `experiments/synthetic_world.py`, noise 0.1 
 of {SAMPLE_S:.0f} s; every other unit has a ripple over temperature that no cubic follows). `auto` is
 trained on one cycle at 1 °C/min, or on three at 0.5, 1 and 2 °C/min, and used at 0.4, 0.7, 1.5 and
 3 °C/min. The rule of the choice at one rate was set with units {IN_VIEW} in view
-(some of them are here) and judged once on the fresh ones ({described}). Ratios of
+(some of them are here) and judged twice on the fresh ones ({described}). Ratios of
 `auto` to another model, unit by unit and rate by rate; below 1 `auto` is better. Means are geometric.
 *Error* is against the noise-free truth; *residual* has the noise floor of {AVERAGING_S:.0f} s averages
 in it, as a recording would; *worse in* counts the cases with a ratio of errors above {1.0 + SAME:.2f}.
