@@ -1,8 +1,9 @@
 """Cubics over temperature as parameters of PX4 and ArduPilot.
 
 PX4 subtracts ``X0 + X1 d + X2 d^2 + X3 d^3`` with d = T - TREF (docs.px4.io, "Sensor Thermal Compensation").
-ArduPilot subtracts ``(g1 d + g2 d^2 + g3 d^3) 1e-6`` with d = T - 35 degC, and a constant offset that it
-finds at each start (AP_InertialSensor_tempcal.cpp). Both hold T within TMIN and TMAX, and work in rad/s.
+ArduPilot subtracts ``(g1 d + g2 d^2 + g3 d^3) 1e-6`` with d = T - 35 degC, less its value at CALTEMP, where the
+constant offset was found that it subtracts, too (AP_InertialSensor_tempcal.cpp). Both hold all temperatures
+within TMIN and TMAX, and work in rad/s.
 """
 
 from __future__ import annotations
@@ -76,8 +77,8 @@ def write(
         # Of a curve that is constant the higher powers are left out.
         cubic = np.zeros(4)
         cubic[: len(fit.coef)] = fit.coef
-        held = (cubic / share).astype(np.float32)
-        coefficients[_NUMBERS[axis]] = held.astype(np.float64)
+        held = (cubic / share).astype(np.float32).astype(np.float64)
+        coefficients[_NUMBERS[axis]] = held
         value = np.polynomial.polynomial.polyval(temperature - reference, share * held)
         off = (value - bias) / RAD_S_PER_DEG_H
         told[axis] = {
@@ -108,6 +109,8 @@ def _px4(coefficients: Mapping[int, FloatArray], low: float, high: float, refere
 
 
 def _ardupilot(coefficients: Mapping[int, FloatArray], low: float, high: float, reference: float) -> str:
+    shown = min(max(reference, low), high)
+    from_reference = (ARDUPILOT_SHARE ** np.array([0, 1, 1, 1])) * (shown - reference) ** np.arange(4)
     lines = [
         "# Gyro rate offsets over temperature, written by fogml.",
         "INS_TCAL1_ENABLE,1",
@@ -117,5 +120,5 @@ def _ardupilot(coefficients: Mapping[int, FloatArray], low: float, high: float, 
     for axis, held in coefficients.items():
         letter = "XYZ"[axis]
         lines += [f"INS_TCAL1_GYR{power}_{letter},{np.float32(held[power]):.9g}" for power in (1, 2, 3)]
-        lines.append(f"INS_GYROFFS_{letter},{np.float32(held[0]):.9g}")
-    return "\n".join([*lines, f"INS_GYR1_CALTEMP,{reference:.9g}"]) + "\n"
+        lines.append(f"INS_GYROFFS_{letter},{np.float32(from_reference @ held):.9g}")
+    return "\n".join([*lines, f"INS_GYR1_CALTEMP,{shown:.9g}"]) + "\n"

@@ -19,6 +19,7 @@ from fogml.escaping import CCode
 from fogml.export.c_float import array, box_comment, box_numbers, sensor_identifier
 from fogml.export.c_own import fixed_number, function_atoms, own_constants, own_context
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
+from fogml.export.c_thermometers import thermometer_rule
 from fogml.export.fixed_scales import (
     HELD_BITS,
     OUTPUT_BITS,
@@ -78,6 +79,7 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
     exp_terms = [round((-log(2.0)) ** n / factorial(n) * 2.0**30) for n in range(10, -1, -1)]
     rates = any(o.method not in ("first", "own") or o.unit_s for o in windows.operators)
     own = own_context(plan, windows, fixed_number, "int64_t")
+    readable = (fixed["temperature_most"] - 1.0) * 2.0**-bits  # the ends of their type are none
     return {
         "fixed": fixed,
         **own,
@@ -103,22 +105,11 @@ def fixed_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
         "evaluate": _evaluations(plan, windows, scales),
         "exponential_arguments": _exponential_arguments(windows),
         "atom_expressions": [_atom(i, plan, windows, scales) for i in range(len(plan.atoms))],
-        "rule": _thermometer(plan, bits, fixed["temperature_most"]),
+        "rule": {
+            **thermometer_rule(plan.thermometer, "INT64_C({})".format, readable, 2.0**-bits),
+            "note": f", steps of 2^-{bits}",
+        },
         "columns": _columns(plan, scales),
-    }
-
-
-def _thermometer(plan: Plan, bits: int, most: float) -> dict[str, str]:
-    """What a thermometer can show, in the steps of temperatures; the ends of their type are none."""
-    rule, step = plan.thermometer, 2.0**-bits
-    return {
-        "low": f"INT32_C({round(max(rule.low_degC / step, 1.0 - most))})",
-        "high": f"INT32_C({round(min(rule.high_degC / step, most - 1.0))})",
-        "jump": f"INT64_C({round(rule.jump_degC / step)})",
-        "rate": f"INT64_C({round(rule.rate_degC_s / step)})",
-        "continuing": f"INT64_C({round(rule.continuing_degC / step)})",
-        "spell_us": str(round(1e6 * rule.spell_s)),
-        "note": f", steps of 2^-{bits}",
     }
 
 

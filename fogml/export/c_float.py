@@ -12,6 +12,7 @@ from fogml.errors import InputError, quoted
 from fogml.escaping import CCode, c_text
 from fogml.export.c_own import function_atoms, own_constants, own_context
 from fogml.export.c_slices import slice_comment, slice_inputs, slice_numbers
+from fogml.export.c_thermometers import thermometer_rule
 from fogml.export.layout import RANGE_BITS, Layout
 from fogml.export.plan import Limits, Plan
 from fogml.features.atoms import DEAD_BAND
@@ -100,15 +101,7 @@ def float_context(plan: Plan, windows: Layout, dtype: str) -> dict[str, Any]:
             for i, operator in enumerate(windows.operators)
         },
         "atom_expressions": [_atom(i, plan, windows) for i in range(len(plan.atoms))],
-        "rule": {
-            "low": number(max(plan.thermometer.low_degC, -(2.0**RANGE_BITS))),
-            "high": number(min(plan.thermometer.high_degC, 2.0**RANGE_BITS)),
-            "jump": number(plan.thermometer.jump_degC),
-            "rate": number(plan.thermometer.rate_degC_s),
-            "continuing": number(plan.thermometer.continuing_degC),
-            "spell_us": round(1e6 * plan.thermometer.spell_s),
-            "note": "",
-        },
+        "rule": thermometer_rule(plan.thermometer, number, 2.0**RANGE_BITS) | {"note": ""},
         "columns": column_expressions(plan),
         **own_context(plan, windows, number, real),
     }

@@ -71,6 +71,27 @@ def with_offsets(run: Run, seed: int, most: float) -> tuple[Run, np.ndarray]:
 
 
 @needs_cc
+@pytest.mark.parametrize("dtype", ["float32", "q31", "q15"])
+@pytest.mark.parametrize("cycle", [None, (300, 0), (300, 36_000_000_000)])
+def test_a_thermometer_is_believed_again_after_any_change(tmp_path, dtype, cycle):
+    time = np.arange(12_000.0)
+    T = 10.0 - 50.0 * np.cos(np.pi * time / 6000.0)
+    slow = Run("slow", {"time": time, "gyro": 0.01 * T, "T": T})
+    source = c_source(Plan.of(make_model("polynomial", features="T, dT").fit(slow)), dtype, [])
+    # Cut off for three hours, or the unit off for ten or for an unknown time, while it warms by 98 degC.
+    shown, cut_off = np.repeat([-39.0, -127.0, 59.0], 300), np.zeros(900)
+    if cycle is None:
+        cut_off[300] = 10_800.0
+    else:
+        shown[300:600], cut_off[300] = 59.0, cycle[1] * 1e-6
+    stamps = np.arange(900.0) + np.cumsum(cut_off)
+    program = CProgram(source, tmp_path, flags=QUICK)
+    unit = source.numbers["fixed"]["temperature_value"] if source.numbers["fixed"] else 1.0
+    _, flag = program.steps(stamps, np.round(shown / unit)[:, None], np.zeros(900), cycle)
+    assert flag[299] == 0 and flag[300] == 2 and flag[-1] == 0
+
+
+@needs_cc
 @pytest.mark.parametrize(("name", "dtype"), [("memory", "float64"), ("polynomial", "q31")])
 def test_c_takes_offsets_as_batch_does(model_of, tmp_path, name, dtype):
     model = model_of(name)

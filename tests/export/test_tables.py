@@ -156,6 +156,25 @@ def test_parameters_subtract_the_drift(axes, tmp_path, to):
         assert offset / DEG_H == pytest.approx(wanted, abs=1e-4)
 
 
+@pytest.mark.parametrize("middle", [-5.0, 60.0])
+def test_ardupilot_holds_the_temperature_of_its_offset_within_the_range_too(tmp_path, middle):
+    time = np.arange(0.0, 3600.0, 4.0)
+    T = middle + 15.0 * np.sin(time / 500.0)
+    columns = {"time": time, "gyro": 2.0 + 0.1 * T + 0.003 * T**2, "T": T}
+    model = make_model("polynomial", features="T, T^2").fit(Run.from_columns("a", Facts(axis="x"), **columns))
+    export_tables([model], tmp_path, TableSettings("ardupilot"))
+    lines = (tmp_path / "fogml_ardupilot.param").read_text().splitlines()[1:]
+    held = {key: float(value) for key, value in (line.split(",") for line in lines)}
+
+    def polynomial(degc):  # polynomial_eval of AP_InertialSensor_tempcal.cpp
+        d = np.clip(degc, held["INS_TCAL1_TMIN"], held["INS_TCAL1_TMAX"]) - 35.0
+        return 1e-6 * sum(held[f"INS_TCAL1_GYR{power}_X"] * d**power for power in (1, 2, 3))
+
+    at = middle + np.linspace(-14.0, 14.0, 9)
+    subtracted = held["INS_GYROFFS_X"] + polynomial(at) - polynomial(held["INS_GYR1_CALTEMP"])
+    assert subtracted / DEG_H == pytest.approx(2.0 + 0.1 * at + 0.003 * at**2, abs=1e-3)
+
+
 @pytest.mark.parametrize("to", ["px4", "ardupilot"])
 def test_a_drift_that_is_constant_has_parameters(tmp_path, to):
     time = np.arange(0.0, 3600.0, 4.0)
