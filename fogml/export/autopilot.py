@@ -1,9 +1,9 @@
 """Cubics over temperature as parameters of PX4 and ArduPilot.
 
 PX4 subtracts ``X0 + X1 d + X2 d^2 + X3 d^3`` with d = T - TREF (docs.px4.io, "Sensor Thermal Compensation").
-ArduPilot subtracts ``(g1 d + g2 d^2 + g3 d^3) 1e-6`` with d = T - 35 degC, less its value at CALTEMP, where the
-constant offset was found that it subtracts, too (AP_InertialSensor_tempcal.cpp). Both hold all temperatures
-within TMIN and TMAX, and work in rad/s.
+ArduPilot subtracts ``(g1 d + g2 d^2 + g3 d^3) 1e-6`` with d = T - 35 degC, less its value at CALTEMP, where
+the constant offset was found that it subtracts, too (AP_InertialSensor_tempcal.cpp). Both hold all
+temperatures within TMIN and TMAX, and work in rad/s.
 """
 
 from __future__ import annotations

@@ -171,8 +171,9 @@ def by_axis(models: Sequence[DriftModel]) -> dict[str, DriftModel]:
         axis = model.card_.axis
         if axis not in AXES or axis in found:
             raise InputError(
-                f"export: models of several axes are told apart by their axis, x, y or z; one states "
-                f"{quoted(axis)}{' again' if axis in found else ''}"
+                "export: models of several axes are told apart by their axis, x, y or z; one states "
+                f"{'none' if axis is None else quoted(axis)}{' again' if axis in found else ''}; the "
+                "side files of its runs state it, as 'axis: x', before they are trained on"
             )
         found[axis] = model
     units = sorted({str(model.card_.unit) for model in models})

@@ -129,6 +129,7 @@ def test_one_c_file_gives_what_compensate_gives(home, trained, invoke_json, invo
     values = invoke_json("export", trained[0], "--dtype", "float64", *by, "-o", out)
     assert values["matrix"] == matrix.tolist()
     assert list(values["axes"]) == list(AXES) and "fogml_axes.c" in values["files"]
+    assert "<U+" not in (out / "fogml_axes.h").read_text()
     library = tmp_path / "axes.so"
     words = ["-std=c99", "-O1", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-shared", "-fPIC"]
     subprocess.run(["gcc", *words, out / "fogml_axes.c", "-o", library], check=True)

@@ -201,8 +201,11 @@ def test_the_loss_is_of_the_sensors_that_stand_for_the_coils_temperature(axes, t
 
 def test_what_does_not_go_together_is_told(axes, tmp_path, model_of):
     x = axes["x"][0]
+    rest = Run("rest", {"time": np.arange(200.0), "gyro": np.zeros(200), "T": np.full(200, 20.0)})
+    anonymous = make_model("mean").fit(rest)
     for models, settings, told in [
         ([x, x], TableSettings("segments"), "axis, x, y or z; one states 'x' again"),
+        ([x, anonymous], TableSettings("segments"), "one states none; the side files of its runs state it"),
         ([x], TableSettings("segments", breakpoints=1), "from 2 to 64"),
         ([x], TableSettings("segments", "q15"), "takes float32 and float64"),
         ([model_of("none")], TableSettings("px4"), "of no temperature"),
