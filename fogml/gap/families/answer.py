@@ -31,6 +31,7 @@ from fogml.gap.families.reports import (
 )
 from fogml.gap.families.shares import cause_shares
 from fogml.gap.how_far_result import Nearest, WhatIf
+from fogml.gap.noise import Noise
 from fogml.gap.preparing import check_runs, keep_back
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.twin_model import AnyModel, TwinModel
@@ -184,7 +185,10 @@ def _answer(
         for c, p in zip(judged.causes, shifted)
         if p >= LISTED
     )
-    held_out = [HeldOut(found, i, recalibrated, seed) for i in range(scene.fitted, len(scene.runs))]
+    held_out = [
+        HeldOut(found, i, recalibrated, judged.best.members, seed)
+        for i in range(scene.fitted, len(scene.runs))
+    ]
     far = tuple(h.how_far(after) for h in held_out)
     gaps = [
         GapOnRun(r, structural[i], every.on(i) - _constants_alone(every, i), 0.0)
@@ -195,9 +199,8 @@ def _answer(
     nearest = _nearest(found, what_if, judged)
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
     verdict = _verdict(named, unknown, judged.nothing)
-    shown = () if verdict == "unknown" else tuple(f for f in items)
-    from fogml.gap.noise import Noise
-
+    shown = () if verdict == "unknown" else items
+    other_plant = any(found.columns.families[m.family].kind == "plant" for m in judged.best.members)
     lies = where(
         gaps,
         stage_energies(found, energies),
@@ -231,7 +234,7 @@ def _answer(
         nearest=nearest,
         shares=shares,
         compensation=compensation_of(found, judged.causes, named),
-        headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments),
+        headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments, other_plant),
     )
 
 

@@ -19,7 +19,6 @@ from fogml.gap.noise import UNIT_FACTOR
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
-from fogml.signals.noise_fit import NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
 AVERAGING_S = 100.0
@@ -110,15 +109,21 @@ class HeldOut:
         Number of the run in the scene.
     recalibrated
         Constants alone.
+    members
+        Causes of the likeliest set: what they make is no noise.
     seed
         Of the draws behind intervals.
     """
 
-    def __init__(self, found: Inference, run: int, recalibrated: Foretold, seed: int) -> None:
+    def __init__(
+        self, found: Inference, run: int, recalibrated: Foretold, members: Sequence[Member], seed: int
+    ) -> None:
         self.run, self.rows = run, found.setting.scene.runs[run]
         self._rng = np.random.default_rng([seed, run])
         self._windows = windows = averages(self.rows)
-        model, self._noisier = _own_noise(self.rows, found.field.whitening.noise, found.points.prior)
+        nodes = [found.columns.nodes[m.node] for m in members]
+        made = [found.columns.by_run[run][:, n.start : n.stop] for n in nodes]
+        model, self._noisier = _own_noise(self.rows, found, made)
         self._before = _square(windows.of(self.rows.gap))
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
@@ -179,9 +184,10 @@ class HeldOut:
         )
 
 
-def _own_noise(rows: Rows, model: NoiseModel, prior: NoisePrior) -> tuple[NoiseModel, str]:
+def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tuple[NoiseModel, str]:
     """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
-    own, usual = white_noise(rows, prior), model.N
+    model = found.field.whitening.noise
+    own, usual = white_noise(rows, found.points.prior, made), model.N
     # The median of second differences of m rows is told to about 1.4 over the root of m.
     chance = 3.0 * 1.4 / math.sqrt(len(rows))
     if abs(math.log(own / usual)) < max(chance, math.log(UNIT_FACTOR)):

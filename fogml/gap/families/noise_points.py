@@ -123,10 +123,26 @@ def first_noise(setting: Setting, prior: NoisePrior) -> NoiseModel:
     return replace(prior.centre, N=float(np.median(found)))
 
 
-def white_noise(rows: Rows, prior: NoisePrior) -> float:
-    """Coefficient N of one run from second differences of neighbouring rows, by median, or the least."""
-    second = np.abs(np.diff(rows.gap, 2))
-    found = float(np.median(second)) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
+def white_noise(rows: Rows, prior: NoisePrior, made: Sequence[FloatArray] = ()) -> float:
+    """Coefficient N of one run from second differences of neighbouring rows, by median, or the least.
+
+    What constants, and causes where there are some, may do to them is fitted first: a table that turns all
+    the time makes no noise.
+
+    Parameters
+    ----------
+    rows
+        The run, m rows.
+    prior
+        Its centre states the least.
+    made
+        What each cause may make of it, columns of shape (m, k) [deg/h].
+    """
+    second = np.diff(rows.gap, 2)
+    columns = np.diff(np.concatenate([rows.constants, *made], axis=1), 2, axis=0)
+    columns = columns / np.maximum(np.abs(columns).max(axis=0), np.finfo(float).tiny)
+    left = second - columns @ np.linalg.lstsq(columns, second)[0]
+    found = float(np.median(np.abs(left))) / _MEDIAN / math.sqrt(6.0) * math.sqrt(rows.row_s / 3600.0)
     return max(found, NOISELESS * prior.centre.N)
 
 

@@ -252,10 +252,19 @@ def headline(
     nearest: Sequence[Nearest],
     far: Sequence[HowFar],
     segments: Sequence[GapSegment],
+    other_plant: bool,
 ) -> tuple[str, ...]:
-    """Sentences: the verdict, each cause with its size, share and place, the nearest where none is sure."""
+    """Sentences: the verdict, each cause with its size, share and place, the nearest where none is sure.
+
+    `other_plant` says that the likeliest set holds another flow of heat.
+    """
     said, titles = [], found.setting.scene.candidates
-    if verdict == "no_gap":
+    if verdict == "no_gap" and other_plant:
+        said.append(
+            "Heat flows a little otherwise than the model's plant says, or a sensor lags: fit its time "
+            "constants. Nothing beyond that is missing that these runs could show."
+        )
+    elif verdict == "no_gap":
         said.append("Nothing is missing that these runs could show.")
     for f in (f for f in shown if f.named):
         title = titles[f.effect].title

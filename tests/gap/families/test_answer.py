@@ -56,6 +56,20 @@ def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
     assert max(errors) < 3.0
 
 
+def test_a_table_that_turns_all_the_time_makes_no_noise(tactical):
+    # Scale factor off by 950 ppm: at turning rates that change from row to row, hundreds of times the noise.
+    runs = [_run(tactical, seed) for seed in (1, 2)]
+    turned = []
+    for run in runs:
+        rate = 3.0 * np.sin(run.time / 300.0 + 0.5 * np.sin(run.time / 77.0))
+        gyro = run.gyro_deg_h + (1.0 + 950e-6) * 3600.0 * rate
+        turned.append(run.with_columns(rate=rate, gyro=gyro))
+    held = diagnose(TwinModel(tactical), turned[:1], turned[1:], plan=False).how_far[0]
+    still = diagnose(TwinModel(tactical), runs[:1], runs[1:], plan=False).how_far[0]
+    assert held.floor == pytest.approx(still.floor, rel=0.15)
+    assert "white noise" not in held.note
+
+
 def test_a_size_that_the_twin_has_wrong_gets_its_own_name(tactical, runs, tmp_path):
     wrong = tactical.with_effect("thermal_hysteresis", 0.9, half_width=8.0)
     found = diagnose(TwinModel(wrong), runs[:2], runs[2:], plan=False, rehearsed=True)
