@@ -26,6 +26,8 @@ LEAST_D_PRIME = 10.0
 """Causes of the diagnosis track are at least so strong: whitened length beside the constants."""
 SAMPLE_S = 10.0
 _APART = 7
+_SECRET_BITS = 62
+# As large as a number of JSON may be; each guess would take the making of a case.
 
 
 def make_round(
@@ -67,7 +69,7 @@ def make_round(
         raise InputError("a round needs a case of each track at least: --drift, --diagnosis, --real")
     _check_free(Path(directory))
     if closed:
-        seed = secrets.randbits(120)
+        seed = secrets.randbits(_SECRET_BITS)
     with scratch_folder() as scratch:
         step("drift cases")
         # Another seed than the diagnosis track's: its held-out runs are handed out whole.

@@ -173,6 +173,20 @@ def test_a_closed_round_states_no_seed_and_hashes_by_a_salt_of_its_own(tmp_path:
         make_round(tmp_path / "a")
 
 
+def test_a_closed_round_is_made_and_scored_by_its_keeper(tmp_path: Path) -> None:
+    """The whole command, so some seconds: a unit of each track is drawn."""
+    told = make_round(tmp_path / "round", closed=True, drift=1, diagnosis=1, real=False, workers=1)
+    assert told["closed"] and told["seed"] is None
+    seed = json.loads((tmp_path / "round" / "kept" / "key.json").read_text())["seed"]
+    handout = (path for path in (tmp_path / "round" / "handout").rglob("*") if path.is_file())
+    assert not any(str(seed) in path.read_text() for path in handout)
+    answers = TrackFolder(tmp_path / "round", "diagnosis").answers("quiet") / "0001"
+    answers.mkdir(parents=True)
+    (answers / "gap.json").write_text('{"verdict": "no_gap"}')
+    figures = score_round(tmp_path / "round")["diagnosis"]["quiet"]["figures"]["all"]
+    assert figures["cases"] == 1 and figures["failed"] == 0
+
+
 def test_the_commands_answer_and_score(made: Path, tmp_path: Path) -> None:
     runner = CliRunner()
     ran = runner.invoke(app, ["benchmark", "run", str(made), "--method", "mean", "--workers", "1", "--json"])
