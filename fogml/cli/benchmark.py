@@ -42,8 +42,8 @@ class MakeSettings(RoundSettings):
         SEED, ge=0, lt=1_000_000
     )
     closed: Annotated[bool, option("Draw the seed, and keep it.", "--closed")] = False
-    drift: Annotated[int, option("Synthetic units of the drift track.", metavar="N")] = 24
-    diagnosis: Annotated[int, option("Cases of the diagnosis track.", metavar="N")] = 24
+    drift: Annotated[int, option("Synthetic units of the drift track.", metavar="N")] = 12
+    diagnosis: Annotated[int, option("Cases of the diagnosis track.", metavar="N")] = 12
     real: Annotated[bool, option("With the real legs that ship.", "--real/--no-real")] = True
     workers: options.Workers = 2
 
