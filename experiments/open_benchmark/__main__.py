@@ -9,6 +9,7 @@ with them.
 from __future__ import annotations
 
 import argparse
+import json
 import statistics
 from collections.abc import Mapping
 from pathlib import Path
@@ -101,10 +102,15 @@ def _markdown(table: Table) -> str:
 def main() -> None:
     """Make, answer, score and write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("directory", type=Path, help="where the round lies or is made")
+    parser.add_argument("directory", type=Path, nargs="?", help="where the round lies or is made")
     parser.add_argument("--workers", type=int, default=2, help="processes (2)")
     parser.add_argument("--only", action="append", help="answer by this entry alone; may be repeated")
+    parser.add_argument("--page", action="store_true", help="the pages of results.json alone")
     given = parser.parse_args()
+    if given.page:
+        return write(json.loads((HERE / "results.json").read_text(encoding="utf-8")))
+    if given.directory is None:
+        parser.error("name the folder of the round")
     if not (given.directory / "handout").exists():
         make_round(given.directory, workers=given.workers, step=lambda words: print(words, flush=True))
     for track, entries in ENTRIES.items():
@@ -114,7 +120,11 @@ def main() -> None:
                 answered, failed = run_cases(plan)
                 print(f"{track}, {name}: {answered} answered, {failed} failed", flush=True)
     values = score_round(given.directory, workers=given.workers)
-    values["seconds"] = seconds(given.directory)
+    write(values | {"seconds": seconds(given.directory)})
+
+
+def write(values: Mapping[str, Any]) -> None:
+    """The results as JSON, in Markdown and as the page that the command writes."""
     write_results(HERE, values, page(values))
     with whole_file(HERE / "results.html") as partial:
         partial.write_text(benchmark_page(values), encoding="utf-8")

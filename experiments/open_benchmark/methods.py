@@ -12,8 +12,8 @@ from fogml.blind.folders import CaseFiles
 
 
 def gaussian_process(case: CaseFiles, out: Path) -> None:
-    """scikit-learn's, on at most 600 averages of T, its rate and their product, tuned by its evidence."""
-    answer_by(PeerModel(peer_of("gaussian-process"), Budget(), case.seed), case, out)
+    """scikit-learn's, on at most 300 averages of T, its rate and their product, tuned by its evidence."""
+    answer_by(PeerModel(peer_of("gaussian-process"), Budget(most_rows=300), case.seed), case, out)
 
 
 def gru(case: CaseFiles, out: Path) -> None:
