@@ -133,7 +133,7 @@ def _judged(search: Search, family: int, form: str, size: str, data: FloatArray,
     scores = search.alone_on(data)
     known = {f: s for f, s in scores.items() if families[f].kind == "known"}
     best = max(known, key=known.__getitem__)
-    alike = sorted((f for f in known if known[f] > known[best] - priors.alike), key=lambda f: -known[f])
+    alike = sorted((f for f in known if known[f] > known[best] - priors.exchange), key=lambda f: -known[f])
     own, others, unknown = (
         float(np.logaddexp.reduce(np.array(told)))
         for told in (

@@ -192,7 +192,7 @@ def _alike(
     near = [
         (score, next(iter(held - rest)))
         for held, score in by_set.items()
-        if held > rest and len(held) == len(rest) + 1 and score > best.score - found.setting.priors.alike
+        if held > rest and len(held) == len(rest) + 1 and score > best.score - found.setting.priors.exchange
     ]
     others = [f for _, f in sorted(near, reverse=True) if f != family and families[f].kind == "known"]
     return [family, *others]
@@ -202,7 +202,7 @@ def _left_out(found: Inference, best: Explanation, family: int) -> tuple[str, ..
     """Effects that are no candidates, and that these runs don't tell from one of the likeliest set."""
     search = found.search
     others = search.instead(best, family, search.families_of("left_out"))
-    asked = best.log_prior + best.log_evidence - found.setting.priors.alike
+    asked = best.log_prior + best.log_evidence - found.setting.priors.exchange
     near = [f for f, e in others.items() if e.log_prior + e.log_evidence > asked]
     return tuple(found.columns.families[f].id for f in near)
 

@@ -99,11 +99,6 @@ class Priors:
         return replace(self, greatest_size=greatest, sizes=self.sizes + more)
 
     @property
-    def alike(self) -> float:
-        """Members of a class cost less than this to be exchanged [nats of evidence]."""
-        return self.exchange
-
-    @property
     def plant_lengths(self) -> FloatArray:
         """The values of another plant's size, shape (sizes,)."""
         return np.geomspace(self.least_size, self.plant_size, self.sizes)
