@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import Field
 
 from fogml.errors import InputError
-from fogml.fleet.shares import apart, discoveries, prevalence, probability_of_difference
+from fogml.fleet.shares import apart, bayes_factor, discoveries, prevalence, probability_of_difference
 from fogml.gap.result import NAMED
 from fogml.runs.run import FloatArray
 from fogml.signals.random_effects import random_effects
@@ -20,6 +20,11 @@ FALSE_SHARE = 0.05
 """Of the units that are said to stand apart, the share that may be wrong in the mean."""
 SHARED = 0.95
 """A cause is the line's if more than half of its units have it with this probability, and by lot likewise."""
+RARE = 0.1
+"""A cause is rare where no more than this share of the units, or one alone, have it."""
+BEFORE, UNKNOWN_BEFORE = 1.0 / 60.0, 0.25
+"""Probability before the data that a unit has a given cause, or an unknown one, as a diagnosis takes it
+(`fogml.gap.families.priors.Priors`): one of the catalogue's that runs can show."""
 _RESAMPLES = 400
 """Lines drawn from the units for an interval: its ends are told to a tenth of its width."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -55,7 +60,8 @@ class UnitDiagnosis(Strict, extra="ignore"):
 
 def unit_diagnosis(found: Any, covariates: Mapping[str, str]) -> dict[str, Any]:
     """What a `fogml.gap.result.Diagnosis` tells the fleet, JSON-ready."""
-    far = [item for item in found.how_far if item.recalibrated is not None]
+    # Where fitted constants do harm, the fit runs do not tell them: that is no gap of the line's.
+    far = [item for item in found.how_far if item.recalibrated is not None and _told(item)]
     worst = max(far, key=lambda item: item.recalibrated, default=None)
     floor = 0.0 if worst is None else float(worst.floor) ** 2
     return UnitDiagnosis(
@@ -81,6 +87,10 @@ def unit_diagnosis(found: Any, covariates: Mapping[str, str]) -> dict[str, Any]:
     ).model_dump()
 
 
+def _told(item: Any) -> bool:
+    return bool(item.before is None or item.recalibrated <= item.before)
+
+
 def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], seed: int = 0) -> dict[str, Any]:
     """What n units' diagnoses tell together, JSON-ready.
 
@@ -104,7 +114,7 @@ def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], see
     draws = rng.integers(len(units), size=(_RESAMPLES, len(units)))
     causes = [_cause(effect, labels, units, draws) for effect in effects]
     causes.sort(key=lambda one: -one["energy_share"])
-    unknown = prevalence([unit.unknown for unit in units])
+    unknown = prevalence([bayes_factor(unit.unknown, UNKNOWN_BEFORE) for unit in units])
     return {
         "units": len(units),
         "causes": causes,
@@ -131,11 +141,15 @@ def _probability(unit: UnitDiagnosis, effect: str) -> float:
     return cause.probability if cause is not None else 0.0
 
 
+def _factor(unit: UnitDiagnosis, effect: str) -> float:
+    return bayes_factor(_probability(unit, effect), BEFORE)
+
+
 def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], draws: Any) -> dict[str, Any]:
     """One cause on the line."""
     # Units whose runs could not show it say nothing on how common it is.
     showing = [unit for unit in units if effect not in unit.undetectable or _of(unit, effect) is not None]
-    common = prevalence([_probability(unit, effect) for unit in showing])
+    common = prevalence([_factor(unit, effect) for unit in showing])
     named = [(label, cause) for label, unit in zip(labels, units) if (cause := _of(unit, effect)) is not None]
     sure = [(label, cause) for label, cause in named if cause.probability >= NAMED]
     by_size = sorted(named, key=lambda item: -item[1].probability)
@@ -184,7 +198,7 @@ def _depends(effect: str, units: Sequence[UnitDiagnosis]) -> list[dict[str, Any]
         groups: dict[str, list[float]] = defaultdict(list)
         for unit in units:
             if name in unit.covariates:
-                groups[unit.covariates[name]].append(_probability(unit, effect))
+                groups[unit.covariates[name]].append(_factor(unit, effect))
         # Where every unit has a value of its own there is nothing to compare.
         if not 2 <= len(groups) <= sum(map(len, groups.values())) / 2:
             continue
@@ -209,9 +223,9 @@ def _apart(
         for (label, one), p in zip(sure, apart(values, errors)):
             size = f"{one.amplitude:.3g} {one.unit}, the line's is {cause['amplitude']:.3g}"
             tested.append((label, effect, size, float(p)))
-        common = 1.0 - cause["prevalence_ci90"][1]
+        rare = cause["prevalence_ci90"][1] < 0.5 and len(sure) <= max(1.0, RARE * cause["units_told"])
         for label, _ in sure:
-            if common > 0.5 and len(units) > 3:
+            if rare and len(units) > 3:
                 why = f"has it, as {cause['units_named']} of {cause['units_told']} units do"
                 told.append({"unit": label, "effect": effect, "kind": "rare", "why": why})
         if cause["shared"]:

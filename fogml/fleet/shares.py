@@ -1,10 +1,12 @@
-"""How common a cause is on a line, and which units differ: from each unit's posterior.
+"""How common a cause is on a line, and which units differ: from each unit's evidence.
 
-Units are exchangeable. How many of n have a cause is a sum of independent events with the units' own
-probabilities (Poisson-binomial); the share of the line is then Beta distributed for each count, with
-Jeffreys' prior. A unit stands apart where its size does not fit what the others foretell
-(`fogml.signals.random_effects`); of all units told so no more than the stated share is wrong in the mean (Y.
-Benjamini & Y. Hochberg, J. R. Stat. Soc. B 57, 1995).
+Units are exchangeable. Each has a cause with the probability pi, the share of the line, whose prior is
+Jeffreys'; the data of a unit are likelier by the Bayes factor B with the cause than without, so that those of
+all have the likelihood prod (pi B + 1 - pi). Probabilities that a diagnosis states of one unit alone rest on
+how rare causes are among all gyros: on a line where most have one, the same data say more. A unit stands
+apart where its size does not fit what the others foretell (`fogml.signals.random_effects`); of all units told
+so no more than the stated share is wrong in the mean (Y. Benjamini & Y. Hochberg, J. R. Stat. Soc. B 57,
+1995).
 """
 
 from __future__ import annotations
@@ -14,15 +16,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
-from scipy.special import betaln
-from scipy.stats import beta
 from scipy.stats import t as student
 
 from fogml.runs.run import FloatArray
 from fogml.signals.random_effects import random_effects
 
-JEFFREYS = 0.5
+_STEPS = 4000
+_SHARES: FloatArray = np.sin(0.5 * np.pi * (np.arange(_STEPS) + 0.5) / _STEPS) ** 2
+"""Shares that are equally likely by Jeffreys' prior, told to a thousandth."""
 
 
 @dataclass(frozen=True)
@@ -34,45 +35,43 @@ class Prevalence:
     over_half: float
 
 
-def count_distribution(probabilities: ArrayLike) -> FloatArray:
-    """Probability that k of n units have a cause, shape (n + 1,), from that of each."""
-    counts = np.ones(1)
-    for p in np.asarray(probabilities, dtype=np.float64):
-        counts = np.convolve(counts, (1.0 - p, p))
-    return counts
+def bayes_factor(probability: float, prior: float) -> float:
+    """How much likelier a unit's data are with a cause, from its probability after them and before."""
+    return probability * (1.0 - prior) / max((1.0 - probability) * prior, 1e-300)
 
 
-def prevalence(probabilities: ArrayLike) -> Prevalence:
-    """Share of a line's units that have a cause, from the probability of each of n units."""
-    counts = count_distribution(probabilities)
-    n = len(counts) - 1
-    k = np.arange(n + 1)
-    a, b = k + JEFFREYS, n - k + JEFFREYS
-
-    def below(share: float) -> float:
-        return float(counts @ beta.cdf(share, a, b))
-
-    low, high = (float(brentq(lambda x, q=q: below(x) - q, 0.0, 1.0)) for q in (0.05, 0.95))
-    return Prevalence(float(counts @ (a / (a + b))), (low, high), 1.0 - below(0.5))
+def prevalence(factors: ArrayLike) -> Prevalence:
+    """Share of a line's units that have a cause, from the Bayes factor of each of n units."""
+    logs = _log_likelihood(factors)
+    weights = np.exp(logs - logs.max())
+    weights /= weights.sum()
+    # Within a step of the grid the distribution is even.
+    below = np.cumsum(weights)
+    low, high = np.interp((0.05, 0.95), below, _SHARES)
+    return Prevalence(
+        float(weights @ _SHARES), (float(low), float(high)), float(weights[_SHARES > 0.5].sum())
+    )
 
 
 def probability_of_difference(groups: Sequence[ArrayLike]) -> float:
     """Probability that groups of units have a cause at shares of their own rather than at one.
 
-    Even odds before; marginal likelihoods of the counts with Jeffreys' prior, averaged over the counts.
+    Even odds before; marginal likelihoods of the groups' Bayes factors with Jeffreys' prior.
     """
-    apart = sum(_log_evidence(count_distribution(group)) for group in groups)
-    together = _log_evidence(count_distribution(np.concatenate([np.asarray(group) for group in groups])))
+    apart = sum(_log_evidence(group) for group in groups)
+    together = _log_evidence(np.concatenate([np.asarray(group) for group in groups]))
     return float(1.0 / (1.0 + np.exp(np.clip(together - apart, -700.0, 700.0))))
 
 
-def _log_evidence(counts: FloatArray) -> float:
-    """Log probability of which units have a cause, the share of the line unknown, counts being uncertain."""
-    n = len(counts) - 1
-    k = np.arange(n + 1)
-    each = betaln(k + JEFFREYS, n - k + JEFFREYS) - betaln(JEFFREYS, JEFFREYS)
-    held = counts > 0.0
-    return float(np.logaddexp.reduce(np.log(counts[held]) + each[held]))
+def _log_likelihood(factors: ArrayLike) -> FloatArray:
+    b = np.asarray(factors, dtype=np.float64)[:, None]
+    return np.asarray(np.log(_SHARES * b + (1.0 - _SHARES)).sum(axis=0))
+
+
+def _log_evidence(factors: ArrayLike) -> float:
+    """Log likelihood of the factors, the share of the line unknown."""
+    logs = _log_likelihood(factors)
+    return float(logs.max() + np.log(np.mean(np.exp(logs - logs.max()))))
 
 
 def apart(values: ArrayLike, errors: ArrayLike) -> FloatArray:

@@ -2,41 +2,34 @@
 
 from __future__ import annotations
 
-from itertools import product
-
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from scipy.stats import beta, binom
+from scipy.stats import beta
 
 from fogml.fleet.shares import (
     apart,
-    count_distribution,
+    bayes_factor,
     discoveries,
     prevalence,
     probability_of_difference,
 )
 
-PROBABILITIES = st.lists(st.floats(0.0, 1.0), min_size=1, max_size=6)
+
+def test_sure_units_are_counted_with_jeffreys_prior():
+    told = prevalence([1e12] * 18 + [0.0] * 2)
+    assert told.ci90 == pytest.approx(beta(18.5, 2.5).interval(0.9), abs=2e-3)
+    assert told.mean == pytest.approx(beta(18.5, 2.5).mean(), abs=1e-3)
+    assert told.over_half == pytest.approx(beta(18.5, 2.5).sf(0.5), abs=1e-3)
+    # What is not sure makes the interval wider; what says nothing leaves the prior.
+    assert np.ptp(prevalence([4.0] * 8 + [0.25] * 2).ci90) > np.ptp(prevalence([1e12] * 8 + [0.0] * 2).ci90)
+    assert prevalence([1.0] * 9).ci90 == pytest.approx(beta(0.5, 0.5).interval(0.9), abs=2e-3)
 
 
-@given(PROBABILITIES)
-def test_counts_are_those_of_all_arrangements(p):
-    expected = np.zeros(len(p) + 1)
-    for held in product((0, 1), repeat=len(p)):
-        expected[sum(held)] += np.prod([a if h else 1.0 - a for a, h in zip(p, held, strict=True)])
-    np.testing.assert_allclose(count_distribution(p), expected, atol=1e-12)
-
-
-def test_equal_probabilities_are_binomial_and_sure_ones_jeffreys():
-    np.testing.assert_allclose(count_distribution([0.3] * 40), binom.pmf(np.arange(41), 40, 0.3), atol=1e-12)
-    told = prevalence([1.0] * 18 + [0.0] * 2)
-    assert told.ci90 == pytest.approx(beta(18.5, 2.5).interval(0.9), abs=1e-9)
-    assert told.over_half == pytest.approx(beta(18.5, 2.5).sf(0.5))
-    # What is not sure makes the interval wider.
-    unsure = prevalence([0.8] * 10)
-    assert np.ptp(unsure.ci90) > np.ptp(prevalence([1.0] * 8 + [0.0] * 2).ci90)
+def test_what_is_rare_among_all_is_common_on_a_line_that_shows_it_again_and_again():
+    """A probability of 0.3 by a prior of 1 in 60 is evidence, if not of one unit alone."""
+    assert prevalence([bayes_factor(0.3, 1.0 / 60.0)] * 40).ci90[0] > 0.9
+    assert bayes_factor(0.3, 0.3) == pytest.approx(1.0)
+    assert bayes_factor(0.0, 0.1) == 0.0 and bayes_factor(1.0, 0.1) > 1e12
 
 
 def test_intervals_hold_the_truth_as_often_as_they_say():
@@ -45,20 +38,18 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     for _ in range(200):
         share = rng.beta(0.5, 0.5)
         has = rng.random(30) < share
-        # Evidence of three deviations, turned to a probability with the line's share as prior odds.
-        ratio = np.exp(3.0 * (rng.normal(size=30) + 3.0 * has) - 4.5)
-        p = share * ratio / (share * ratio + 1.0 - share)
-        low, high = prevalence(p).ci90
+        # Evidence of three deviations.
+        low, high = prevalence(np.exp(3.0 * (rng.normal(size=30) + 3.0 * has) - 4.5)).ci90
         held += low <= share <= high
     assert 0.84 < held / 200 < 0.98
 
 
 def test_lots_that_differ_are_told_and_equal_ones_are_not():
-    few, many = [0.02] * 20, [0.97] * 20
+    few, many = [0.02] * 20, [40.0] * 20
     assert probability_of_difference([few, many]) > 0.999
     assert probability_of_difference([few, few]) < 0.3
     # What says nothing of units says nothing of lots.
-    assert probability_of_difference([[0.5] * 20, [0.5] * 20]) == pytest.approx(0.5)
+    assert probability_of_difference([[1.0] * 20, [1.0] * 20]) == pytest.approx(0.5)
 
 
 def test_units_that_stand_apart_are_told_and_few_others():
