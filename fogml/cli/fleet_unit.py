@@ -128,7 +128,7 @@ class UnitWork:
         worst = max(far, key=lambda item: item.after) if far else None
         return {
             "verdict": found.verdict,
-            "effects": [item.effect for item in found.found],
+            "effects": [item.effect for item in found.named],
             "diagnosis": unit_diagnosis(found, unit.covariates),
             "worst": None
             if worst is None

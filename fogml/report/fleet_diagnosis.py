@@ -17,6 +17,11 @@ _SHOWN = 20
 """Causes of the figure; the table holds all."""
 
 
+def named_causes(line: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """Causes that the diagnosis of one unit at least is sure enough of to name."""
+    return [cause for cause in line["causes"] if cause["units_named"]]
+
+
 def line_sentences(line: Mapping[str, Any]) -> list[str]:
     """What the line shares and what to change first."""
     shared = [cause["effect"] for cause in line["causes"] if cause["shared"]]
@@ -50,9 +55,9 @@ def line_sentences(line: Mapping[str, Any]) -> list[str]:
 
 
 def line_table(line: Mapping[str, Any]) -> Table:
-    """Every cause of the line."""
+    """Every cause that is named in a unit."""
     rows = []
-    for cause in line["causes"]:
+    for cause in named_causes(line):
         size = MISSING
         if cause["amplitude"] is not None:
             between = f", between units {number(cause['between_units'])}" if cause["between_units"] else ""
@@ -79,12 +84,16 @@ def line_table(line: Mapping[str, Any]) -> Table:
         ("Gap without it", "deg/h rms", "figure"),
         ("Place", "", "text"),
     )
-    return Table(columns, tuple(rows), "Causes of the line, what makes most of its gap first.")
+    others = len(line["causes"]) - len(rows)
+    more = (
+        f" {plural(others, 'more is', 'more are')} hinted at and named in none: fleet.json." if others else ""
+    )
+    return Table(columns, tuple(rows), f"Causes of the line, what makes most of its gap first.{more}")
 
 
 def line_figure(line: Mapping[str, Any]) -> Drawing:
     """What each cause makes of the line's gap, and how common it is."""
-    causes = line["causes"][:_SHOWN][::-1]
+    causes = named_causes(line)[:_SHOWN][::-1]
     names = [cause["effect"] for cause in causes]
     figure = go.Figure()
     for key, words, colour, symbol in (
@@ -113,7 +122,7 @@ def line_figure(line: Mapping[str, Any]) -> Drawing:
         )
     figure.update_xaxes(title_text="share [%]", range=[0, 102])
     style.styled(figure, 130 + 34 * len(names))
-    first = line["causes"][0]
+    first = causes[-1]
     return Drawing(
         figure,
         alt=(

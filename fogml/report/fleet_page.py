@@ -9,7 +9,7 @@ from urllib.parse import quote
 from fogml.fleet.summary import in_order_of_serial, label_of
 from fogml.fleet.tasks import DONE
 from fogml.report.figures_fleet import by_unit, constants, distribution
-from fogml.report.fleet_diagnosis import apart_facts, line_figure, line_sentences, line_table
+from fogml.report.fleet_diagnosis import apart_facts, line_figure, line_sentences, line_table, named_causes
 from fogml.report.page import Tile, render
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, averages, number, percent, plural
@@ -61,7 +61,7 @@ def _line(fleet: Mapping[str, Any]) -> dict[str, Any] | None:
     line = fleet.get("diagnosis")
     if line is None:
         return None
-    causes = bool(line["causes"])
+    causes = bool(named_causes(line))
     return {
         "sentences": line_sentences(line),
         "figure": line_figure(line) if causes else None,
