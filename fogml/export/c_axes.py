@@ -31,6 +31,7 @@ _DEFINED = re.compile(
     r"|^(?:static )?(?:const )?\w+ \*?(\w+)\(|^static const \w+ (\w+)\[",
     re.MULTILINE,
 )
+_INCLUDE = re.compile(r"^#include .*\n", re.MULTILINE)
 _WORD = re.compile(r"\b[A-Za-z_]\w*\b")
 
 
@@ -119,7 +120,8 @@ def _code_of(axis: str, folder: Path, sensors: Sequence[str]) -> AxisCode:
     def told_apart(text: str) -> str:
         return _WORD.sub(lambda word: own.get(word[0], word[0]), text)
 
-    source = source.replace(f'#include "{HEADER}"\n', "")
+    # The file of all axes includes what they need, once.
+    header, source = (_INCLUDE.sub("", text) for text in (header, source))
     places = tuple((of_axis(sensor_identifier(name), axis), of_axes(name)) for name in sensors)
     return AxisCode(axis, told_apart(header), told_apart(source), places)
 

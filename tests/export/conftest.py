@@ -71,3 +71,17 @@ def fitted(name: str) -> DriftModel:
 def model_of():
     """A fitted model by a short name."""
     return fitted
+
+
+@pytest.fixture(scope="session")
+def axes():
+    """Models of three axes, cubics with a rate."""
+    time = np.arange(0.0, 7200.0, 4.0)
+    temperature = 20.0 - 30.0 * np.cos(2.0 * np.pi * time / 7200.0)
+    found = {}
+    for i, axis in enumerate("xyz"):
+        drift = 2.0 + 0.05 * temperature + (i - 1) * 1e-3 * temperature**2 - 1e-5 * temperature**3
+        gyro = drift + 0.01 * np.random.default_rng(i).normal(size=len(time))
+        run = Run.from_columns(axis, Facts(unit="FOG-7", axis=axis), time=time, gyro=gyro, T=temperature)
+        found[axis] = make_model("polynomial", features="T^1..3, dT").fit(run), run
+    return found

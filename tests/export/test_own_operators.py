@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.export.c_program import CProgram, compiled_output
+from fogml.export.c_program import CProgram, compiled_output, write_files
 from fogml.export.c_source import c_source
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
@@ -25,6 +25,7 @@ from fogml.signals.windows import slope
 from fogml.testing import check_feature
 from tests.export.conftest import training_run
 from tests.export.test_c_code import QUICK, SANITIZERS, WITH_SHADOW, disturbed, fast_run, needs_cc, outputs
+from tests.export.test_project_files import hold_misra, needs
 
 LINE = Kernel("line", (1.0, 0.0))
 """Weights that fall with age in a straight line: those of the least-squares slope."""
@@ -111,6 +112,15 @@ def test_their_c_gives_what_compensate_gives(tmp_path, text, dtype, bound):
     np.testing.assert_allclose(out, expected.compensated, atol=bound)
     assert np.count_nonzero(flag[1:] != expected.flag[1:]) <= (0 if dtype == "float64" else 2)
     assert set(flag.tolist()) == {1, 2}  # never as slow as in training
+
+
+@needs_cc
+@pytest.mark.parametrize("dtype", ["float32", "q31"])
+def test_their_c_keeps_the_rules_of_misra(tmp_path, dtype):
+    needs("cppcheck")
+    model = make_model("polynomial", features=TEXT).fit(training_run())
+    write_files(c_source(Plan.of(model, 0.1), dtype, []).files, tmp_path)
+    hold_misra(tmp_path)
 
 
 @needs_cc

@@ -95,20 +95,6 @@ def test_at_rest_is_what_the_model_says_of_constant_temperatures(model_of, name)
     assert moving <= set(found.leaves_out)
 
 
-@pytest.fixture(scope="module")
-def axes():
-    """Models of three axes, cubics with a rate."""
-    time = np.arange(0.0, 7200.0, 4.0)
-    temperature = 20.0 - 30.0 * np.cos(2.0 * np.pi * time / 7200.0)
-    found = {}
-    for i, axis in enumerate("xyz"):
-        drift = 2.0 + 0.05 * temperature + (i - 1) * 1e-3 * temperature**2 - 1e-5 * temperature**3
-        gyro = drift + 0.01 * np.random.default_rng(i).normal(size=len(time))
-        run = Run.from_columns(axis, Facts(unit="FOG-7", axis=axis), time=time, gyro=gyro, T=temperature)
-        found[axis] = make_model("polynomial", features="T^1..3, dT").fit(run), run
-    return found
-
-
 def test_three_axes_and_a_matrix(axes, tmp_path):
     matrix = [[1.0, 1e-3, 0.0], [0.0, 1.0, -2e-3], [5e-4, 0.0, 0.999]]
     (tmp_path / "m.yaml").write_text(yaml.safe_dump({"matrix": matrix}))
