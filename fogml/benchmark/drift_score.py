@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,8 @@ from fogml.blind.folders import case_files
 from fogml.blind.scoring.statistics import NOTHING, Estimate, mean, proportion
 from fogml.models.baselines import MeanModel
 from fogml.runs.reading import read_run
-from fogml.validation.judge import judge_run
+from fogml.validation.floors import floor_of_run
+from fogml.validation.metrics import RunMetrics
 from fogml.validation.run_errors import RunErrors, run_errors
 
 SETTLING_S = 128.0
@@ -89,26 +90,18 @@ def drift_marks(
 
 def _mark(case: str, group: str, nothing: RunErrors, answer: DriftAnswer, averaging_s: float) -> DriftMark:
     """An answer's mark; `nothing` has the training runs' mean for a drift."""
-    known = nothing.run.earth_known
-    # The mean is what the model of it leaves: taken off before, so that both sides have their constant.
-    constant = (float(nothing.drift[0]), 0.0)
+    used = nothing.used
+    metrics = RunMetrics(nothing.run, used, averaging_s, full=nothing.full)
+    left = metrics.figures(nothing.after).rms
+    floor = floor_of_run(nothing.run, used, nothing.before, averaging_s).value
     if answer.drift is None:
-        judged = judge_run(nothing, averaging_s, constant, known)
-        after = judged.before.rms
-        return DriftMark(case, group, after, after, judged.floor, 0.0, None, None, answer.failure)
-    half = np.zeros(len(answer.drift)) if answer.half_width is None else answer.half_width
-    judged = judge_run(replace(nothing, drift=answer.drift, half_width=half), averaging_s, constant, known)
-    series, stated = judged.series, answer.half_width is not None
-    return DriftMark(
-        case,
-        group,
-        judged.before.rms,
-        judged.after.rms,
-        judged.floor,
-        float(np.mean(np.abs(series.after) <= series.upper)) if stated else None,
-        float(np.mean(series.upper - series.lower)) if stated else None,
-        answer.bytes,
-    )
+        return DriftMark(case, group, left, left, floor, 0.0, None, None, answer.failure)
+    error = nothing.before - answer.drift
+    covered = width = None
+    if answer.half_width is not None:
+        after, half = metrics.averages(error[used], answer.half_width[used]).values
+        covered, width = float(np.mean(np.abs(after) <= half)), float(np.mean(2.0 * half))
+    return DriftMark(case, group, left, metrics.figures(error).rms, floor, covered, width, answer.bytes)
 
 
 def drift_figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
