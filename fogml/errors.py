@@ -52,6 +52,11 @@ def quoted(value: object) -> str:
     return printable(_brief.repr(value).replace("\n", " "))
 
 
+def counted(count: int, word: str, words: str | None = None) -> str:
+    """``1 row``, ``3 rows``; `words` where the plural is no mere s."""
+    return f"{count} {word if count == 1 else words or word + 's'}"
+
+
 def listed(names: object, most: int = 12) -> str:
     """Names for a message, each cut, and only so many of them."""
     texts = [printable(str(name).replace("\n", " ")) for name in list(names)]  # type: ignore[call-overload]

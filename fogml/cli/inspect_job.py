@@ -31,7 +31,7 @@ def inspect_and_write(settings: InspectSettings, terminal: Terminal) -> None:
             with terminal.work("drawing"):
                 from fogml.report import inspect_page
 
-                (folder / "inspect.html").write_text(inspect_page(runs), encoding="utf-8")
+                (folder / "inspect.html").write_text(inspect_page(runs, values), encoding="utf-8")
             settings.write_into(folder, "inspect")
     for run in values["runs"]:
         _print(run, terminal)

@@ -15,6 +15,7 @@ from fogml.report.shading import Segment, regime_word, shade
 from fogml.report.words import duration, listed, number, plural
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
+from fogml.signals import large
 from fogml.signals.averages import block_averages
 
 FloatArray = NDArray[np.float64]
@@ -39,7 +40,7 @@ def recording(run: Run) -> Drawing:
         row_heights=[1.6, *[1.2] * (len(rows) - 1)],
     )
     per_unit, unit = time_unit(run.span_s)
-    time = run.time / per_unit
+    time = large.each(lambda seconds: seconds / per_unit, run.time)
     _output(figure, run, time, per_unit)
     for index, name in enumerate(run.temperature_columns):
         place = rows.index("temperature") + 1

@@ -8,6 +8,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from fogml.signals import large
+
 FloatArray = NDArray[np.float64]
 DRAWN_POINTS = 4000
 """Points per trace above which a series is reduced."""
@@ -48,7 +50,10 @@ def min_max_indices(values: ArrayLike, points: int = DRAWN_POINTS) -> NDArray[np
     whole = n // width * width
     kept = [np.array([0, n - 1])]
     # The tail that does not fill a bucket is a bucket of its own.
-    for start, part in ((0, values[:whole].reshape(-1, width)), (whole, values[whole:].reshape(1, -1))):
+    parts = [
+        (span.start, values[span].reshape(-1, width)) for span in large.pieces(values[:whole], least=width)
+    ]
+    for start, part in (*parts, (whole, values[whole:].reshape(1, -1))):
         if part.size == 0:
             continue
         offsets = start + np.arange(len(part)) * part.shape[1]
@@ -59,6 +64,7 @@ def min_max_indices(values: ArrayLike, points: int = DRAWN_POINTS) -> NDArray[np
         else:
             kept.append(offsets + np.argmin(part, axis=1))
             kept.append(offsets + np.argmax(part, axis=1))
+        large.release()
     return np.unique(np.concatenate(kept))
 
 

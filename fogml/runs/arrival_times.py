@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.findings import Finding
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -80,21 +81,36 @@ def burst_ends(time: FloatArray) -> IndexArray | None:
     """
     if len(time) < _LEAST_SAMPLES:
         return None
-    steps = np.diff(time)
-    # Long real gaps would make the mean interval too long.
-    mean = float(np.mean(steps[steps <= np.quantile(steps, 0.999)])) if len(steps) > 1000 else steps.mean()
-    between = steps > LONG_INTERVALS * mean
-    ends = np.flatnonzero(between)
-    if len(ends) < LEAST_BURSTS or 2 * len(ends) > len(steps) + 2:
+    count = len(time) - 1
+    mean = float(time[-1] - time[0]) / count
+    if count > 1000:
+        # Long real gaps would make the mean interval too long.
+        (usual,) = large.quantiles(lambda: (steps for _, steps in large.differences(time)), [0.999])
+        mean = _mean_up_to(time, usual)
+    found, spent, short = [], 0.0, 0
+    for at, steps in large.differences(time):
+        between = steps > LONG_INTERVALS * mean
+        found.append(at + np.flatnonzero(between))
+        spent += float(steps[between].sum())
+        short += int(np.count_nonzero(steps[~between] < SHORT_INTERVALS * mean))
+    ends = np.concatenate(found)
+    if len(ends) < LEAST_BURSTS or 2 * len(ends) > count + 2:
         return None
-    if steps[between].sum() < TIME_BETWEEN * (time[-1] - time[0]):
-        return None
-    if np.count_nonzero(steps[~between] < SHORT_INTERVALS * mean) < MOST_OF_THEM * (len(steps) - len(ends)):
+    if spent < TIME_BETWEEN * (time[-1] - time[0]) or short < MOST_OF_THEM * (count - len(ends)):
         return None
     sizes, periods = np.diff(ends), np.diff(time[ends])
     interval = float(np.median(periods / sizes))
     fits = np.abs(periods - sizes * interval) < 0.5 * float(np.median(periods))
     return ends if np.count_nonzero(fits) >= MOST_OF_THEM * len(fits) else None
+
+
+def _mean_up_to(time: FloatArray, longest: float) -> float:
+    """Mean of the intervals that are no longer than one."""
+    spent, count = 0.0, 0
+    for _, steps in large.differences(time):
+        usual = steps[steps <= longest]
+        spent, count = spent + float(usual.sum()), count + len(usual)
+    return spent / count
 
 
 def pauses_are_real(time: FloatArray, ends: IndexArray, columns: Mapping[str, FloatArray]) -> bool:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from fogml.runs.columns import conversion, parse_header
 from fogml.runs.reader_process import StoredArray, StoredFile
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 
@@ -17,7 +18,8 @@ def interpolated(seconds: FloatArray, at: FloatArray, values: FloatArray) -> Flo
     if not sound.any():
         return np.full(len(seconds), np.nan)
     order = np.argsort(at[sound], kind="stable")
-    return np.interp(seconds, at[sound][order], values[sound][order])
+    known_s, known = at[sound][order], values[sound][order]
+    return large.each(lambda part: np.interp(part, known_s, known), seconds)
 
 
 def clock_s(cell: str, file: str) -> float:

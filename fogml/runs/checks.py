@@ -15,6 +15,7 @@ from fogml.runs.outliers import OUTLIER_SIGMA, find_outliers
 from fogml.runs.plausible import implausible
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.thermal_columns import leading_temperature
+from fogml.signals import large
 
 STUCK_S = 600.0
 """A sensor that shows one value for longer [s] may be stuck."""
@@ -61,8 +62,12 @@ def check_run(run: Run) -> tuple[Finding, ...]:
     if len(run) < 2:
         return ()
     parts = (implausible, _dropouts, _gaps, _irregular, _stuck, _saturated, _outliers, _span)
+    found: list[Finding] = []
     with np.errstate(over="ignore", invalid="ignore"):  # values near the greatest float
-        return tuple(finding for part in parts for finding in part(run))
+        for part in parts:
+            found += part(run)
+            large.release()
+    return tuple(found)
 
 
 def _dropouts(run: Run) -> Iterator[Finding]:
@@ -95,16 +100,20 @@ def _gaps(run: Run) -> Iterator[Finding]:
 def _irregular(run: Run) -> Iterator[Finding]:
     if run.clock.grid_s is not None:
         return
-    steps = np.diff(run.time)
-    off = np.abs(steps - run.sample_s) > _IRREGULAR_INTERVAL * run.sample_s
-    off[run.gap_starts - 1] = False
-    count = int(np.count_nonzero(off))
-    if count > _IRREGULAR_SHARE * len(steps):
+    limit = _IRREGULAR_INTERVAL * run.sample_s
+    count, first = 0, 0
+    for at, steps in large.differences(run.time):
+        off = np.abs(steps - run.sample_s) > limit
+        low, high = np.searchsorted(run.gap_starts - 1, [at, at + len(steps)])
+        off[run.gap_starts[low:high] - 1 - at] = False
+        first = first or (at + int(np.argmax(off)) + 2 if off.any() else 0)
+        count += int(np.count_nonzero(off))
+    if count > _IRREGULAR_SHARE * (len(run) - 1):
         message = (
-            f"{count} of {len(steps)} intervals differ from the median of {run.sample_s:.4g} s by more "
+            f"{count} of {len(run) - 1} intervals differ from the median of {run.sample_s:.4g} s by more "
             "than a tenth; true times are used"
         )
-        yield Finding("irregular_sampling", message, column="time", row=int(np.argmax(off)) + 2, count=count)
+        yield Finding("irregular_sampling", message, column="time", row=first, count=count)
 
 
 def _stuck(run: Run) -> Iterator[Finding]:
@@ -114,19 +123,20 @@ def _stuck(run: Run) -> Iterator[Finding]:
         values = run.columns[name]
         if marks is not None and not _stays(values, marks):
             continue
-        starts, stops = _spells(values)
-        long = np.flatnonzero(run.time[stops - 1] - run.time[starts] > STUCK_S)
-        if not len(long):
+        starts, stops, total = _long_spells(run.time, values)
+        if not len(starts):
             continue
         least = max(MOVED_DEGC, 2.0 * _resolution(values)) if name != "gyro" else MOVED_DEGC
         if name == "gyro":
             # A quiet output of few steps rests at one value for long; a noisy one hardly ever.
-            spells = len(starts) - len(long)
-            samples = len(values) - int((stops - starts)[long].sum())
+            spells = total - len(starts)
+            samples = len(values) - int((stops - starts).sum())
             if spells < _LEAST_SPELLS or samples > _NOISY_SPELL * spells:
                 continue
         others = [run.temperature(other) for other in temperatures if other != name]
-        found = [i for i in long.tolist() if any(np.ptp(x[starts[i] : stops[i]]) > least for x in others)]
+        found = [
+            i for i, (a, b) in enumerate(zip(starts, stops)) if any(np.ptp(x[a:b]) > least for x in others)
+        ]
         if found:
             first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
             times = "" if len(found) == 1 else f", and {len(found) - 1} times more,"
@@ -151,20 +161,33 @@ def _stays(values: FloatArray, marks: IndexArray) -> bool:
     """Whether a column holds one value from any mark to the next."""
     if len(marks) < 2:
         return False
+    large.release()
     same = values[1 : marks[-1] + 1] == values[: marks[-1]]
     return bool(np.logical_and.reduceat(same, marks[:-1]).any())
 
 
-def _spells(values: FloatArray) -> tuple[IndexArray, IndexArray]:
-    """Spells [start, stop) of one value."""
-    changes = np.flatnonzero(values[1:] != values[:-1]) + 1
-    return np.concatenate([[0], changes]), np.concatenate([changes, [len(values)]])
+def _long_spells(time: FloatArray, values: FloatArray) -> tuple[IndexArray, IndexArray, int]:
+    """Spells [start, stop) of one value that last long, and how many there are of any length."""
+    kept, total, begin = [], 1, 0
+    for part in large.pieces(values, overlap=1):
+        changes = part.start + 1 + np.flatnonzero(values[part][1:] != values[part][:-1])
+        total += len(changes)
+        # The last spell of a part may go on in the next one.
+        edges = np.concatenate([[begin], changes, [len(values)] if part.stop == len(values) else []])
+        edges = edges.astype(np.intp)
+        spells = np.column_stack((edges[:-1], edges[1:]))
+        kept.append(spells[time[spells[:, 1] - 1] - time[spells[:, 0]] > STUCK_S])
+        begin = int(edges[-1])
+    starts, stops = np.concatenate(kept).T
+    return starts, stops, total
 
 
 def _resolution(values: FloatArray) -> float:
     """Smallest step of a column that is not zero; 0 where it never moves."""
-    steps = np.abs(np.diff(values))
-    return float(np.min(steps, where=steps > 0.0, initial=np.inf)) if steps.any() else 0.0
+    least = np.inf
+    for _, steps in large.differences(values):
+        least = min(least, float(np.min(np.abs(steps), where=steps != 0.0, initial=np.inf)))
+    return least if np.isfinite(least) else 0.0
 
 
 def _saturated(run: Run) -> Iterator[Finding]:
@@ -187,9 +210,11 @@ def _saturated(run: Run) -> Iterator[Finding]:
         if usual is None:
             same = gyro[1:] == gyro[:-1]
             usual = _longest(same & ~extremes[0][1][1:] & ~extremes[1][1][1:]) + 1
-        others = gyro[~at]
-        next_to = others.max() if extreme == greatest else others.min()
-        is_tail = count <= _TAIL_RATIO * np.count_nonzero(others == next_to)
+        if extreme == greatest:
+            next_to = np.max(gyro, where=~at, initial=-np.inf)
+        else:
+            next_to = np.min(gyro, where=~at, initial=np.inf)
+        is_tail = count <= _TAIL_RATIO * np.count_nonzero(gyro == next_to)
         # A quiet output of few steps rests at other values too.
         rests = usual >= _RESTING_SAMPLES and spell < _RESTING_RATIO * usual
         if not is_tail and not rests:

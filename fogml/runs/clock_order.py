@@ -13,8 +13,10 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.errors import counted
 from fogml.runs.arrival_times import spread_stamps
 from fogml.runs.findings import Finding
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -107,7 +109,7 @@ def in_order(
     row_name
         Names the row at an index in messages.
     """
-    clock = _Clock(np.arange(len(time), dtype=np.intp), time, row_name)
+    clock = _Clock(large.count_up(len(time)), time, row_name)
     if np.all(time[1:] > time[:-1]):
         return Ordered(clock.rows, time, (slice(0, len(time)),))
     if float(np.ptp(time)) == 0.0:
@@ -168,12 +170,13 @@ def _drop_repeats(clock: _Clock, columns: Mapping[str, FloatArray]) -> None:
             equal &= (values[a] == values[b]) | (np.isnan(values[a]) & np.isnan(values[b]))
     # Samples of one coarse stamp differ by their noise, most of them at least.
     if equal.any() and (equal.mean() > _CLOSE or not _is_coarse(clock.time)):
-        _forget(clock, order[pairs[equal] + 1], "repeat another row in every value")
+        _forget(clock, order[pairs[equal] + 1], "another row in every value")
 
 
 def _forget(clock: _Clock, places: IndexArray, what: str) -> None:
     first = int(clock.rows[places].min())
-    told = f"{len(places)} rows {what}, the first: {clock.row_name(first)}"
+    verb = "repeats" if len(places) == 1 else "repeat"
+    told = f"{counted(len(places), 'row')} {verb} {what}, the first: {clock.row_name(first)}"
     clock.note("repaired_repeats", told, "drops the repeats", "dropped", first, len(places))
     kept = np.ones(len(clock.rows), dtype=bool)
     kept[places] = False
@@ -276,7 +279,7 @@ def _spread(clock: _Clock, legs: list[slice]) -> None:
     if not len(found):
         return
     if not any(_is_coarse(clock.time[leg]) for leg in legs) and len(found) <= most_repeats(len(clock.time)):
-        _forget(clock, found, "repeat a time")
+        _forget(clock, found, "a time")
         lost = [len(t) for t in ties]
         edges = np.cumsum([0, *(leg.stop - leg.start - n for leg, n in zip(legs, lost, strict=True))])
         legs[:] = [slice(int(a), int(b)) for a, b in pairwise(edges.tolist())]
@@ -286,7 +289,8 @@ def _spread(clock: _Clock, legs: list[slice]) -> None:
     for leg in legs:
         time[leg], words = spread_stamps(time[leg])
     clock.time = time
-    told = f"{len(found)} rows show the time of the row before, as the clock's step is longer than a sample"
+    show = "row shows" if len(found) == 1 else "rows show"
+    told = f"{len(found)} {show} the time of the row before, as the clock's step is longer than a sample"
     row = int(clock.rows[found[0]])
     clock.note("repaired_stamps", told, "spreads the samples evenly", words, row, len(found))
 

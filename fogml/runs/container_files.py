@@ -29,6 +29,7 @@ from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import RawTable, choose_vectors, moment, stored_blocks
 from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 
@@ -202,7 +203,7 @@ def container_columns(
         findings = []
         for source, array in found.items():
             stored.limits.check_size(path, float(max(array.shape)))
-            values = stored.read(array, 0, max(array.shape))
+            values = _read_long(stored, array)
             if array.group != main:
                 at, own = (_clock_of(path, stored, groups[name]) for name in (main, array.group))
                 findings.append(next(_joined_findings([(array.name, groups[array.group], array)])))
@@ -211,6 +212,17 @@ def container_columns(
             if len(values) != count:
                 raise InputError(f"{path.name}: {quoted(str(source))} holds {len(values)} values of {count}")
     return columns, tuple(findings)
+
+
+def _read_long(stored: StoredFile, array: StoredArray) -> FloatArray:
+    """All values of an array, as many as a block's at a time."""
+    count = max(array.shape)
+    if count <= large.HELD_VALUES:
+        return stored.read(array, 0, count)
+    held = large.Growing()
+    for start in range(0, count, large.HELD_VALUES):
+        held.append(stored.read(array, start, min(start + large.HELD_VALUES, count)))
+    return held.array()
 
 
 def _source(path: Path, stored: StoredFile, source: str | int) -> StoredArray:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.signals import large
+
 FloatArray = NDArray[np.float64]
+IndexArray = NDArray[np.intp]
 BoolArray = NDArray[np.bool_]
 
 _STARTING = 9
@@ -131,20 +135,16 @@ def last_reading(time: FloatArray, values: FloatArray, found: Reading) -> LastRe
 def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastReading | None) -> Reading:
     if len(values) < 2:
         return Reading(values)
-    steps = np.abs(np.diff(values))
-    ranged = (values >= rule.low_degC) & (values <= rule.high_degC)
-    apart = np.diff(time)
-    limit = rule.jump_degC + rule.rate_degC_s * apart
-    if ranged.all() and (before is None or before.rejected is None) and not np.any(steps > limit):
+    ranged = large.each(lambda x: (x >= rule.low_degC) & (x <= rule.high_degC), values, kind=bool)
+    none_rejected = before is None or before.rejected is None
+    if ranged.all() and none_rejected and not len(_jumps(time, values, rule, rule.jump_degC)):
         return Reading(values)
     if before is None and np.count_nonzero(ranged) < _LEAST_GOOD * len(values):
         return Reading(values)
-    within = np.abs(np.diff(values[ranged]))
-    noise = float(np.median(within[within > 0.0])) / 0.6745 if (within > 0.0).any() else 0.0
-    jump = max(rule.jump_degC, rule.noise_sigma * noise)
-    suspects = np.flatnonzero(~ranged[1:] | (steps > jump + rule.rate_degC_s * apart)) + 1
+    jump = max(rule.jump_degC, rule.noise_sigma * _noise(large.chosen(values, ranged)))
+    suspects = np.union1d(np.flatnonzero(~ranged[1:]) + 1, _jumps(time, values, rule, jump))
     bad = np.zeros(len(values), dtype=bool)
-    cleaned = values.copy()
+    cleaned = large.each(np.copy, values)
     used = replace(rule, jump_degC=jump)
     first = _first_good(time, values, ranged, used) if before is None else 0
     bad[:first] = True
@@ -161,6 +161,28 @@ def _read(time: FloatArray, values: FloatArray, rule: DropoutRule, before: LastR
     if not bad.any() or (before is None and np.count_nonzero(bad) > (1.0 - _LEAST_GOOD) * len(values)):
         return Reading(values)
     return Reading(cleaned, bad)
+
+
+def _jumps(time: FloatArray, values: FloatArray, rule: DropoutRule, jump_degC: float) -> IndexArray:
+    """Readings further from the one before than a jump and the fastest change."""
+    found = [
+        part.start
+        + 1
+        + np.flatnonzero(np.abs(np.diff(values[part])) > jump_degC + rule.rate_degC_s * np.diff(time[part]))
+        for part in large.pieces(values, overlap=1)
+    ]
+    return np.concatenate(found)
+
+
+def _noise(values: FloatArray) -> float:
+    """Robust standard deviation of the steps that are any [degC]."""
+
+    def steps() -> Iterator[FloatArray]:
+        for _, step in large.differences(values):
+            yield np.abs(step[step != 0.0])
+
+    middle = large.median(steps)
+    return 0.0 if np.isnan(middle) else middle / 0.6745
 
 
 def _first_good(time: FloatArray, values: FloatArray, ranged: BoolArray, rule: DropoutRule) -> int:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, counted, quoted
 from fogml.runs.beside import interpolated
 from fogml.runs.columns import conversion, is_temperature
 from fogml.runs.container_files import container_columns, sheet_file
@@ -18,6 +20,7 @@ from fogml.runs.profile_parts import ImportColumn, JoinedLog, LegByState, LegByT
 from fogml.runs.profile_schema import ImportProfile
 from fogml.runs.reading import file_format
 from fogml.runs.stamps import Stamps
+from fogml.signals import large
 
 __all__ = ["chosen_rows", "internal", "interpolated", "joined_columns", "read_logger", "rows_of_leg"]
 
@@ -53,7 +56,7 @@ def internal(values: FloatArray, name: str, column: ImportColumn) -> FloatArray:
     """A source's values in the internal unit of a column of the run format."""
     factor, shift = conversion(name, column.unit, "import profile")
     with np.errstate(over="ignore", invalid="ignore"):
-        return np.asarray((values * column.scale + column.offset) * factor + shift)
+        return large.each(lambda x: (x * column.scale + column.offset) * factor + shift, values)
 
 
 def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
@@ -62,7 +65,7 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
         inside = matching(table, rule)
         if not inside.all():
             lost = int(np.count_nonzero(~inside))
-            message = f"{lost} rows left out by 'where' of {quoted(str(rule.source))}"
+            message = f"{counted(lost, 'row')} left out by 'where' of {quoted(str(rule.source))}"
             row = int(table.rows[np.argmin(inside)]) + 1
             table = table.kept(inside, Finding("rejected_rows", message, row=row, count=lost))
     for name, column in profile.columns.items():
@@ -70,30 +73,36 @@ def chosen_rows(table: LoggerTable, profile: TextLayout) -> LoggerTable:
         if not column.missing or source is None or source not in table.columns:
             continue
         values = table.columns[source]
-        none = np.isin(values, column.missing)
+        none = _is_one_of(values, column.missing)
         lost = int(np.count_nonzero(none))
         if lost == 0:
             continue
         row = int(table.rows[np.argmax(none)]) + 1
         if is_temperature(name) and lost < len(none):
-            places = np.flatnonzero(~none)
-            filled = np.interp(np.arange(len(values)), places, values[places])
-            message = f"{lost} values of {quoted(str(source))} stand for none: interpolated"
-            columns = {**table.columns, source: filled}
+            verb = "stands" if lost == 1 else "stand"
+            message = f"{counted(lost, 'value')} of {quoted(str(source))} {verb} for none: interpolated"
             table = table.kept(slice(None), Finding("sentinel", message, column=name, row=row, count=lost))
-            table = LoggerTable(
-                columns,
-                table.rows,
-                table.total_rows,
-                table.findings,
-                table.texts,
-                table.seconds,
-                table.stamps,
-            )
+            table = replace(table, columns={**table.columns, source: _bridged(values, none)})
         else:
-            message = f"{lost} rows in which {quoted(str(source))} stands for none left out"
+            message = f"{counted(lost, 'row')} in which {quoted(str(source))} stands for none left out"
             table = table.kept(~none, Finding("rejected_rows", message, row=row, count=lost))
     return table
+
+
+def _is_one_of(values: FloatArray, numbers: Sequence[float]) -> NDArray[np.bool_]:
+    return large.each(lambda part: np.isin(part, numbers), values, kind=bool)
+
+
+def _bridged(values: FloatArray, none: NDArray[np.bool_]) -> FloatArray:
+    """Values, in the place of those that are none the line from the one before to the one behind."""
+    filled = large.each(np.copy, values)
+    changes = np.flatnonzero(none[1:] != none[:-1]) + 1
+    edges = np.concatenate([[0], changes, [len(values)]]).tolist()
+    for first, end in pairwise(edges):
+        if none[first]:
+            around = [at for at in (first - 1, end) if 0 <= at < len(values)]
+            filled[first:end] = np.interp(np.arange(first, end), around, values[around])
+    return filled
 
 
 def matching(table: LoggerTable, rule: RowFilter) -> NDArray[np.bool_]:
@@ -107,7 +116,7 @@ def matching(table: LoggerTable, rule: RowFilter) -> NDArray[np.bool_]:
     if rule.at_most is not None:
         inside &= values <= rule.at_most
     if rule.numbers:
-        inside &= np.isin(values, rule.numbers)
+        inside &= _is_one_of(values, rule.numbers)
     return inside
 
 
@@ -143,7 +152,7 @@ def _seconds(table: LoggerTable, profile: ImportProfile) -> FloatArray:
         assert profile.sample_s is not None
         return np.asarray(table.rows * profile.sample_s)
     seconds = internal(table.columns[clock], "time", profile.columns["time"])
-    return seconds - seconds[:1]
+    return large.each(lambda time: time - seconds[:1], seconds)
 
 
 def joined_columns(path: Path, log: JoinedLog, stamps: Stamps | None) -> Mapping[str, FloatArray]:

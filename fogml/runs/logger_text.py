@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError, listed, quoted
+from fogml.errors import InputError, counted, listed, quoted
 from fogml.runs.csv_end import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
-from fogml.runs.logger_lines import Lines, single_blanks
+from fogml.runs.logger_fields import field_numbers, field_texts
+from fogml.runs.logger_lines import Lines
+from fogml.runs.logger_parts import PART_BYTES, text_parts
 from fogml.runs.other_rate import is_of_another_rate
 from fogml.runs.profile_parts import TextLayout
-from fogml.runs.raw_table import empty_file
 from fogml.runs.stamps import StampClock, Stamps, stamps_of
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -62,16 +64,24 @@ class LoggerTable:
         """The table of some of its rows, with what is said of the others."""
         return replace(
             self,
-            columns={source: values[rows] for source, values in self.columns.items()},
+            columns={source: large.chosen(values, rows) for source, values in self.columns.items()},
             texts={source: values[rows] for source, values in self.texts.items()},
-            seconds=None if self.seconds is None else self.seconds[rows],
-            rows=self.rows[rows],
+            seconds=None if self.seconds is None else large.chosen(self.seconds, rows),
+            rows=large.chosen(self.rows, rows),
             findings=(*self.findings, finding),
         )
 
 
-def read_logger_text(path: str | Path, profile: TextLayout, profile_name: str) -> LoggerTable:
+def read_logger_text(
+    path: str | Path,
+    profile: TextLayout,
+    profile_name: str,
+    part_bytes: int = PART_BYTES,
+) -> LoggerTable:
     """Read the source columns of a logger's text file.
+
+    A long file is read part by part, its columns kept in temporary files; whether a column is one of another
+    rate is told by the first part, and no part may be one of which most is left out.
 
     Raises
     ------
@@ -80,31 +90,13 @@ def read_logger_text(path: str | Path, profile: TextLayout, profile_name: str) -
         holds faulty rows that the profile does not reject; the message names file and line.
     """
     path = Path(path)
-    content = _content(path, profile)
+    parts = text_parts(path, profile.encoding, part_bytes)
+    first = next(parts)
     cut = cut_line(CsvSource(path), profile.text_separator, profile.decimal)
     if cut is not None and not profile.reject.not_numbers:
         raise cut_error(path, cut, "'reject: {not_numbers: true}' in the profile leaves the row out")
-    return _Reader(path.name, profile, profile_name, is_cut=cut is not None).read(content)
-
-
-def _content(path: Path, profile: TextLayout) -> bytes:
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); check the path") from None
-    if not raw.strip():
-        raise empty_file(path.name)
-    try:
-        text = raw.decode(profile.encoding).removeprefix("\ufeff").encode()
-    except UnicodeError as error:
-        place = f"byte {error.start}" if isinstance(error, UnicodeDecodeError) else "it"
-        raise InputError(
-            f"{path.name}: {place} is no {profile.encoding} text; "
-            "give the file's encoding in the profile (key 'encoding')"
-        ) from None
-    if b"\0" in text[:4096]:
-        raise InputError(f"{path.name}: this is a binary file, a text file was expected")
-    return text
+    reader = _Reader(path.name, profile, profile_name, is_cut=cut is not None)
+    return reader.read(chain([first], parts))
 
 
 class _Reader:
@@ -113,44 +105,86 @@ class _Reader:
         self.is_cut = is_cut
         self.profile = profile
         self.hint = f"is this a file for the profile {quoted(profile_name)}?"
+        self.lines_before = self.rows_before = 0
+        self.clock: StampClock | None = None
+        self.filled: NDArray[np.bool_] | None = None
+        self.rejected: dict[str, Finding] = {}
 
-    def read(self, content: bytes) -> LoggerTable:
+    def read(self, parts: Iterator[tuple[bytes, bool]]) -> LoggerTable:
+        columns: dict[str | int, large.Growing] = {}
+        rows, seconds = large.Growing(np.intp), large.Growing()
+        texts: dict[str | int, list[NDArray[np.str_]]] = {}
+        fields, places = 0, dict[str | int, int]()
+        for content, is_last in parts:
+            lines = Lines.of(content)
+            is_first = self.lines_before == 0
+            numbers = np.flatnonzero(self._used(lines, is_first))
+            if is_first:
+                numbers, fields, places = self._head(lines, numbers)
+            part = self._table(lines, numbers, fields, places, is_last)
+            for source, values in part.columns.items():
+                columns.setdefault(source, large.Growing()).append(values)
+            for source, held in part.texts.items():
+                texts.setdefault(source, []).append(held)
+            rows.append(part.rows + self.rows_before)
+            if part.seconds is not None:
+                seconds.append(part.seconds)
+            self.lines_before += len(lines.starts)
+            self.rows_before += len(numbers)
+        return LoggerTable(
+            {source: values.array() for source, values in columns.items()},
+            rows.array(),
+            self.rows_before,
+            tuple(self.rejected.values()),
+            {source: np.concatenate(held) for source, held in texts.items()},
+            None if self.clock is None else seconds.array(),
+            None if self.clock is None else self.clock.stamps,
+        )
+
+    def _used(self, lines: Lines, first: bool) -> NDArray[np.bool_]:
+        """Which lines of a part are neither blank, nor comments, nor above the header."""
         profile = self.profile
-        lines = Lines.of(content)
-        signature = profile.signature
+        mark = lines.first_bytes()
+        used = mark != 0
+        if first:
+            self._check_signature(lines)
+            used[: profile.skip_lines] = False
+            if profile.header_text is not None:
+                found = (n for n in np.flatnonzero(used).tolist() if profile.header_text in lines.line(n))
+                header = next(found, None)
+                if header is None:
+                    raise InputError(
+                        f"{self.file}: no line holds the header's text {quoted(profile.header_text)}; "
+                        f"{self.hint}"
+                    )
+                used[:header] = False
+        if profile.comment is not None:
+            begins = mark == profile.comment.encode(errors="replace")[0]
+            for number in np.flatnonzero(used & begins).tolist():
+                if lines.line(number).lstrip(" \t").startswith(profile.comment):
+                    used[number] = False
+        return used
+
+    def _check_signature(self, lines: Lines) -> None:
+        signature = self.profile.signature
         if signature is not None:
             head = [lines.line(number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
             if not any(signature in line for line in head):
                 raise InputError(
                     f"{self.file}: {quoted(signature)} was expected in its first lines; {self.hint}"
                 )
-        first = lines.first_bytes()
-        used = first != 0
-        used[: profile.skip_lines] = False
-        if profile.header_text is not None:
-            found = (n for n in np.flatnonzero(used).tolist() if profile.header_text in lines.line(n))
-            header = next(found, None)
-            if header is None:
-                raise InputError(
-                    f"{self.file}: no line holds the header's text {quoted(profile.header_text)}; {self.hint}"
-                )
-            used[:header] = False
-        if profile.comment is not None:
-            for number in np.flatnonzero(
-                used & (first == profile.comment.encode(errors="replace")[0])
-            ).tolist():
-                if lines.line(number).lstrip(" \t").startswith(profile.comment):
-                    used[number] = False
-        numbers = np.flatnonzero(used)[profile.header_lines :]
+
+    def _head(self, lines: Lines, numbers: IndexArray) -> tuple[IndexArray, int, dict[str | int, int]]:
+        """The lines of data below the header, the fields of a row, and where each source stands."""
+        numbers = numbers[self.profile.header_lines :]
         names: list[str] | None = None
-        if profile.header and len(numbers):
+        if self.profile.header and len(numbers):
             names = self._names(lines.line(int(numbers[0])))
             numbers = numbers[1:]
         if len(numbers) == 0:
             raise InputError(f"{self.file}: no data rows; {self.hint}")
-        fields = profile.fields or (len(names) if names else 0)
-        places = self._places(names, fields)
-        return self._table(lines, numbers, fields, places)
+        fields = self.profile.fields or (len(names) if names else 0)
+        return numbers, fields, self._places(names, fields)
 
     def _names(self, line: str) -> list[str]:
         separator = self.profile.text_separator
@@ -181,136 +215,80 @@ class _Reader:
         return places
 
     def _table(
-        self, lines: Lines, numbers: IndexArray, fields: int, places: dict[str | int, int]
+        self,
+        lines: Lines,
+        numbers: IndexArray,
+        fields: int,
+        places: dict[str | int, int],
+        is_last: bool,
     ) -> LoggerTable:
+        """The table of a part's lines of data; its rows are counted from the part's first."""
         counts = lines.field_counts(self.profile.text_separator)[numbers]
         short = counts != fields
-        findings = []
         if short.any():
-            line = int(numbers[np.argmax(short)])
+            line = self.lines_before + int(numbers[np.argmax(short)])
             fault = f"{fields} fields were expected, line {line + 1} has {int(counts[np.argmax(short)])}"
             if not self.profile.reject.wrong_field_count or 2 * np.count_nonzero(short) > len(numbers):
                 raise InputError(f"{self.file}: {fault} ({int(short.sum())} such rows); {self.hint}")
-            findings.append(_rejected(f"without {fields} fields", short))
+            self._reject(f"without {fields} fields", short)
         rows = np.flatnonzero(~short)
         content = lines.keep(numbers[rows])
         sources = {source: place for source, place in places.items() if source in self.profile.sources}
-        values = self._values(content, fields, list(sources.values()))
-        texts = {s: self._texts(content, fields, places[s]) for s in self.profile.text_sources}
-        seconds, stamps = self._seconds(texts)
-        faulty = np.any(~np.isfinite(values[self._filled(sources, values)]), axis=0)
+        values = field_numbers(content, self.profile, fields, list(sources.values()))
+        texts = {s: field_texts(content, self.profile, fields, places[s]) for s in self.profile.text_sources}
+        seconds = self._seconds(texts)
+        if self.filled is None:
+            self.filled = self._filled(sources, values)
+        faulty = np.any(~np.isfinite(values[self.filled]), axis=0)
         if seconds is not None:
             faulty = (faulty if len(sources) else np.zeros(len(rows), dtype=bool)) | np.isnan(seconds)
-        if self.is_cut and len(rows) and rows[-1] == len(numbers) - 1:
+        if self.is_cut and is_last and len(rows) and rows[-1] == len(numbers) - 1:
             faulty[-1] = True
         if faulty.any():
             line = int(numbers[rows[np.argmax(faulty)]])
+            place = f"line {self.lines_before + line + 1}"
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
                 raise InputError(
-                    f"{self.file}: line {line + 1} holds text or nothing in a number's place "
+                    f"{self.file}: {place} holds text or nothing in a number's place "
                     f"({int(faulty.sum())} such rows): {quoted(lines.line(line))}; {self.hint}"
                 )
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True
-            findings.append(_rejected("with text or nothing in a number's place", bad))
+            self._reject("with text or nothing in a number's place", bad)
             rows, values = rows[~faulty], values[:, ~faulty]
             texts = {source: held[~faulty] for source, held in texts.items()}
             seconds = None if seconds is None else seconds[~faulty]
-        columns = dict(zip(sources, values))
-        return LoggerTable(columns, rows, len(numbers), tuple(findings), texts, seconds, stamps)
+        compared = {source: texts[source] for source in self.profile.compared_texts}
+        return LoggerTable(dict(zip(sources, values)), rows, len(numbers), (), compared, seconds)
 
-    def _seconds(
-        self, texts: Mapping[str | int, NDArray[np.str_]]
-    ) -> tuple[FloatArray | None, Stamps | None]:
+    def _reject(self, what: str, rows: NDArray[np.bool_]) -> None:
+        """Count rejected rows; `rows` (n,) marks them among the data rows of a part."""
+        before = self.rejected.get(what)
+        count = int(np.count_nonzero(rows)) + (before.count if before else 0)
+        row = before.row if before else self.rows_before + int(np.argmax(rows)) + 1
+        message = f"{counted(count, 'row')} {what} left out"
+        self.rejected[what] = Finding("rejected_rows", message, row=row, count=count)
+
+    def _seconds(self, texts: Mapping[str | int, NDArray[np.str_]]) -> FloatArray | None:
         """Times since the first stamp [s], NaN where a text is none; nothing without a clock of stamps."""
         import pyarrow as pa
 
         places = self.profile.stamps
         if not places:
-            return None, None
+            return None
         columns = [texts[place] for place in places]
-        stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
-        if stamps is None:
-            raise InputError(
-                f"{self.file}: {quoted(str(columns[0][:1].tolist()))} is no date or time of day; {self.hint}"
-            )
-        clock = StampClock(stamps, self.file)
-        return clock.seconds([pa.array(column, pa.string()) for column in columns]), stamps
+        if self.clock is None:
+            stamps = stamps_of([(i, column[:1000].tolist()) for i, column in enumerate(columns)])
+            if stamps is None:
+                raise InputError(
+                    f"{self.file}: {quoted(str(columns[0][:1].tolist()))} is no date or time of day; "
+                    f"{self.hint}"
+                )
+            self.clock = StampClock(stamps, self.file)
+        return self.clock.seconds([pa.array(column, pa.string()) for column in columns])
 
     def _filled(self, places: dict[str | int, int], values: NDArray[np.float64]) -> NDArray[np.bool_]:
         """Which sources have a value in every row: those of another rate are empty in most, evenly so."""
         clock = self.profile.columns["time"].number if "time" in self.profile.columns else None
         kinds = zip(places, values, strict=True)
         return np.array([source == clock or not is_of_another_rate(column) for source, column in kinds])
-
-    def _texts(self, content: bytes, fields: int, position: int) -> NDArray[np.str_]:
-        """A source column as texts without blanks and quotation marks about them, shape (rows,)."""
-        import pyarrow as pa
-
-        (column,) = self._fields(content, fields, [position], pa.string(), []).columns
-        return np.char.strip(np.array(column.to_pylist(), dtype=np.str_), ' \t"')
-
-    def _fields(
-        self, content: bytes, fields: int, positions: list[int], kind: Any, nulls: list[str] | None
-    ) -> Any:
-        """Fields by position, as Arrow reads them."""
-        import pyarrow as pa
-        from pyarrow import csv
-
-        separator = self.profile.text_separator
-        if separator is None:
-            content, separator = single_blanks(content), " "
-        names = [str(position) for position in range(fields)]
-        wanted = [names[position] for position in positions]
-        return csv.read_csv(
-            pa.BufferReader(content),
-            csv.ReadOptions(column_names=names),
-            # A mark that is not closed must not swallow the lines below it.
-            csv.ParseOptions(delimiter=separator, quote_char=False, ignore_empty_lines=False),
-            csv.ConvertOptions(
-                column_types=dict.fromkeys(wanted, kind),
-                include_columns=sorted(set(wanted)),
-                decimal_point=self.profile.decimal,
-                null_values=nulls,
-                strings_can_be_null=nulls is not None,
-            ),
-        )
-
-    def _values(self, content: bytes, fields: int, positions: list[int]) -> NDArray[np.float64]:
-        """The source columns as numbers, shape (columns, rows); NaN where there is none."""
-        import pyarrow as pa
-
-        if not positions:
-            return np.empty((0, content.count(b"\n")))
-        wanted = [str(position) for position in positions]
-        try:
-            columns = self._fields(content, fields, positions, pa.float64(), None)
-        except pa.ArrowInvalid:
-            # Some field is no plain number: read text, and let what is none become NaN.
-            text = self._fields(content, fields, positions, pa.string(), [""])
-            numbers = [_numbers(text[name], self.profile.decimal) for name in text.column_names]
-            columns = pa.table(numbers, names=text.column_names)
-        return np.stack([columns[name].to_numpy() for name in wanted])
-
-
-def _numbers(text: Any, decimal: str) -> Any:
-    """Text as float64, null where it is no number."""
-    import pyarrow as pa
-    import pyarrow.compute as compute
-
-    plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
-    plain = compute.utf8_trim_whitespace(plain)
-    if decimal == ",":
-        plain = compute.replace_substring(plain, ",", ".")
-    plain = compute.replace_substring_regex(plain, r"^\+", "")
-    valid = compute.match_substring_regex(plain, r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
-    return compute.cast(compute.if_else(valid, plain, pa.scalar(None, pa.string())), pa.float64())
-
-
-def _rejected(what: str, rows: NDArray[np.bool_]) -> Finding:
-    """A finding that counts rejected rows; `rows` (n,) marks them among the data rows."""
-    count = int(np.count_nonzero(rows))
-    plural = "row" if count == 1 else "rows"
-    return Finding(
-        "rejected_rows", f"{count} {plural} {what} left out", row=int(np.argmax(rows)) + 1, count=count
-    )

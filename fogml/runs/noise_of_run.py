@@ -7,18 +7,19 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fogml.errors import InputError
 from fogml.runs.noise_series import (
-    AT_REST_DEG_S,
     NoiseSeries,
     joined,
+    rows_at_rest,
     series_of,
     spectrum_of_runs,
 )
 from fogml.runs.noise_words import doubts_of, gaps_of, model_told, words_of
 from fogml.runs.run import FloatArray, Run
+from fogml.signals import large
 from fogml.signals.allan import AllanResult, allan_deviation
 from fogml.signals.averages import block_averages
 from fogml.signals.noise_terms import NoiseTerms, noise_terms
@@ -123,7 +124,7 @@ def noise_report(
         "span_s": sum(one.span_s for one in runs),
         "stretches": len(segments),
         "gaps": gaps_of(runs),
-        "mean": float(np.mean(np.concatenate([one.gyro_deg_h for one in runs]))),
+        "mean": float(sum(one.gyro_deg_h.sum() for one in runs)) / sum(map(len, runs)),
         "taus_s": [float(f"{tau:.9g}") for tau in listed.taus_s],
         "adev": listed.adev.tolist(),
         "ci": np.column_stack((listed.lower, listed.upper)).tolist(),
@@ -201,16 +202,16 @@ def _warnings(run: Run, moving: dict[str, float], segments: list[slice]) -> list
             "and are not given, and long averaging times hold the drift; give a run at constant temperature."
         )
         warnings.append({"code": "moving_temperature", "message": message})
-    if not np.all(np.abs(run.rate) < AT_REST_DEG_S):
-        some = any(np.any(np.abs(run.rate[part]) < AT_REST_DEG_S) for part in segments)
+    still = rows_at_rest(run)
+    if not np.all(still):
+        some = any(np.any(still[part]) for part in segments)
         message = (
             "The table turns in part of the run: only rows at rest count."
             if some
             else "The table turns all through the run: its own noise and the scale factor's count too."
         )
         warnings.append({"code": "turning", "message": message})
-    intervals = np.delete(np.diff(run.time), run.gap_starts - 1)
-    if _spread(intervals) > UNEVEN * run.sample_s:
+    if _spread(run) > UNEVEN * run.sample_s:
         message = (
             f"Samples are not evenly spaced: averaging times take them as {run.sample_s:.4g} s apart, as "
             "they are on average."
@@ -219,5 +220,14 @@ def _warnings(run: Run, moving: dict[str, float], segments: list[slice]) -> list
     return warnings
 
 
-def _spread(intervals: NDArray[np.float64]) -> float:
-    return float(intervals.std()) if len(intervals) else 0.0
+def _spread(run: Run) -> float:
+    """Standard deviation of the sample intervals but for gaps [s]."""
+    intervals = sum(part.stop - 1 - part.start for part in run.stretches)
+    spent = sum(float(run.time[part.stop - 1] - run.time[part.start]) for part in run.stretches)
+    mean = spent / max(intervals, 1)
+    square = sum(
+        float(np.sum((steps - mean) ** 2))
+        for part in run.stretches
+        for _, steps in large.differences(run.time[part])
+    )
+    return float(np.sqrt(square / max(intervals, 1)))

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.thermal_columns import thermal_columns
+from fogml.signals import large
 from fogml.signals.holds import hold_of
-from fogml.signals.noise_spectrum import Spectrum, spectrum_of
+from fogml.signals.noise_spectrum import Rows, Spectrum, spectrum_of
+
+Follows = Callable[[FloatArray], FloatArray]
 
 AT_REST_DEG_S = 1e-3
 """Table rate under which the table stands [deg/s]."""
@@ -77,27 +80,41 @@ def spectrum_of_runs(series: Sequence[NoiseSeries], moving: Sequence[bool]) -> S
     follows = [thermal_columns(one.run) if moves else None for one, moves in zip(series, moving, strict=True)]
     columns = []
     for place, one in enumerate(series):
-        for time in one.times:
-            ramp = np.zeros((len(time), len(series)))
-            ramp[:, place] = time
-            drifts = [
-                (one_of(time) if other == place else np.zeros((len(time), one_of(time[:1]).shape[1])))
-                for other, one_of in enumerate(follows)
-                if one_of is not None
-            ]
-            columns.append(np.column_stack([ramp, *drifts]))
+        columns += [_rows_at(time, place, follows) for time in one.times]
     stretches = [part for one in series for part in one.stretches]
     return spectrum_of(stretches, series[0].new_s, columns)
 
 
+def _rows_at(time: FloatArray, place: int, follows: Sequence[Follows | None]) -> Rows:
+    """Columns of a stretch of one of several runs: a ramp of each run, and what its drift may follow."""
+
+    def rows(part: slice) -> FloatArray:
+        at = time[part]
+        ramp = np.zeros((len(at), len(follows)))
+        ramp[:, place] = at
+        drifts = [
+            (one_of(at) if other == place else np.zeros((len(at), one_of(at[:1]).shape[1])))
+            for other, one_of in enumerate(follows)
+            if one_of is not None
+        ]
+        return np.column_stack([ramp, *drifts])
+
+    return rows
+
+
 def stretches_at_rest(run: Run) -> list[slice]:
     """Stretches, cut down to rows at rest where the table both turns and stands."""
-    at_rest = np.abs(run.rate) < AT_REST_DEG_S
+    at_rest = rows_at_rest(run)
     if np.all(at_rest) or not np.any(at_rest):
         return list(run.stretches)
-    edges = np.flatnonzero(np.diff(at_rest)) + 1
+    edges = np.flatnonzero(at_rest[1:] != at_rest[:-1]) + 1
     bounds = np.union1d(np.concatenate(([0], edges, run.gap_starts)), [len(run)])
     return [slice(int(a), int(b)) for a, b in pairwise(bounds) if at_rest[a]]
+
+
+def rows_at_rest(run: Run) -> BoolArray:
+    """Where the table stands, shape (n,)."""
+    return large.each(lambda rate: np.abs(rate) < AT_REST_DEG_S, run.rate, kind=bool)
 
 
 def sample_interval(run: Run, segments: list[slice]) -> float:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from fogml.runs.columns import DUTY, column_spec
 from fogml.runs.findings import Finding
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 
@@ -49,12 +50,12 @@ def on_gyro_rows(
         Columns of shape (m,), the rows that they are of, and a finding for each column that was filled.
     """
     time = columns["time"]
-    rows = np.arange(len(time), dtype=np.intp)
+    rows = large.count_up(len(time))
     if not any(np.isnan(values).any() for values in columns.values()):
         return dict(columns), rows, ()
     findings = []
     if is_of_another_rate(columns["gyro"]):
-        rows = np.flatnonzero(~np.isnan(columns["gyro"]))
+        rows = large.places(~np.isnan(columns["gyro"]))
         message = (
             f"'gyro' is in {len(rows)} of {len(time)} rows: the others, of another rate, are brought to these"
         )

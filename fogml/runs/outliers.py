@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.run import FloatArray
+from fogml.signals import large
 
 OUTLIER_SIGMA = 8.0
 """Robust standard deviations off its neighbours from which on a sample is an outlier."""
@@ -48,20 +49,28 @@ def find_outliers(
     if len(gyro) <= 2 * _HALF:
         return none
     size = _off_neighbours(gyro)
-    np.abs(size, out=size)
+    for part in large.pieces(size):
+        np.abs(size[part], out=size[part])
     # The first and the last sample lie on one side of all others: a line through four goes on there.
     for end, (a, b, d) in ((0, gyro[[1, 2, 4]]), (-1, gyro[[-2, -3, -5]])):
         size[end] = min(size[end], abs(gyro[end] - (a + 0.5 * (b - d))))
     if _none_stands_out(size):
         return none
     sigma = _sigma(size, gyro)
-    found = np.flatnonzero(size > OUTLIER_SIGMA * sigma)
+    # Values of one block share their sigma.
+    found = np.concatenate(
+        [
+            part.start
+            + np.flatnonzero(size[part] > OUTLIER_SIGMA * sigma[np.arange(part.start, part.stop) // _BLOCK])
+            for part in large.pieces(size)
+        ]
+    )
     if len(found) and rate_deg_s is not None:
         moved = np.abs(_off_neighbours(rate_deg_s)[found])
         # The output may be in counts: stand-outs are compared with each column's own span.
         shares = moved / (np.ptp(rate_deg_s) or 1.0), size[found] / np.ptp(gyro)
         found = found[shares[0] < 0.5 * shares[1]]
-    return found, sigma[found]
+    return found, sigma[found // _BLOCK]
 
 
 def _none_stands_out(size: FloatArray) -> bool:
@@ -78,19 +87,22 @@ def _none_stands_out(size: FloatArray) -> bool:
 
 
 def _sigma(size: FloatArray, values: FloatArray) -> FloatArray:
-    """Robust standard deviation of the noise about each sample, shape (n,).
+    """Robust standard deviation of the noise about each block of samples, shape (blocks,).
 
     That of white noise of which 90 % deviates as little from the median of five, or of which half
     has second differences as small, whichever is greater: the first knows slow noise and coarse
     steps, the second noise on a ramp. Where both are 0, a step of the output stands for its noise.
     """
-    bends = np.abs(values[2:] - 2.0 * values[1:-1] + values[:-2])
-    sigma = np.maximum(_of_blocks(size, _SHARE) / _WITHIN, _of_blocks(np.pad(bends, 1), 0.5) / _BEND_WITHIN)
+    bends = large.empty(len(values))
+    bends[[0, -1]] = 0.0
+    for part in large.pieces(values, overlap=2):
+        x = values[part]
+        bends[part.start + 1 : part.stop - 1] = np.abs(x[2:] - 2.0 * x[1:-1] + x[:-2])
+    sigma = np.maximum(_of_blocks(size, _SHARE) / _WITHIN, _of_blocks(bends, 0.5) / _BEND_WITHIN)
     usual = float(np.median(sigma))
     if usual == 0.0:
-        steps = np.abs(np.diff(values))
-        usual = float(np.median(steps[steps > 0.0])) if steps.any() else 0.0
-    return np.repeat(np.maximum(sigma, usual), _BLOCK)[: len(size)]
+        usual = large.median(lambda: (np.abs(step[step != 0.0]) for _, step in large.differences(values)))
+    return np.fmax(sigma, usual)
 
 
 def _of_blocks(size: FloatArray, share: float) -> FloatArray:
@@ -101,8 +113,8 @@ def _of_blocks(size: FloatArray, share: float) -> FloatArray:
 def _blocks(size: FloatArray) -> Iterator[FloatArray]:
     """Blocks of samples as rows, all of one length; the last one, which ends at the end, by itself."""
     whole = len(size) // _BLOCK * _BLOCK
-    if whole:
-        yield size[:whole].reshape(-1, _BLOCK)
+    for part in large.pieces(size[:whole], least=_BLOCK) if whole else ():
+        yield size[part].reshape(-1, _BLOCK)
     if whole < len(size):
         yield size[None, -_BLOCK:]
 
@@ -110,11 +122,12 @@ def _blocks(size: FloatArray) -> Iterator[FloatArray]:
 def _off_neighbours(values: FloatArray) -> FloatArray:
     """Each value less the median of the five about it, mirrored at the ends; shape (n,)."""
     n = len(values)
-    off = np.empty(n)
+    off = large.empty(n)
     # Chunks stay in the processor's cache.
-    for start in range(_HALF, n - _HALF, _CHUNK):
-        stop = min(start + _CHUNK, n - _HALF)
-        _less_median(values[start - _HALF : stop + _HALF], off[start:stop])
+    for part in large.pieces(values[_HALF : n - _HALF], least=_CHUNK):
+        for start in range(part.start + _HALF, part.stop + _HALF, _CHUNK):
+            stop = min(start + _CHUNK, part.stop + _HALF)
+            _less_median(values[start - _HALF : stop + _HALF], off[start:stop])
     ends = min(2 * _HALF, n)
     _less_median(np.pad(values[:ends], (_HALF, 0), mode="reflect"), off[: ends - _HALF])
     _less_median(np.pad(values[-ends:], (0, _HALF), mode="reflect"), off[_HALF - ends :])

@@ -69,6 +69,18 @@ def parquet_rows(path: Path) -> int:
         return max((max(array.shape) for array in stored.arrays), default=0)
 
 
+def parquet_values(path: Path) -> int:
+    """Number of values of a Parquet file, in all its columns.
+
+    Raises
+    ------
+    InputError
+        If the file is damaged.
+    """
+    with stored_file(path, "parquet", (), DEFAULT_LIMITS) as stored:
+        return sum(max(array.shape) for array in stored.arrays)
+
+
 def parquet_marks(path: Path, cell: str) -> NDArray[np.str_]:
     """The texts of a column of marks, shape (n,), by its header cell.
 

@@ -13,6 +13,7 @@ from fogml.errors import InputError
 from fogml.runs.findings import Finding
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.turning import turning
+from fogml.signals import large
 
 HOUR_S = 3600.0
 FACTORS = {
@@ -119,7 +120,7 @@ def _temperature_units(run: Run) -> Iterator[Finding]:
 
 def _unit_told(values: FloatArray) -> str | None:
     """What a temperature seems to be in, if not in degC."""
-    low, middle, high = (float(q) for q in np.quantile(values, [0.02, 0.5, 0.98]))
+    low, middle, high = large.quantiles(large.parts_of(values), [0.02, 0.5, 0.98])
     if KELVIN[0] <= low and high <= KELVIN[1] and middle > HOTTEST_DEGC:
         return f"reads {low:.4g} to {high:.4g}: kelvin? Write the header with [K]"
     if low > COUNTS or high < -COUNTS:
@@ -129,12 +130,12 @@ def _unit_told(values: FloatArray) -> str | None:
 
 def _thermometers(run: Run) -> Iterator[Finding]:
     names = [name for name in run.temperature_columns if _unit_told(run.columns[name]) is None]
-    means = {name: float(np.median(run.columns[name])) for name in names}
+    means = {name: large.median(large.parts_of(run.columns[name])) for name in names}
     pairs = [(a, b) for a in names for b in names if means[b] > means[a]]
     odd = {}
     for cold, warm in pairs:
         is_far = means[warm] - means[cold] > _APART_IN_FAHRENHEIT and warm not in odd
-        if is_far and _same(run.columns[warm], 1.8 * run.columns[cold] + 32.0):
+        if is_far and _same_in_fahrenheit(run.columns[warm], run.columns[cold]):
             odd[warm] = f"'{warm}' is 1.8 times '{cold}' and 32 more: Fahrenheit? Convert it to degC"
     for name, told in odd.items():
         yield Finding("implausible_temperature", told, column=name, count=len(run))
@@ -147,24 +148,24 @@ def _thermometers(run: Run) -> Iterator[Finding]:
         yield Finding("thermometers_apart", told, column=a, count=len(run))
 
 
-def _same(a: FloatArray, b: FloatArray) -> bool:
-    """Whether two thermometers read the same, most of the time."""
-    return float(np.quantile(np.abs(a - b), 0.9)) < _RELATED_DEGC and float(np.ptp(b)) > _RELATED_DEGC
+def _same_in_fahrenheit(warm: FloatArray, cold: FloatArray) -> bool:
+    """Whether one thermometer reads in Fahrenheit what another reads in degC, most of the time."""
+    apart = large.parts_of(warm, lambda a, b: np.abs(a - (1.8 * b + 32.0)), cold)
+    return large.quantiles(apart, [0.9])[0] < _RELATED_DEGC and 1.8 * float(np.ptp(cold)) > _RELATED_DEGC
 
 
 def _scale_factor(run: Run, gyro: FloatArray) -> Iterator[Finding]:
     turns = turning(run) if "rate" in run.columns else np.zeros(len(run), dtype=bool)
     if np.count_nonzero(turns) < 2:
         return
-    rate = 3600.0 * run.rate[turns]
-    output = gyro[turns]
-    ratios = output / rate
-    middle = float(np.median(ratios))
-    spread = float(np.median(np.abs(ratios - middle)))
+    rate = large.chosen(run.rate, turns)
+    ratios = large.each(lambda output, rate: output / (3600.0 * rate), large.chosen(gyro, turns), rate)
+    middle = large.median(large.parts_of(ratios))
+    spread = large.median(large.parts_of(ratios, lambda part: np.abs(part - middle)))
     if abs(middle - 1.0) <= FAR_SCALE_FACTOR or spread > abs(middle) / LEAST_TURN_SIGMA:
         return
     told = f"the output follows the table rate {middle:.4g} times, {1e6 * (middle - 1.0):.3g} ppm off: "
-    yield Finding("implausible_scale_factor", told + _why(middle), column="gyro", count=len(output))
+    yield Finding("implausible_scale_factor", told + _why(middle), column="gyro", count=len(ratios))
 
 
 def _why(ratio: float) -> str:
@@ -185,9 +186,9 @@ def _earth_rate(run: Run, gyro: FloatArray) -> Iterator[Finding]:
     rest = ~turning(run) if "rate" in run.columns else np.ones(len(run), dtype=bool)
     if np.count_nonzero(rest) < 2:
         return
-    at_rest = gyro[rest]
-    mean = float(np.median(at_rest))
-    scatter = 1.4826 * float(np.median(np.abs(at_rest - mean)))
+    at_rest = large.chosen(gyro, rest)
+    mean = large.median(large.parts_of(at_rest))
+    scatter = 1.4826 * large.median(large.parts_of(at_rest, lambda part: np.abs(part - mean)))
     why = None
     if abs(mean + earth) < NEAR_EARTH_RATE * abs(earth):
         why = _why(-1.0)

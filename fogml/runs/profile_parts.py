@@ -148,8 +148,12 @@ class TextLayout(Strict):
     @property
     def text_sources(self) -> tuple[Source, ...]:
         """The columns of text that are read: stamps, and those that are compared with texts."""
-        wanted = [*self.stamps, *(rule.source for rule in self.where if rule.texts)]
-        return tuple(dict.fromkeys(wanted))
+        return tuple(dict.fromkeys([*self.stamps, *self.compared_texts]))
+
+    @property
+    def compared_texts(self) -> tuple[Source, ...]:
+        """The columns that are compared with texts, each once."""
+        return tuple(dict.fromkeys(rule.source for rule in self.where if rule.texts))
 
     @property
     def stamps(self) -> tuple[Source, ...]:

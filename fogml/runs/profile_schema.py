@@ -154,10 +154,10 @@ class ImportProfile(TextLayout):
         return tuple(dict.fromkeys([*super().sources, *self.axes.values(), *states, *self.keep]))
 
     @property
-    def text_sources(self) -> tuple[Source, ...]:
-        """The columns of text that the profile uses."""
+    def compared_texts(self) -> tuple[Source, ...]:
+        """The columns that are compared with texts, each once."""
         states = [leg.source for leg in self.legs.values() if isinstance(leg, LegByState) and leg.texts]
-        return tuple(dict.fromkeys([*super().text_sources, *states]))
+        return tuple(dict.fromkeys([*super().compared_texts, *states]))
 
 
 def check_joined(log: JoinedLog) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, counted, quoted
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion, parse_header
@@ -28,6 +28,7 @@ from fogml.runs.profile_schema import ImportProfile, load_profile, profile_names
 from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
+from fogml.signals import large
 from fogml.yaml_text import read_yaml
 
 __all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
@@ -154,7 +155,7 @@ def runs_from_table(
     for name, (leg, this_axis) in run_names(profile, stem).items():
         if axis is None or this_axis == axis:
             part, found = _leg(table, profile, leg, file)
-            rows = table.rows[part]
+            rows = large.chosen(table.rows, part)
             if not len(rows):
                 raise InputError(f"{file}: no rows are left; the profile rejects them all")
             findings = [*table.findings, *found]
@@ -185,7 +186,7 @@ def _tick_s(profile: ImportProfile) -> float:
 
 def _from_zero(run: Run) -> Run:
     """The run with a clock that begins at 0."""
-    columns = {**run.columns, "time": run.time - run.time[:1]}
+    columns = {**run.columns, "time": large.each(lambda time: time - run.time[:1], run.time)}
     return Run.derived(run.name, columns, run.facts, run.gyro_unit, run.findings)
 
 
@@ -213,10 +214,9 @@ def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> Logge
     if not steps.any():
         return table
     count = int(np.flatnonzero(steps)[-1]) + 1
-    plural = "row" if count == 1 else "rows"
     finding = Finding(
         "rejected_rows",
-        f"{count} leading {plural} left out: {quoted(str(rule.source))} then jumps by more than "
+        f"{counted(count, 'leading row')} left out: {quoted(str(rule.source))} then jumps by more than "
         f"{rule.more_than:g}",
         row=int(table.rows[0]) + 1,
         count=count,
@@ -226,24 +226,24 @@ def _without_leading_rows(table: LoggerTable, rule: LeadingJump | None) -> Logge
 
 def _leg(
     table: LoggerTable, profile: ImportProfile, leg: str | None, file: str
-) -> tuple[NDArray[np.intp], tuple[Finding, ...]]:
+) -> tuple[NDArray[np.bool_] | slice, tuple[Finding, ...]]:
     """The rows of a leg, and how many rows of the file belong to none."""
     if leg is None:
-        return np.arange(len(table.rows)), ()
+        return slice(None), ()
     inside = {name: rows_of_leg(table, profile, name, file) for name in profile.legs}
     outside = ~np.any(list(inside.values()), axis=0)
     findings: tuple[Finding, ...] = ()
     if outside.any():
         count = int(np.count_nonzero(outside))
-        message = f"{count} {'row' if count == 1 else 'rows'} of the file in no leg left out"
+        message = f"{counted(count, 'row')} of the file in no leg left out"
         row = int(table.rows[np.argmax(outside)]) + 1
         findings = (Finding("rejected_rows", message, row=row, count=count),)
-    return np.flatnonzero(inside[leg]), findings
+    return inside[leg], findings
 
 
 def _columns(
     table: LoggerTable,
-    part: NDArray[np.intp],
+    part: NDArray[np.bool_] | slice,
     profile: ImportProfile,
     axis: str | None,
     file: str,
@@ -253,13 +253,14 @@ def _columns(
     for name, column in profile.columns.items():
         source = profile.axes[axis] if name == "gyro" and axis is not None else column.number
         if source is not None:
-            columns[name] = internal(table.columns[source][part], name, column)
-    rows = table.rows[part]
+            columns[name] = internal(large.chosen(table.columns[source], part), name, column)
+    rows = large.chosen(table.rows, part)
     if profile.sample_s is not None:
+        sample_s = np.float64(profile.sample_s)
         with np.errstate(over="ignore", invalid="ignore"):
-            columns["time"] = (rows - rows[:1]) * np.float64(profile.sample_s)
+            columns["time"] = large.each(lambda row: (row - rows[:1]) * sample_s, rows)
     elif table.seconds is not None:
-        columns["time"] = table.seconds[part]
+        columns["time"] = large.chosen(table.seconds, part)
     for name, values in columns.items():
         lost = np.isinf(values)
         if lost.any():
@@ -270,9 +271,9 @@ def _columns(
     start = 0.0 if profile.sample_s is None or not len(rows) else float(rows[0]) * profile.sample_s
     for log in joined:
         for name in log.keys() - {"time"}:
-            columns[name] = interpolated(columns["time"] + start, log["time"], log[name])
+            columns[name] = interpolated(columns["time"], log["time"] - start, log[name])
     for source in profile.keep:
-        columns[parse_header(source)[0]] = table.columns[source][part]
+        columns[parse_header(source)[0]] = large.chosen(table.columns[source], part)
     order = ["time", "gyro", *(name for name in columns if name not in ("time", "gyro"))]
     return {name: columns[name] for name in order}
 

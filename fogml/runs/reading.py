@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+import math
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from fogml.errors import InputError, listed, quoted
@@ -10,11 +12,13 @@ from fogml.readers import READERS, reader_of, reader_of_content
 from fogml.runs.assemble import MOST_DROPPED, Assembler, needs_whole, runs_of_table, too_short
 from fogml.runs.checks import check_run
 from fogml.runs.columns import parse_header
+from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, empty_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 from fogml.runs.three_axes import OneAxis
+from fogml.signals.large import Growing
 
 BLOCK_ROWS = 1_000_000
 _HEAD_BYTES = 1024
@@ -102,7 +106,11 @@ def read_runs(
     path = Path(path)
     with unchanged(*run_sources(path)):
         one = OneAxis(axis)
-        table = one.table(_read_table(path, file_format(path), repair, limits))
+        kind = file_format(path)
+        if not repair and _is_long(path, kind, limits):
+            long = _joined(path, read_blocks(path, axis=axis, limits=limits), name)
+            return [long.with_findings(check_run(long))]
+        table = one.table(_read_table(path, kind, repair, limits))
         runs = runs_of_table(table, path, repair=repair, name=name, most_dropped=most_dropped)
     return [run.with_findings(check_run(run)) for run in map(one.run, runs)]
 
@@ -171,11 +179,35 @@ def read_blocks(
                     f"{path.name}: no column {quoted(missing[0])} of numbers; it holds {listed(held)}"
                 )
             if assembler.samples == 0 and needs_whole(table):
-                yield from _cut(read_run(path, axis=axis, limits=limits), columns, block_rows)
+                whole = replace(limits, long_mb=math.inf)
+                yield from _cut(read_run(path, axis=axis, limits=whole), columns, block_rows)
                 return
             yield one.run(assembler.block(table))
         if assembler.samples < 2:
             raise too_short(path.name, assembler.samples)
+
+
+def _is_long(path: Path, kind: str, limits: ReadingLimits) -> bool:
+    """Whether a file is read into temporary ones, block by block, and not into memory."""
+    size = float(path.stat().st_size)
+    if kind == "parquet":
+        from fogml.runs.parquet_files import parquet_values
+
+        size = max(size, 8.0 * parquet_values(path))
+    return size > 1e6 * limits.long_mb
+
+
+def _joined(path: Path, blocks: Iterable[Run], name: str | None) -> Run:
+    """Blocks of a run as one, whose columns lie in temporary files where they are long."""
+    columns: dict[str, Growing] = {}
+    findings: dict[Finding, None] = {}
+    for block in blocks:
+        for column, values in block.columns.items():
+            columns.setdefault(column, Growing()).append(values)
+        findings.update(dict.fromkeys(block.findings))
+        last = block
+    held = {column: values.array() for column, values in columns.items()}
+    return Run.derived(name or path.name, held, last.facts, last.gyro_unit, tuple(findings))
 
 
 def _cut(run: Run, columns: Collection[str] | None, block_rows: int) -> Iterator[Run]:

@@ -31,6 +31,10 @@ class ReadingLimits:
         Most bytes that a byte of the file stands for; deflate's own limit is 1032 (zlib technical details).
     spare_mb
         What a file may stand for in any case [MB].
+    long_mb
+        A larger file [MB], or a Parquet file of more values, is not read into memory: its columns go block by
+        block into temporary files (``TMPDIR``). Smaller ones are quicker to hold; a run of them takes a few
+        times as much while it is looked into.
     """
 
     cpu_s: float = 10.0
@@ -40,6 +44,7 @@ class ReadingLimits:
     memory_per_byte: float = 20.0
     expansion: float = 1032.0
     spare_mb: float = 16.0
+    long_mb: float = 64.0
 
     def at_least(self, cpu_s_per_mb: float, memory_per_byte: float) -> ReadingLimits:
         """The limits for a format that takes so much more than others."""

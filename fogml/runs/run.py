@@ -20,6 +20,7 @@ from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_t
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns
+from fogml.signals import large
 from fogml.signals.clock import Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
@@ -142,7 +143,8 @@ class Run:
                 f"{self.name}: column 'gyro' is in counts and no scale factor is stated; add "
                 "'scale_factor: {value: ..., unit: \"count per deg/h\"}' to the side file"
             )
-        return self.gyro / self.facts.scale_factor.count_per_deg_h
+        count_per_deg_h = self.facts.scale_factor.count_per_deg_h
+        return large.each(lambda gyro: gyro / count_per_deg_h, self.gyro)
 
     @cached_property
     def rate(self) -> FloatArray:
@@ -157,12 +159,13 @@ class Run:
     @cached_property
     def reference_deg_h(self) -> FloatArray:
         """Reference rate [deg/h], shape (n,): table rate plus Earth rate where it is known."""
-        return 3600.0 * self.rate + (self.facts.earth_rate_deg_h or 0.0)
+        earth_deg_h = self.facts.earth_rate_deg_h or 0.0
+        return large.each(lambda rate: 3600.0 * rate + earth_deg_h, self.rate)
 
     @cached_property
     def error_deg_h(self) -> FloatArray:
         """Gyro output less reference rate [deg/h], shape (n,): what a drift model describes."""
-        return self.gyro_deg_h - self.reference_deg_h
+        return large.each(np.subtract, self.gyro_deg_h, self.reference_deg_h)
 
     @cached_property
     def temperature_columns(self) -> tuple[str, ...]:
@@ -208,7 +211,8 @@ class Run:
     def _sensor_mean(self, sensors: tuple[str, ...]) -> FloatArray:
         means: dict[tuple[str, ...], FloatArray] = self.__dict__.setdefault("_sensor_means", {})
         if sensors not in means:
-            means[sensors] = np.mean([self._readings[c].values for c in sensors], axis=0)
+            readings = [self._readings[c].values for c in sensors]
+            means[sensors] = large.each(lambda *values: np.mean(values, axis=0), *readings)
         return means[sensors]
 
     @cached_property
@@ -302,7 +306,8 @@ class Run:
         digest = hashlib.sha256(self.gyro_unit.encode())
         for name in sorted(self.columns):
             digest.update(name.encode())
-            digest.update(np.ascontiguousarray(self.columns[name]).data)
+            for part in large.pieces(values := self.columns[name]):
+                digest.update(np.ascontiguousarray(values[part]).data)
         return digest.hexdigest()
 
     def __getitem__(self, part: slice) -> Run:

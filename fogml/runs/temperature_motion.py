@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.runs.turning import white_noise
+from fogml.signals import large
+from fogml.signals.clock import gap_starts
 
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
@@ -146,14 +148,15 @@ def find_motion(time: FloatArray, sample_s: float, temperatures: Sequence[FloatA
 
 
 def _grid(time: FloatArray, sample_s: float, bin_s: float) -> Grid:
-    steps = np.diff(time)
-    cut = steps > max(LONGEST_BRIDGE_S, 10.0 * sample_s)
-    number = np.floor((time - time[0]) / bin_s * (1.0 + 1e-12))
-    starts = np.concatenate([[0], np.flatnonzero((np.diff(number) > 0) | cut) + 1])
-    part_of_row = np.concatenate([[0], np.cumsum(cut)])
-    first = np.concatenate([[0], np.flatnonzero(cut) + 1])
+    cuts = gap_starts(time, sample_s, max(LONGEST_BRIDGE_S, 10.0 * sample_s))
+    begins = [cuts]
+    for rows in large.pieces(time, overlap=1):
+        number = np.floor((time[rows] - time[0]) / bin_s * (1.0 + 1e-12))
+        begins.append(rows.start + np.flatnonzero(np.diff(number) > 0) + 1)
+    starts = np.union1d([0], np.concatenate(begins)).astype(np.intp)
+    first = np.concatenate([[0], cuts])
     last = np.concatenate([first[1:] - 1, [len(time) - 1]])
-    part = part_of_row[starts]
+    part = np.searchsorted(cuts, starts, side="right")
     grid = Grid(starts, len(time), np.empty(0), part, time[first][part], time[last][part])
     return Grid(starts, len(time), grid.averages(time), part, grid.low, grid.high)
 

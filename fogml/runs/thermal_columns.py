@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fogml.runs.run import FloatArray, Run
+from fogml.signals import large
 from fogml.signals.memory import Lag
 
 _LAGS_S = (60.0, 300.0, 1200.0, 3600.0)
@@ -37,6 +38,7 @@ def thermal_columns(run: Run) -> Callable[[FloatArray], FloatArray]:
     at = np.arange(0, len(run), max(len(run) // _COARSE // 2, 1))
     counts = np.diff(np.append(at, len(run)))
     coarse, time = (np.add.reduceat(values, at) / counts for values in (temperature, run.time))
+    large.release()
     t = (coarse - coarse.mean()) / (float(np.std(coarse)) or 1.0)
     step = float(np.median(np.diff(time))) if len(time) > 1 else 1.0
     lags = [Lag(max(lag_s, step), step).push(time, t)[0] for lag_s in _LAGS_S]

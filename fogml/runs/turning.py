@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.signals import large
 
 LEAST_RATE_DEG_S = 1e-3
 """Table rates below this count as zero [deg/s]."""
@@ -14,7 +15,8 @@ def white_noise(values: FloatArray) -> float:
     """Standard deviation of white noise on a series of plateaus, by the median of second differences."""
     if len(values) < 4:
         return 0.0
-    return float(np.median(np.abs(np.diff(values, 2)))) / 0.6745 / float(np.sqrt(6.0))
+    bends = large.median(lambda: (np.abs(part) for _, part in large.differences(values, 2)))
+    return bends / 0.6745 / float(np.sqrt(6.0))
 
 
 def turning(run: Run) -> BoolArray:
@@ -22,7 +24,8 @@ def turning(run: Run) -> BoolArray:
 
     A measured rate counts as zero within six times its own noise.
     """
-    return np.asarray(np.abs(run.rate) > least_rate_deg_s(run))
+    least = least_rate_deg_s(run)
+    return large.each(lambda rate: np.abs(rate) > least, run.rate, kind=bool)
 
 
 def least_rate_deg_s(run: Run) -> float:

@@ -19,6 +19,7 @@ from fogml.runs.columns import column_spec, header
 from fogml.runs.facts import SIDE_SUFFIXES, Facts, read_side_file, side_file, side_file_text
 from fogml.runs.raw_table import FACTS_KEY
 from fogml.runs.run import Run
+from fogml.signals import large
 
 if TYPE_CHECKING:
     from pyarrow import Schema, Table
@@ -45,7 +46,8 @@ def write_run(run: Run, path: str | Path, *, mat_version: Literal["5", "7.3"] | 
     cells = header_cells(run)
     if suffix in (".csv", ".parquet"):
         with BlockWriter(path, run.facts) as writer:
-            writer.write(run)
+            for part in large.pieces(run.time, least=_ROW_GROUP):
+                writer.write(run[part])
         return
     _check_finite(path, {cell: run.columns[name] for name, cell in cells.items()}, carried_cells(run))
     with _with_side_file(path, run.facts) as partial:

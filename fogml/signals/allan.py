@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.signals import large
 from fogml.signals.allan_confidence import degrees_of_freedom, noise_exponents, variance_interval
 
 FloatArray = NDArray[np.float64]
@@ -119,6 +120,7 @@ def allan_deviation(
     from fogml.signals import allan_kernel as kernel
 
     phases, edges = kernel.phase(values, starts, stops)
+    large.release()
     squares = kernel.second_difference_squares if overlapping else kernel.stepped_second_difference_squares
     sums, counts = squares(phases, edges, factors)
     if not np.all(np.isfinite(sums)):
@@ -128,6 +130,7 @@ def allan_deviation(
     from_one = np.union1d([1], factors)
     averages = (lengths[None, :] // from_one[:, None]).sum(axis=1)
     exponent = noise_exponents(kernel.lag_sums(phases, edges, from_one), averages)
+    large.release()
     exponent = exponent[np.searchsorted(from_one, factors)]
     edf = np.array(
         [

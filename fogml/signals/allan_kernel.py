@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.signals import large
 from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
@@ -38,7 +39,7 @@ def phase(values: FloatArray, starts: IntArray, stops: IntArray) -> tuple[FloatA
     """
     lengths = stops - starts
     edges = np.concatenate(([0], np.cumsum(lengths + 1))).astype(np.int64)
-    phases = np.empty(int(edges[-1]))
+    phases = large.empty(int(edges[-1]))
     phases[edges[:-1]] = 0.0
     segment, number = _pieces(lengths, _SUM_BLOCK)
     first = starts[segment] + number * _SUM_BLOCK

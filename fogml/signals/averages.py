@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.signals import large
 from fogml.signals.clock import GAP_SHARE, Clock, gap_starts
 
 FloatArray = NDArray[np.float64]
@@ -106,13 +107,13 @@ def _windows(time: FloatArray, window_s: float, start: float | None) -> tuple[In
     sample_s = Clock(kept).sample_s
     cuts = gap_starts(kept, sample_s, GAP_SHARE * window_s)
     edges = np.concatenate(([0], cuts, [len(kept)]))
-    if start is None:
-        origin: FloatArray | float = np.repeat(kept[edges[:-1]], np.diff(edges))
-    else:
-        origin = start
-    number = np.floor((kept - origin + _ROUNDING * sample_s) / window_s)
-    opens = np.flatnonzero(np.diff(number)) + 1
-    starts = np.union1d(edges[:-1], opens)
+    opens = [edges[:-1]]
+    for part in large.pieces(kept, overlap=1):
+        rows = np.arange(part.start, part.stop)
+        origin = kept[edges[np.searchsorted(edges, rows, side="right") - 1]] if start is None else start
+        number = np.floor((kept[part] - origin + _ROUNDING * sample_s) / window_s)
+        opens.append(part.start + np.flatnonzero(np.diff(number)) + 1)
+    starts = np.unique(np.concatenate(opens))
     stops = np.append(starts[1:], len(kept))
     covered = kept[stops - 1] - kept[starts] + sample_s
     full = covered >= 0.5 * window_s - _ROUNDING * sample_s
@@ -128,9 +129,18 @@ def _means(values: FloatArray, starts: IndexArray, stops: IndexArray) -> FloatAr
     # Without its first value, a time or a rate far from zero loses no digits in the sums.
     origin = values[starts[0]]
     # reduceat sums between neighbouring edges, so dropped windows are summed and left out.
-    edges = np.unique(np.concatenate((starts, stops)))
-    inside = edges[edges < len(values)]
-    sums = np.add.reduceat(values - origin, inside, axis=0)
-    chosen = sums[np.searchsorted(inside, starts)]
+    edges = np.unique(np.concatenate((starts, stops, [len(values)])))
+    sums = np.empty((len(edges) - 1, *values.shape[1:]))
+    first = 0
+    while first < len(sums):
+        # Windows of a piece of a long series, one at least.
+        last = len(sums)
+        if len(values) > large.HELD_VALUES:
+            last = max(int(np.searchsorted(edges, edges[first] + large.PIECE, side="right")) - 1, first + 1)
+        part = values[edges[first] : edges[last]]
+        sums[first:last] = np.add.reduceat(part - origin, edges[first:last] - edges[first], axis=0)
+        large.release()
+        first = last
+    chosen = sums[np.searchsorted(edges, starts)]
     counts = (stops - starts).reshape(-1, *([1] * (values.ndim - 1)))
     return np.asarray(chosen / counts + origin)

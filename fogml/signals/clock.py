@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -62,7 +63,7 @@ class Clock:
         if len(self.time) < 2:
             return 0.0
         # On a grid all intervals are the median, and telling that is much quicker than sorting.
-        return self.grid_s or float(np.median(np.diff(self.time)))
+        return self.grid_s or large.median(lambda: (steps for _, steps in large.differences(self.time)))
 
     @cached_property
     def grid_s(self) -> float | None:
@@ -81,11 +82,12 @@ class Clock:
         if abs(interval - nominal) > EDGE_TOLERANCE * nominal + 4.0 * noise:
             return None
         grid = interval * np.arange(min(_CHUNK, n))
-        for low in range(0, n, _CHUNK):
-            off = time[low : low + _CHUNK] - (time[0] + low * interval)
-            off -= grid[: len(off)]
-            if off.max() > tolerance or off.min() < -tolerance:
-                return None
+        for part in large.pieces(time, least=_CHUNK):
+            for low in range(part.start, part.stop, _CHUNK):
+                off = time[low : min(low + _CHUNK, part.stop)] - (time[0] + low * interval)
+                off -= grid[: len(off)]
+                if off.max() > tolerance or off.min() < -tolerance:
+                    return None
         return interval
 
 
@@ -101,7 +103,9 @@ def gap_starts(time: FloatArray, sample_s: float, longest_s: float = 0.0) -> NDA
     longest_s
         Longest interval [s] that counts as none.
     """
-    return np.flatnonzero(np.diff(time) > max(GAP_INTERVALS * sample_s, longest_s)) + 1
+    limit = max(GAP_INTERVALS * sample_s, longest_s)
+    found = [at + np.flatnonzero(steps > limit) + 1 for at, steps in large.differences(time)]
+    return np.concatenate(found) if found else np.empty(0, dtype=np.intp)
 
 
 def longest_gap_s(window_s: float, sample_s: float) -> float:

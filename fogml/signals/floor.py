@@ -21,10 +21,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
 from fogml.intervals import Z90
+from fogml.signals import large
 from fogml.signals.allan import Segments, segment_bounds
 from fogml.signals.averages import block_averages
 from fogml.signals.averages_noise import FastNoise, averages_variance, fast_noise
-from fogml.signals.noise_spectrum import spectrum_of
+from fogml.signals.noise_spectrum import Rows, spectrum_of
 from fogml.signals.quiet_rows import quiet_parts, without_spikes
 from fogml.signals.spectrum_fit import SpectrumFit, SpectrumModel, SpectrumTerms
 
@@ -175,7 +176,8 @@ def floor_model(
     stretches = [without_spikes(values[a:b]) for a, b in parts]
     if all(np.ptp(part) == 0.0 for part in stretches):
         return None
-    tables = None if columns is None else [columns(np.arange(a, b)) for a, b in parts]
+    large.release()
+    tables = None if columns is None else [_from(columns, a) for a, _ in parts]
     spectrum = spectrum_of(stretches, sample_s, tables)
     if not np.any(spectrum.power > 0.0):
         return None
@@ -211,6 +213,11 @@ def floor_model(
     whole = int(np.sum(stops - starts))
     loud = 1.0 - sum(map(len, stretches)) / whole
     return FloorModel(tuple(fits[i] for i in live), chosen, sample_s, ("N", *own), fast, loud)
+
+
+def _from(columns: Columns, first: int) -> Rows:
+    """Columns at the rows of a stretch, which begins at a row."""
+    return lambda part: columns(np.arange(first + part.start, first + part.stop))
 
 
 def _subsets(names: tuple[str, ...]) -> Iterator[tuple[str, ...]]:

@@ -7,14 +7,19 @@ none of the run's information is lost.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.signals import large
+from fogml.signals.cosine import cosine_transform
+
 FloatArray = NDArray[np.float64]
+Rows = Callable[[slice], FloatArray]
+"""Columns of a stretch, told for some of its rows at a time."""
 
 POINTS = 4
 """Frequencies at which a model is asked in a bin."""
@@ -90,7 +95,7 @@ class Spectrum:
 def spectrum_of(
     stretches: Sequence[FloatArray],
     sample_s: float,
-    columns: Sequence[FloatArray] | None = None,
+    columns: Sequence[FloatArray | Rows] | None = None,
     resolution: Resolution | None = None,
 ) -> Spectrum:
     """Spectrum of stretches of one series or of several, each about a mean of its own.
@@ -103,6 +108,7 @@ def spectrum_of(
         Sample interval [s].
     columns
         Regressors of each stretch, shape (n, p), that vary slowly: only the single coefficients know them.
+        Of a long stretch a function that gives them at some of its rows.
     resolution
         How finely.
     """
@@ -112,9 +118,11 @@ def spectrum_of(
     lengths = [_good_length(len(stretches[i])) for i in kept]
     total, longest = sum(lengths), max(lengths)
     columns = [np.empty((len(y), 0)) for y in stretches] if columns is None else columns
+    tables = [_rows_of(one) for one in columns]
     # Columns vary slowly: means over blocks tell all of them.
+    least = 64 * single
     coarse = [
-        (_block_means(columns[i][:n], 64 * single), _block_means(stretches[i][:n, None], 64 * single), n)
+        (_block_means(tables[i], n, least), _block_means(_rows_of(stretches[i][:, None]), n, least), n)
         for i, n in zip(kept, lengths)
     ]
     removed = _least_squares(coarse)
@@ -123,16 +131,18 @@ def spectrum_of(
     counts = np.zeros(len(edges) - 1)
     low_f, low_v, low_x, lines = [], [], [], []
     for i, n, (x, means, _) in zip(kept, lengths, coarse):
-        y = stretches[i][:n] - means.mean()
-        if len(removed):
-            y -= columns[i][:n] @ removed
-        coefficients = _cosine(y)
+        y, middle = large.empty(n), means.mean()
+        for part in large.pieces(y):
+            y[part] = stretches[i][part] - middle
+            if len(removed):
+                y[part] -= tables[i](part) @ removed
+        coefficients = cosine_transform(y)
         coefficients *= np.sqrt(2.0 * sample_s)
         alone = min(single, n - 1)
         low_f.append(np.arange(1, alone + 1) / (2.0 * n * sample_s))
         low_v.append(coefficients[1 : alone + 1].copy())
         scale = np.sqrt(2.0 * sample_s * n / len(x))
-        low_x.append(scale * np.array([_cosine(c)[1 : alone + 1] for c in x.T]).reshape(-1, alone).T)
+        low_x.append(scale * np.array([cosine_transform(c)[1 : alone + 1] for c in x.T]).reshape(-1, alone).T)
         square = coefficients[alone + 1 :]
         square *= square
         # In shares of the highest frequency, coefficient k of n is at k / n.
@@ -145,11 +155,13 @@ def spectrum_of(
         masked, found = _lines(square, at, sample_s, n, alone + 1, fine.line_chance / total)
         lines += found
         if masked is not None:
-            square = np.where(masked, 0.0, square)
-            counts[used] += np.add.reduceat(~masked, first, dtype=np.float64)
+            square[masked] = 0.0
+            lost = np.searchsorted(at, np.flatnonzero(masked), side="right") - 1
+            counts[used] += (np.diff(at) - np.bincount(lost, minlength=len(at) - 1))[used]
         else:
             counts[used] += np.diff(at)[used]
         sums[used] += np.add.reduceat(square, first)
+        large.release()
     seen = counts > 0
     half = 0.5 / sample_s
     points = (np.arange(POINTS) + 0.5) / POINTS
@@ -175,19 +187,29 @@ def _good_length(samples: int) -> int:
 
     if samples < _LONG:
         return samples
-    length = samples
+    length = samples // 2 * 2
     while next_fast_len(length, real=True) != length:
-        length -= 1
+        length -= 2
     return length
 
 
-def _block_means(values: FloatArray, least: int) -> FloatArray:
-    """Means over blocks of equal length, at least so many and enough for what varies slowly."""
-    n, blocks = len(values), max(_BLOCKS, least)
+def _rows_of(columns: FloatArray | Rows) -> Rows:
+    return columns.__getitem__ if isinstance(columns, np.ndarray) else columns
+
+
+def _block_means(rows: Rows, n: int, least: int) -> FloatArray:
+    """Means of n rows over blocks of equal length, at least so many and enough for what varies slowly."""
+    blocks = max(_BLOCKS, least)
     if n <= 2 * blocks:
-        return values
+        return rows(slice(0, n))
     edges = np.linspace(0, n, blocks + 1).astype(np.intp)
-    return np.asarray(np.add.reduceat(values, edges[:-1], axis=0) / np.diff(edges)[:, None])
+    at_once = blocks if n <= large.HELD_VALUES else max(large.PIECE * blocks // n, 1)
+    sums = []
+    for first in range(0, blocks, at_once):
+        part = edges[first : first + at_once + 1]
+        sums.append(np.add.reduceat(rows(slice(part[0], part[-1])), part[:-1] - part[0], axis=0))
+        large.release()
+    return np.asarray(np.concatenate(sums) / np.diff(edges)[:, None])
 
 
 def _least_squares(stretches: Sequence[tuple[FloatArray, FloatArray, int]]) -> FloatArray:
@@ -212,12 +234,6 @@ def _edges(begin: float, per_octave: int) -> FloatArray:
     octaves = -np.log2(2.0 * begin)
     low = begin * 2.0 ** np.linspace(0.0, octaves, max(int(np.ceil(per_octave * octaves)), 1) + 1)
     return np.concatenate((low, 1.0 - low[-2::-1]))
-
-
-def _cosine(values: FloatArray) -> FloatArray:
-    from scipy.fft import dct
-
-    return np.asarray(dct(np.ascontiguousarray(values), norm="ortho"))
 
 
 def _lines(

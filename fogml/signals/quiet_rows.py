@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.signals import large
+
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
@@ -50,13 +52,20 @@ def without_spikes(values: FloatArray) -> FloatArray:
     """Values with those far from both neighbours replaced by the neighbours' mean."""
     if len(values) < 3:
         return values
-    beside = 0.5 * (values[:-2] + values[2:])
-    away = values[1:-1] - beside
+
+    def away(part: FloatArray) -> FloatArray:
+        return np.asarray(np.abs(part[1:-1] - 0.5 * (part[:-2] + part[2:])))
+
     # White noise of one unit is 3/2 away in variance.
-    limit = _SPIKE * float(np.median(np.abs(away))) / 0.6745
-    lone = (np.abs(away) > limit) & (np.abs(values[2:] - values[:-2]) <= limit)
-    if limit == 0.0 or not np.any(lone):
+    middle = large.median(lambda: (away(values[part]) for part in large.pieces(values, overlap=2)))
+    limit = _SPIKE * middle / 0.6745
+    lone = [
+        part.start + 1 + np.flatnonzero((away(x := values[part]) > limit) & (np.abs(x[2:] - x[:-2]) <= limit))
+        for part in large.pieces(values, overlap=2)
+    ]
+    rows = np.concatenate(lone)
+    if limit == 0.0 or not len(rows):
         return values
-    cleaned = values.copy()
-    cleaned[1:-1][lone] = beside[lone]
+    cleaned = large.each(np.copy, values)
+    cleaned[rows] = 0.5 * (values[rows - 1] + values[rows + 1])
     return cleaned

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.signals import large
+
 FloatArray = NDArray[np.float64]
 
 PARTS, BLOCKS = 3, 8
@@ -54,8 +56,7 @@ def stationarity(stretches: Sequence[FloatArray], sample_s: float) -> Stationari
     found: list[tuple[float, float, tuple[float, ...]]] = []
     tau_s = sample_s
     while True:
-        pairs = [m[: len(m) // 2 * 2].reshape(-1, 2) for m in means if len(m) >= 2]
-        squares = np.concatenate([(p[:, 1] - p[:, 0]) ** 2 for p in pairs]) if pairs else np.empty(0)
+        squares = _squares(means)
         per_block = len(squares) // (PARTS * BLOCKS)
         if per_block < _PER_BLOCK:
             break
@@ -65,9 +66,28 @@ def stationarity(stretches: Sequence[FloatArray], sample_s: float) -> Stationari
             chance = float(f_oneway(*logarithms).pvalue) if np.ptp(logarithms) > 0.0 else 1.0
             shares = np.sqrt(blocks.mean(axis=1) / blocks.mean())
             found.append((chance, tau_s, tuple(float(s) for s in shares)))
-        means = [m[: len(m) // 4 * 4].reshape(-1, 4).mean(axis=1) for m in means if len(m) >= 4]
+        means = [_means_of_four(m) for m in means if len(m) >= 4]
         tau_s *= 4.0
     if not found:
         return Stationarity(1.0, None, ())
     chance, tau_s, shares = min(found)
     return Stationarity(min(1.0, chance * len(found)), tau_s, shares)
+
+
+def _squares(stretches: Sequence[FloatArray]) -> FloatArray:
+    """Squared differences of pairs of neighbours, one stretch after the other."""
+    found = large.empty(sum(len(y) // 2 for y in stretches))
+    filled = 0
+    for y in stretches:
+        for part in large.pieces(y[: len(y) // 2 * 2], least=2):
+            pairs = y[part].reshape(-1, 2)
+            found[filled : filled + len(pairs)] = (pairs[:, 1] - pairs[:, 0]) ** 2
+            filled += len(pairs)
+    return found
+
+
+def _means_of_four(y: FloatArray) -> FloatArray:
+    found = large.empty(len(y) // 4)
+    for part in large.pieces(y[: len(y) // 4 * 4], least=4):
+        found[part.start // 4 : part.stop // 4] = y[part].reshape(-1, 4).mean(axis=1)
+    return found

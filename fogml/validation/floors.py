@@ -9,9 +9,10 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.noise_of_run import moving_temperatures
-from fogml.runs.noise_series import AT_REST_DEG_S
+from fogml.runs.noise_series import rows_at_rest
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.thermal_columns import thermal_columns
+from fogml.signals import large
 from fogml.signals.floor import Columns, Floor, FloorModel, IntArray, floor_model
 
 _KEPT = "_floor_models"
@@ -37,7 +38,7 @@ def floor_of_run(
     """
     windows = max(int(np.count_nonzero(used) * run.sample_s / averaging_s), 2)
     if noise is not None:
-        still = np.abs(noise.rate) < AT_REST_DEG_S
+        still = rows_at_rest(noise)
         found = _model(noise, still, noise.error_deg_h, averaging_s, static=True)
         source = f"static run {noise.name}"
     else:
@@ -52,7 +53,7 @@ def floors_over(run: Run, averaging_s: float, times_s: Sequence[float]) -> list[
     The noise models are those of `floor_of_run` at `averaging_s`. None where the run is shorter than two
     averages, or turns throughout.
     """
-    still = np.abs(run.rate) < AT_REST_DEG_S
+    still = rows_at_rest(run)
     rows = int(np.count_nonzero(still))
     if rows * run.sample_s < 2.0 * averaging_s:
         return []
@@ -70,7 +71,7 @@ def check_noise_run(noise: Run) -> None:
     InputError
         If the table turns in it.
     """
-    if np.any(np.abs(noise.rate) >= AT_REST_DEG_S):
+    if not np.all(rows_at_rest(noise)):
         raise InputError(f"{noise.name}: the table turns in it; a noise run is a static one")
 
 
@@ -81,8 +82,8 @@ def _model(
     kept = run.__dict__.setdefault(_KEPT, {})
     key = (averaging_s, static, used.tobytes().__hash__())
     if key not in kept:
-        rows = np.flatnonzero(used)
-        broken = np.flatnonzero(np.diff(rows) > 1) + 1
+        rows = large.places(used)
+        broken = np.concatenate([at + 1 + np.flatnonzero(step > 1) for at, step in large.differences(rows)])
         gaps = np.searchsorted(rows, run.gap_starts)
         edges = np.union1d(np.concatenate(([0], broken, gaps)), [len(rows)])
         segments = np.array(list(pairwise(edges.tolist())), dtype=np.int64).reshape(-1, 2)
@@ -91,11 +92,12 @@ def _model(
             raise InputError(f"{run.name}: no three samples in a row count; a noise floor needs more")
         starts, stops = segments[long].T
         moves = bool(moving_temperatures(run))
+        large.release()
         columns = _at_rows(run, rows) if moves else None
         # Without a temperature nobody knows whether a slow change is the gyro's own.
         drifts = moves or (not static and not run.temperature_columns)
         kept[key] = floor_model(
-            error_deg_h[used], run.sample_s, averaging_s, starts, stops, columns, drifts=drifts
+            large.chosen(error_deg_h, used), run.sample_s, averaging_s, starts, stops, columns, drifts=drifts
         )
     found: FloorModel | None = kept[key]
     return found

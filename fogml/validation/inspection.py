@@ -12,6 +12,7 @@ from fogml.runs.columns import column_spec
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.thermal_columns import leading_temperature
+from fogml.signals import large
 from fogml.signals.averages import block_averages
 
 INSPECT_SCHEMA = "fogml.inspect/1"
@@ -48,6 +49,7 @@ def _run(run: Run) -> dict[str, Any]:
 
 
 def _column(run: Run, name: str, values: FloatArray) -> dict[str, Any]:
+    large.release()
     spec = column_spec(name)
     unit = run.gyro_unit if name == "gyro" else spec.internal if spec else None
     return {
@@ -57,7 +59,7 @@ def _column(run: Run, name: str, values: FloatArray) -> dict[str, Any]:
         "least": float(values.min()),
         "greatest": float(values.max()),
         "mean": float(values.mean()),
-        "standard_deviation": float(values.std()),
+        "standard_deviation": large.standard_deviation(values),
     }
 
 
@@ -100,9 +102,12 @@ def _regimes(run: Run) -> dict[str, Any]:
     found = regimes(run)
     temperature = leading_temperature(run)
     # The time that a row stands for: up to the next row, gaps not counted.
-    shares = np.append(np.diff(run.time), run.sample_s)
-    shares[run.gap_starts - 1] = run.sample_s
-    spent = np.bincount(found.labels, shares, len(found.names))
+    spent = np.zeros(len(found.names))
+    for at, steps in large.differences(run.time):
+        low, high = np.searchsorted(run.gap_starts - 1, [at, at + len(steps)])
+        steps[run.gap_starts[low:high] - 1 - at] = run.sample_s
+        spent += np.bincount(found.labels[at : at + len(steps)], steps, len(spent))
+    spent[found.labels[-1]] += run.sample_s
     segments = []
     for name, start, stop in found.segments()[:LONGEST_LIST]:
         segment: dict[str, Any] = {
