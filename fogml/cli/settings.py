@@ -13,7 +13,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 
 from fogml import __version__
 from fogml.cli.given import Given, option
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, listed, quoted
 from fogml.outputs import check_is_no_folder, sole_writer, whole_file
 from fogml.yaml_text import read_yaml, yaml_text
 
@@ -186,6 +186,7 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
         return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
-        return f"{place}nothing is given for '{within}'"
+        lacking = [quoted(".".join(map(str, e["loc"]))) for e in error.errors() if e["type"] == "missing"]
+        return f"{place}nothing is given for {listed(lacking)}"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
     return f"{place}'{key}': {reason} (found {quoted(first['input'])})"

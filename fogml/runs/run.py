@@ -108,8 +108,7 @@ class Run:
     @classmethod
     def from_columns(cls, name: str = "run", facts: Facts | None = None, **columns: ArrayLike) -> Run:
         """A run from arrays in internal units: ``Run.from_columns(time=t, gyro=g, T=temperature)``."""
-        arrays = {key: as_vector(name, key, values).copy() for key, values in columns.items()}
-        return cls(name=name, columns=arrays, facts=facts or Facts())
+        return cls(name, {k: as_vector(name, k, x).copy() for k, x in columns.items()}, facts or Facts())
 
     def __len__(self) -> int:
         return len(self.columns["time"])
@@ -159,8 +158,7 @@ class Run:
     @cached_property
     def reference_deg_h(self) -> FloatArray:
         """Reference rate [deg/h], shape (n,): table rate plus Earth rate where it is known."""
-        earth_deg_h = self.facts.earth_rate_deg_h or 0.0
-        return large.each(lambda rate: 3600.0 * rate + earth_deg_h, self.rate)
+        return large.each(lambda rate: 3600.0 * rate + (self.facts.earth_rate_deg_h or 0.0), self.rate)
 
     @cached_property
     def error_deg_h(self) -> FloatArray:
@@ -211,8 +209,9 @@ class Run:
     def _sensor_mean(self, sensors: tuple[str, ...]) -> FloatArray:
         means: dict[tuple[str, ...], FloatArray] = self.__dict__.setdefault("_sensor_means", {})
         if sensors not in means:
-            readings = [self._readings[c].values for c in sensors]
-            means[sensors] = large.each(lambda *values: np.mean(values, axis=0), *readings)
+            means[sensors] = large.each(
+                lambda *x: np.mean(x, axis=0), *(self._readings[c].values for c in sensors)
+            )
         return means[sensors]
 
     @cached_property
@@ -260,12 +259,8 @@ class Run:
         return part
 
     def dropouts(self, name: str) -> BoolArray | None:
-        """Samples at which a temperature was not measured, shape (n,); None where it always was.
-
-        `name` is one in formulas, as in `temperature`.
-        """
-        found = [self._readings[sensor].bad for sensor in self.sensors(name)]
-        masks = [bad for bad in found if bad is not None]
+        """Samples at which a `temperature` was not measured, shape (n,); None where it always was."""
+        masks = [bad for sensor in self.sensors(name) if (bad := self._readings[sensor].bad) is not None]
         return np.logical_or.reduce(masks) if masks else None
 
     @property
@@ -292,8 +287,7 @@ class Run:
     @cached_property
     def stretches(self) -> tuple[slice, ...]:
         """The parts between gaps, as slices over the samples."""
-        edges = [0, *self.gap_starts.tolist(), len(self)]
-        return tuple(slice(a, b) for a, b in pairwise(edges))
+        return tuple(slice(a, b) for a, b in pairwise([0, *self.gap_starts.tolist(), len(self)]))
 
     @property
     def span_s(self) -> float:
