@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec
+from fogml.signals import large
 
 FloatArray = NDArray[np.float64]
 
@@ -27,6 +28,7 @@ def faulty(name: str, values: FloatArray) -> NDArray[np.bool_] | None:
     if column_spec(name) is None or len(values) == 0:
         return None
     low, high = values.min(), values.max()  # NaN where any value is
+    large.release()
     if low >= -GREATEST and high <= GREATEST:
         return None
     with np.errstate(invalid="ignore"):

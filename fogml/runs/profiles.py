@@ -262,6 +262,7 @@ def _columns(
     elif table.seconds is not None:
         columns["time"] = large.chosen(table.seconds, part)
     for name, values in columns.items():
+        large.release()
         lost = np.isinf(values)
         if lost.any():
             raise InputError(
