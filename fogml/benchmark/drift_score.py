@@ -115,6 +115,8 @@ def drift_figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
 def _figures(marks: Sequence[DriftMark]) -> dict[str, Any]:
     sizes = [m.bytes for m in marks if m.bytes is not None]
     covered = [m.coverage for m in marks if m.coverage is not None]
+    if all(m.coverage is None or m.failure for m in marks):
+        covered = []  # an entry that states no interval has none to hold, its failed cases neither
     return {
         "cases": len(marks),
         "ratio": asdict(geometric_mean([m.ratio for m in marks])),
