@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from hashlib import sha256
+from math import ceil
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from fogml.export.c_float import float_context, input_units, literal, sensor_ide
 from fogml.export.layout import NOISE_TICKS, Layout, Number, layout
 from fogml.export.plan import Plan
 from fogml.export.self_test import SelfTest, make_self_test
-from fogml.features.bins import MOST_IN_BIN
+from fogml.features.bins import GAP_BINS, LOST, MOST_IN_BIN
 from fogml.runs.columns import is_temperature
 from fogml.signals.clock import LEAST_SHARE
 
@@ -201,10 +202,14 @@ def _clock_constants(windows: Layout, sample_s: float, dtype: str) -> list[str]:
         lines += ["#ifdef FOGML_CLOCK_32", "#error a window spans more than a 32-bit clock tells", "#endif"]
     if windows.binned:
         ticks = (windows.bin_samples - 0.5) * sample_s / windows.tick_s
+        longest_s = max(operator.window.span_s for operator in windows.operators if operator.held >= 0)
+        early = ceil(longest_s / windows.tick_s / GAP_BINS) + 1
         lines += [
             f"#define BIN_SAMPLES {windows.bin_samples}",
             f"#define BIN_TICKS {round(ticks)}U /* a sample so long after a bin's first begins the next */",
             f"#define MOST_IN_BIN {MOST_IN_BIN}U",
+            f"#define LOST_US INT64_C({round(LOST * sample_s * 1e6)}) /* after longer, too, */",
+            f"#define EARLY_TICKS {early}U /* not sooner after one that began so */",
         ]
     return [CCode(line) for line in lines]
 

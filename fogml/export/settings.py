@@ -92,10 +92,12 @@ def hold_within(
     total: float, difference: Difference, tolerance: float, settings: ExportSettings, dtype: str
 ) -> None:
     if not total <= tolerance:
+        ways = [] if dtype == "float64" else ["choose a finer --dtype"]
+        ways += [] if settings.budget is None else ["allow more --bytes"]
+        ways.append("state --tolerance if that is good enough")
         raise InputError(
             f"export: in {dtype} the model's output differs by up to {total:.3g} deg/h from the model's, "
-            f"more than the tolerance of {tolerance:.3g} deg/h; choose a finer --dtype, more --bytes, or "
-            "state --tolerance if that is good enough. Nothing was written"
+            f"more than the tolerance of {tolerance:.3g} deg/h; {', or '.join(ways)}. Nothing was written"
         )
     if (
         difference.scale_ppm is not None

@@ -18,6 +18,10 @@ _SHORTEST_BINS = 8
 """Bins in the shortest window at least: its edge parts one along a line, beside which it must be long."""
 MOST_IN_BIN = 8191
 """Samples that a bin holds at most: its sums then fit 63 bits."""
+GAP_BINS = 4
+"""Bins more, as lost samples end one early: within a bin they would be taken to be evenly apart."""
+LOST = 1.5
+"""Sample intervals beyond which samples were lost."""
 _LONGEST_RING = 1 << 12
 """Bins at most; windows whose lengths are further apart are refused."""
 
@@ -42,10 +46,11 @@ def ring_of(windows: Sequence[Window], sample_s: float) -> tuple[int, int]:
         return single
     longest = max(window.span_s for window in held)
     bin_s = min(longest / BINS, min(window.length_s for window in held) / _SHORTEST_BINS)
-    count = min(max(1, math.floor(bin_s / sample_s + EDGE_TOLERANCE)), MOST_IN_BIN)
-    if count == 1:
+    if bin_s < (2.0 - EDGE_TOLERANCE) * sample_s:
         return single
-    ring = math.ceil(longest / ((count - 0.5) * sample_s)) + 2
+    # A bin goes on until half an interval before its last sample would be due: not shorter than it then.
+    count = min(math.ceil(bin_s / sample_s + 0.5 - EDGE_TOLERANCE), MOST_IN_BIN)
+    ring = math.ceil(longest / ((count - 0.5) * sample_s)) + 2 + GAP_BINS
     if ring > _LONGEST_RING:
         raise InputError(
             f"export: windows of {min(w.length_s for w in held):g} s and {longest:g} s at a sample every "

@@ -12,6 +12,7 @@ from fogml.export.c_program import CProgram, compiled_output, write_files
 from fogml.export.c_source import c_source
 from fogml.export.fixed_bound import fixed_point_error, fixed_point_lines
 from fogml.export.plan import Plan
+from fogml.export.points import History
 from fogml.features import own
 from fogml.features.memories import LAG, PLAY
 from fogml.features.own import Function, Recursion, RecursionOperator, declare
@@ -144,6 +145,27 @@ def test_bins_and_fixed_point_hold_a_window_of_ones_own(tmp_path, sample_s):
         assert off <= proven < 30.0 * off
         first, more = fixed_point_lines(proven, plan)
         assert f"at most {proven:.3g} deg/h" in first and "are full" in more
+
+
+@needs_cc
+@pytest.mark.parametrize(("lost", "bound"), [("apart", 1e-4), ("often", 5e-3)])
+def test_lost_samples_hardly_move_windows_in_bins(tmp_path, lost, bound):
+    text = "T_in, dT_in[hann, 64 s], dT_in[slope, 90 s], diff(T_out)[block, 40 s]"
+    model = make_model("polynomial", features=text).fit(training_run())
+    time = 0.1 * np.arange(6000)
+    place = np.arange(6000) % 400
+    keep = (place < 103) | (place > 105)
+    if lost == "often":
+        keep = np.random.default_rng(4).random(6000) > 0.2
+    T = 10.0 + np.cumsum(0.002 * np.sign(np.sin(time / 70.0)))
+    plan, past = Plan.of(model, 0.1), History(time[keep], np.column_stack([T, T - 1.0])[keep], time[keep])
+    source = c_source(plan, "float64", [])
+    assert source.layout.binned and plan.sensors == ("T_in", "T_out")
+    out, flag = CProgram(source, tmp_path, flags=QUICK).steps(past.time, past.temperatures, past.gyro)
+    expected, told = plan.compensated(past.atoms(plan), past.gyro)
+    off = np.abs(out - expected)[told != 2]
+    assert len(off) > 3000 and off.max() < bound
+    assert np.count_nonzero(flag != told) <= 2
 
 
 def test_what_no_rate_is_told_of_has_no_proven_bound():
