@@ -27,7 +27,7 @@ NAME = "fogml_axes"
 SHARED = frozenset({"FOGML_CLOCK_32", "FOGML_NO_SELF_TEST"})
 """What whoever compiles defines, for all axes."""
 _DEFINED = re.compile(
-    r"^#define (\w+)|^\} (\w+);|^typedef \w+ (\w+);"
+    r"^#define (\w+)(?: (\w+_clock_32)$)?|^\} (\w+);|^typedef \w+ (\w+);"
     r"|^(?:static )?(?:const )?\w+ \*?(\w+)\(|^static const \w+ (\w+)\[",
     re.MULTILINE,
 )

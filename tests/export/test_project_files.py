@@ -89,12 +89,18 @@ def test_cplusplus_calls_it_through_cmake(exported, tmp_path):
     run(tmp_path / "build" / "unit", folder=tmp_path)
 
 
-def test_rust_calls_it(exported, tmp_path):
+@pytest.mark.parametrize("clock", [[], ["-DFOGML_CLOCK_32"]])
+def test_rust_calls_it_by_either_clock_but_not_by_the_wrong_one(exported, tmp_path, clock):
     needs("rustc")
     shutil.copytree(exported, tmp_path, dirs_exist_ok=True)
     (tmp_path / "main.rs").write_text(RUST)
-    run("gcc", "-std=c99", "-c", "fogml_model.c", "-o", "fogml_model.o", folder=tmp_path)
-    run("rustc", "-C", "link-arg=fogml_model.o", "main.rs", "-o", "unit", folder=tmp_path)
+    run("gcc", "-std=c99", *clock, "-c", "fogml_model.c", "-o", "fogml_model.o", folder=tmp_path)
+    bare = ["rustc", "-D", "warnings", "-C", "link-arg=fogml_model.o", "main.rs", "-o", "unit"]
+    narrow = [*bare, "--cfg", "fogml_clock_32"]
+    right, wrong = (narrow, bare) if clock else (bare, narrow)
+    done = subprocess.run(wrong, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode != 0 and "fogml_step" in done.stderr
+    run(*right, folder=tmp_path)
     run(tmp_path / "unit", folder=tmp_path)
 
 
