@@ -14,7 +14,6 @@ from fogml.export.number_files import formula_of
 from fogml.export.plan import Plan
 from fogml.export.self_test import sensor_range
 from fogml.export.static_curve import at_rest
-from fogml.features.own import Recursion
 from fogml.features.signal import unit_of
 from fogml.models.base import DriftModel
 from fogml.models.saved import model_hash
@@ -146,11 +145,7 @@ def _vectors(plan: Plan) -> list[str]:
     held = {sensor: low + shares * (high - low) for sensor, (low, high, _) in ends.items()}
     atoms = np.empty((len(shares), len(names)))
     for i, atom in enumerate(plan.atoms):
-        if (
-            atom.window is None
-            and atom.operator != "since_on"
-            and (not isinstance(atom.declared, Recursion) or atom.declared.follows)
-        ):
+        if atom.of_input_at_rest:
             atoms[:, i] = at_rest(atom, held)
         else:
             low, high = plan.limits.box_low[i], plan.limits.box_high[i]

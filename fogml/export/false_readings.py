@@ -102,12 +102,12 @@ def atom_gain(atom: Atom, sample_s: float, spell: bool) -> float:
     moved = sum(abs(weight) for name, weight in atom.signal.parts if is_temperature(name))
     if atom.operator == "sign":
         return 2.0 * float(np.sign(moved))
-    if atom.operator == "lag" and not spell:
-        return moved * min(1.0, sample_s / atom.memory)
-    if (own := atom.declared) is not None and atom.operator not in ("beyond", "since_on"):
-        # Of a curve it is not asked: what flag 0 lets through is its bound.
-        most = own.gain if isinstance(own, Recursion) else float("inf")
-        return most * moved if moved else 0.0
+    if (own := atom.declared) is not None:
+        # Where a curve tells none, what flag 0 lets through is its bound.
+        gain = own.gain
+        if not spell and isinstance(own, Recursion) and own.single_gain is not None:
+            gain = own.single_gain(*atom.given, sample_s)
+        return gain * moved if moved else 0.0
     if atom.window is None:
         return moved
     method, length = atom.window.method, atom.window.length_s or sample_s

@@ -9,6 +9,7 @@ import numpy as np
 
 from fogml.export.layout import Layout
 from fogml.export.plan import Plan
+from fogml.features.own import Function
 from fogml.runs.columns import is_temperature
 
 _CHECKS = 8
@@ -143,8 +144,12 @@ def sensor_range(plan: Plan, sensor: str) -> tuple[float, float, float]:
         ends = float(plan.limits.box_low[i]), float(plan.limits.box_high[i])
         weights = dict(atom.signal.parts)
         total = abs(sum(weights.values()))
-        if atom.operator == "since_on" and sensor in weights:
-            high, low = (-atom.memory * np.log(np.clip(end, 1e-3, 1.0)) for end in ends)
+        if (
+            isinstance(own := atom.declared, Function)
+            and own.inverse is not None
+            and weights.get(sensor) == 1.0
+        ):
+            low, high = sorted(own.inverse(end, *atom.given) for end in ends)
         elif atom.follows and atom.signal.is_sensor and sensor in weights:
             low, high = ends
         elif atom.window and atom.operator in ("d", "diff") and sensor in weights and total > 1e-9:

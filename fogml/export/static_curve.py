@@ -103,10 +103,7 @@ class StaticCurve:
 def _static(plan: Plan, column: int | None, atoms: tuple[int, ...]) -> bool:
     """Whether a column is of values of one thermometer alone."""
     first = next(sensor for sensor in plan.sensors if is_temperature(sensor))
-    own = all(
-        plan.atoms[i].operator in ("value", "beyond") and plan.atoms[i].signal.sensors == (first,)
-        for i in atoms
-    )
+    own = all(plan.atoms[i].instant and plan.atoms[i].signal.sensors == (first,) for i in atoms)
     return own and (column is None or _static(plan, plan.steps[column].column, plan.steps[column].atoms))
 
 
@@ -128,8 +125,10 @@ def at_rest(atom: Atom, held: dict[str, FloatArray]) -> FloatArray:
             f"export: the model takes {atom.text}, of which it is not known what it is where nothing moves; "
             "export it --to onnx or json"
         )
-    if atom.window is not None or atom.operator == "since_on":
+    if atom.window is not None:
         return np.zeros(count)
+    if isinstance(declared, Function) and declared.rest is not None:
+        return np.full(count, declared.rest)
     value = np.sum([weight * held[name] for name, weight in atom.signal.parts], axis=0)
     if isinstance(declared, Function):
         value, _ = declared.operator(atom.given, 1.0).push(np.arange(float(count)), value)

@@ -116,6 +116,19 @@ class Atom:
         return declared.follows if isinstance(declared, Recursion) else self.operator == "value"
 
     @property
+    def instant(self) -> bool:
+        """Whether its value is of its signal's present value alone."""
+        return self.window is None and not isinstance(self.declared, Recursion)
+
+    @property
+    def of_input_at_rest(self) -> bool:
+        """Whether its value where nothing moves is told by its signal's."""
+        declared = self.declared
+        return self.follows or (
+            self.instant and not (isinstance(declared, Function) and declared.rest is not None)
+        )
+
+    @property
     def text(self) -> str:
         """Text form, e.g. ``dT[slope, 60 s]``."""
         signal = self.signal.text

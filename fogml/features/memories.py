@@ -6,12 +6,15 @@ fixed point (`fogml.features.own`). The lag and the play have a quicker way thro
 
 from __future__ import annotations
 
+from math import log
 from typing import Any
 
 from fogml.features.own import Function, Recursion, State
 from fogml.features.traced import decayed, forgotten, larger, smaller, where
 from fogml.signals.memory import Lag, Play
 
+_GONE = 1e-3
+# What is left of a decay where it tells no more how long ago power-on was.
 REACH, TAKEN = 0.5, 0.05
 """Shares of the distance of bounds within which `beyond` levels off, and what it lacks."""
 
@@ -30,6 +33,7 @@ LAG = Recursion(
     value=lambda s, x, tau: x - s[0],
     time_constant=0,
     gain=1.0,
+    single_gain=lambda tau, sample_s: min(1.0, sample_s / tau),
     follows=True,
     operations=6,
     quicker=Lag,
@@ -55,6 +59,8 @@ SINCE_ON = Function(
     parameters=("s",),
     unit="",
     function=lambda x, tau: decayed(larger(x, 0.0) / tau),
+    rest=0.0,
+    inverse=lambda value, tau: -tau * log(min(max(value, _GONE), 1.0)),
     operations=21,
 )
 """Decay since power-on."""
@@ -78,7 +84,7 @@ def most_beyond(low: float, high: float) -> float:
     return (REACH - TAKEN) * (high - low)
 
 
-BEYOND = Function(name="beyond", parameters=("x", "x"), function=beyond, operations=9)
+BEYOND = Function(name="beyond", parameters=("x", "x"), function=beyond, operations=9, gain=1.0)
 """How far beyond bounds."""
 
 MEMORY_OPERATORS = {operator.name: operator for operator in (LAG, PLAY, SINCE_ON, BEYOND)}

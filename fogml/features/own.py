@@ -49,12 +49,15 @@ class _Named:
         Unit of its values; None for that of its input.
     operations
         Additions, multiplications and divisions at a sample; 0 where it isn't counted.
+    gain
+        How far its value moves at most where its inputs are each off by 1.
     """
 
     name: str
     parameters: tuple[str, ...] = ()
     unit: str | None = None
     operations: int = 0
+    gain: float = float("inf")
 
     def __post_init__(self) -> None:
         if not (self.name.isidentifier() and self.name.isascii()):
@@ -73,9 +76,15 @@ class Function(_Named):
     ----------
     function
         ``function(x, *parameters)`` of an array.
+    rest
+        Its value where nothing moves and power-on is long ago; None: what it makes of its input.
+    inverse
+        ``inverse(value, *parameters)``: what it is of, where that is told by its values alone.
     """
 
     function: Callable[..., FloatArray]
+    rest: float | None = None
+    inverse: Callable[..., float] | None = None
 
     def operator(self, parameters: State, sample_s: float) -> FunctionOperator:
         """What takes samples in order."""
@@ -101,8 +110,8 @@ class Recursion(_Named):
     time_constant
         Place among the parameters of its time constant: it is settled three of them after it began, and
         begins anew after a gap that a window as long may not span; None for one that knows no time.
-    gain
-        How far its value moves at most where its inputs are each off by 1.
+    single_gain
+        ``single_gain(*parameters, sample_s)``: the same where one input is off; None: `gain`.
     follows
         Whether its value is its input's where nothing moves.
     quicker
@@ -114,7 +123,7 @@ class Recursion(_Named):
     value: Callable[..., float]
     settled: Callable[..., bool] | None = None
     time_constant: int | None = None
-    gain: float = float("inf")
+    single_gain: Callable[..., float] | None = None
     follows: bool = False
     quicker: Callable[..., MemoryOperator] | None = None
 
