@@ -11,7 +11,7 @@ import numpy as np
 from fogml.benchmark.rounds import TrackFolder
 from fogml.blind.folders import OUTCOME
 from fogml.blind.score import marks_of
-from fogml.blind.scoring.answers import read_answer
+from fogml.blind.scoring.answers import NAMED, read_answer
 from fogml.blind.scoring.by_reality import each_kept, false_names, mass_on_true, within_one
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.statistics import Estimate, mean, median, proportion
@@ -20,12 +20,11 @@ from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 
 ALL = "all"
-_LIKELY = 0.5
 
 
 def _told_unknown(m: Mark) -> bool:
     """Whether a cause that no candidate stands for was called unknown, and nothing wrong was named."""
-    return m.unknown >= _LIKELY and not m.wrong_name
+    return m.unknown >= NAMED and not m.wrong_name
 
 
 def _mass(marks: Sequence[Mark]) -> Estimate:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import fogml
-from fogml.benchmark.drift_cases import DriftCase, real_cases, synthetic_cases, write_case
+from fogml.benchmark.drift_cases import SAMPLE_S, DriftCase, real_cases, synthetic_cases, write_case
 from fogml.benchmark.rounds import RULES, SCHEMA, SEED, TRACKS, Track, TrackFolder, commitment
 from fogml.blind.folders import BlindFolder
 from fogml.blind.make import make_cases
@@ -24,10 +24,10 @@ from fogml.outputs import scratch_folder, whole_folder
 
 LEAST_D_PRIME = 10.0
 """Causes of the diagnosis track are at least so strong: whitened length beside the constants."""
-SAMPLE_S = 10.0
 _APART = 7
+"""Of the drift track's seed from the diagnosis track's, whose held-out runs are handed out whole."""
 _SECRET_BITS = 62
-# As large as a number of JSON may be; each guess would take the making of a case.
+"""Of a drawn seed: as large as a number of JSON may be; each guess would take the making of a case."""
 
 
 def make_round(
@@ -72,7 +72,6 @@ def make_round(
         seed = secrets.randbits(_SECRET_BITS)
     with scratch_folder() as scratch:
         step("drift cases")
-        # Another seed than the diagnosis track's: its held-out runs are handed out whole.
         made = list(synthetic_cases(drift, seed + _APART, scratch / "drift", workers))
         step("diagnosis cases")
         suite = BlindFolder(scratch / "diagnosis")

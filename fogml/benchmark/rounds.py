@@ -14,13 +14,13 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from fogml.blind.folders import BlindFolder, read_json
 from fogml.errors import InputError
 
 Track = Literal["drift", "diagnosis"]
-TRACKS: tuple[Track, ...] = ("drift", "diagnosis")
+TRACKS: tuple[Track, ...] = get_args(Track)
 ANSWER = {"drift": "drift.csv", "diagnosis": "gap.json"}
 """What a method writes for a case, by track."""
 SCHEMA = "fogml.benchmark_round/1"

@@ -11,6 +11,7 @@ from pydantic import Field
 
 from fogml.errors import InputError
 from fogml.fleet.shares import apart, bayes_factor, discoveries, prevalence, probability_of_difference
+from fogml.gap.families.priors import Priors
 from fogml.gap.result import NAMED
 from fogml.runs.run import FloatArray
 from fogml.signals.random_effects import random_effects
@@ -22,9 +23,9 @@ SHARED = 0.95
 """A cause is the line's if more than half of its units have it with this probability, and by lot likewise."""
 RARE = 0.1
 """A cause is rare where no more than this share of the units, or one alone, have it."""
-BEFORE, UNKNOWN_BEFORE = 1.0 / 60.0, 0.25
-"""Probability before the data that a unit has a given cause, or an unknown one, as a diagnosis takes it
-(`fogml.gap.families.priors.Priors`): one of the catalogue's that runs can show."""
+BEFORE = 1.0 / 60.0
+"""Probability before the data that a unit has a given cause, as a diagnosis takes it: one of the catalogue's
+that runs can show."""
 _RESAMPLES = 400
 """Lines drawn from the units for an interval: its ends are told to a tenth of its width."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -114,7 +115,7 @@ def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], see
     draws = rng.integers(len(units), size=(_RESAMPLES, len(units)))
     causes = [_cause(effect, labels, units, draws) for effect in effects]
     causes.sort(key=lambda one: -one["energy_share"])
-    unknown = prevalence([bayes_factor(unit.unknown, UNKNOWN_BEFORE) for unit in units])
+    unknown = prevalence([bayes_factor(unit.unknown, Priors.unknown) for unit in units])
     return {
         "units": len(units),
         "causes": causes,

@@ -25,7 +25,6 @@ from fogml.models.compact import Compact
 from fogml.models.directions import refusals
 from fogml.models.feature_model import resolve_features
 from fogml.models.intervals import Intervals
-from fogml.models.rbf.rates import RATES_THAT_TELL
 from fogml.models.trial import Trial
 from fogml.models.weighing import weigh
 from fogml.runs.run import Run
@@ -83,9 +82,7 @@ class AutoModel(DriftModel):
                 self.progress(done + 1, len(trial.candidates), candidate.name)
         self.scores_ = sorted(scores, key=lambda score: (score.mean_square, score.parameters))
         self.choice_ = trial.chosen(scores)
-        self.weighed_ = weigh(
-            group, self.choice_.candidate, self.features, self.seed, trial.rates >= RATES_THAT_TELL
-        )
+        self.weighed_ = weigh(group, self.choice_.candidate, self.features, self.seed, trial.one_rate)
         self.chosen_ = self.weighed_.model
         notes = (*refusals(group), *self.chosen_.card_.notes, *self._reasons(trial))
         self.card_ = replace(self.chosen_.card_, notes=notes)
@@ -97,7 +94,7 @@ class AutoModel(DriftModel):
         """What is in it and why, and what the training runs could not tell; for the card."""
         notes = [self.weighed_.told()]
         weighed = self.features is None
-        if weighed and trial.direction_told and trial.rates < RATES_THAT_TELL:
+        if weighed and trial.one_rate:
             notes.append(
                 f"at most temperatures the training runs hold {trial.rates} distinct rate(s), which don't "
                 "tell how the drift depends on the rate: what is weighed is linear in it; train at three or "

@@ -72,7 +72,7 @@ class Trial:
         self.candidates = (
             candidates_of(features)
             if features
-            else candidates_for(runs, self.rates >= RATES_THAT_TELL, self.direction_told)
+            else candidates_for(runs, self.rates_told, self.direction_told)
         )
         union = union_of(self.candidates)
         self._column = {atom.text: column for column, atom in enumerate(union.atoms)}
@@ -84,6 +84,16 @@ class Trial:
         self._partings: list[list[Fold]] = [time_folds(self._table, FOLDS, blocks_per_fold=BLOCKS_PER_FOLD)]
         if self.several_runs:
             self._partings.insert(0, run_folds(self._table))
+
+    @property
+    def rates_told(self) -> bool:
+        """Whether there are rates of temperature enough to tell terms in the rate from others."""
+        return self.rates >= RATES_THAT_TELL
+
+    @property
+    def one_rate(self) -> bool:
+        """Whether terms in the rate are offered that too few rates tell."""
+        return self.direction_told and not self.rates_told
 
     def score(self, candidate: Candidate) -> Score:
         """Errors of a candidate on the rows that each fold holds out.
@@ -111,8 +121,7 @@ class Trial:
 
     def chosen(self, scores: Sequence[Score]) -> Score:
         """The score of the candidate that these runs speak for."""
-        told = self.rates >= RATES_THAT_TELL
-        return choose(scores, rates_told=told, both_directions=self.both_directions)
+        return choose(scores, rates_told=self.rates_told, both_directions=self.both_directions)
 
     def _predicted(
         self, candidate: Candidate, fitted: IndexArray, held: IndexArray

@@ -27,7 +27,7 @@ from fogml.models.combination import (
     left_out_parts,
     temperatures_of,
 )
-from fogml.models.directions import direction_is_told, moves_both_ways
+from fogml.models.directions import moves_both_ways
 from fogml.models.feature_model import FeatureModel, resolve_features
 from fogml.models.linear import LinearRegressor
 from fogml.models.mixed_effects import fit_mixed_effects, linear_regressor
@@ -82,9 +82,7 @@ class Weighed:
         return f"made of {shares}: it leaves {rms}"
 
 
-def weigh(
-    runs: Sequence[Run], choice: Candidate, features: str | None, seed: int, rates_told: bool
-) -> Weighed:
+def weigh(runs: Sequence[Run], choice: Candidate, features: str | None, seed: int, one_rate: bool) -> Weighed:
     """Fit the members, weigh them on what is left out, and put them together.
 
     Parameters
@@ -97,9 +95,9 @@ def weigh(
         Features to keep to; None leaves them open.
     seed
         Seed of a network.
-    rates_told
-        Whether the runs hold rates of temperature enough to tell terms in the rate from others; else members
-        that hold more than the simple candidate's must improve on it.
+    one_rate
+        Whether the runs hold too few rates of temperature to tell terms in the rate from others: members that
+        hold more than the simple candidate must improve on it.
     """
     hashes = hash_ahead(runs)
     shared = {"mixed effects": offered(runs) if features is None else resolve_features(features, runs)}
@@ -119,10 +117,9 @@ def weigh(
         members[choice.name] = FittedMember(simple.features_, regressor)
     parts = left_out_parts(table, temperatures_of(table, union))
     lefts = left_out(list(members.values()), union, table, parts)
-    motion = [run.temperature("T") for run in runs]
-    both_ways = moves_both_ways(motion)
+    both_ways = moves_both_ways([run.temperature("T") for run in runs])
     must_improve_on = [STATIC] if len(runs) > 1 else []
-    must_improve_on += [choice.name] if direction_is_told(motion) and not rates_told else []
+    must_improve_on += [choice.name] if one_rate else []
     beside = [place for place, name in enumerate(members) if name in must_improve_on]
     weights = weights_of(lefts, len(members), both_ways, beside)
     left, mean_left = _rms(lefts, weights), _rms(lefts, 0.0 * weights)

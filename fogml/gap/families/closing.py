@@ -21,7 +21,6 @@ from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
 
-AVERAGING_S = 100.0
 DRAWS, NOISES = 40, 200
 LEAST_GAP = 0.2
 """A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
