@@ -21,6 +21,8 @@ HEADER = ("drift [deg/h]", "half_width [deg/h]")
 ABOUT = "about.json"
 """What a method tells beside its answer: ``bytes`` of what it would carry into firmware."""
 _DIGITS = "%.10g"
+_MOST_BYTES_A_ROW = 128
+"""Two numbers of all their digits take under 60 bytes; what is larger is no answer and is not read."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +89,10 @@ def read_drift(folder: Path, samples: int) -> DriftAnswer:
         return DriftAnswer(failure=f"{outcome.get('reason')}: {outcome.get('message')}")
     if not path.is_file():
         raise InputError(f"{path}: no such file; every case needs an answer")
+    if path.stat().st_size > _MOST_BYTES_A_ROW * (samples + 1):
+        raise InputError(
+            f"{path}: is larger than {samples} rows can be; expected one row for each of held-out-1.csv"
+        )
     lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     cells = tuple(cell.strip() for cell in lines[0].split(",")) if lines else ()
     if cells not in (HEADER, HEADER[:1]):
@@ -97,9 +103,7 @@ def read_drift(folder: Path, samples: int) -> DriftAnswer:
             f"{path}: {len(lines) - 1} rows below the header, expected {samples}: one for each row of "
             "held-out-1.csv"
         )
-    values = np.empty((samples, len(cells)))
-    for row, line in enumerate(lines[1:]):
-        values[row] = _numbers(line, cells, path, row + 2)
+    values = _numbers(lines[1:], cells, path)
     about = read_json(folder / ABOUT) if (folder / ABOUT).is_file() else {}
     told = about.get("bytes")
     if told is not None and not (isinstance(told, int) and told >= 0):
@@ -107,11 +111,24 @@ def read_drift(folder: Path, samples: int) -> DriftAnswer:
     return DriftAnswer(values[:, 0], values[:, 1] if len(cells) > 1 else None, told)
 
 
-def _numbers(line: str, cells: tuple[str, ...], path: Path, row: int) -> list[float]:
+def _numbers(lines: list[str], cells: tuple[str, ...], path: Path) -> FloatArray:
+    """Rows of finite numbers; a fault is told by its column and row."""
+    try:
+        values = np.loadtxt(lines, delimiter=",", ndmin=2, comments=None)
+    except ValueError:
+        values = np.empty((0, 0))
+    sound = values.shape == (len(lines), len(cells)) and np.isfinite(values).all()
+    if sound and not np.any(values[:, 1:] < 0.0):
+        return values
+    for row, line in enumerate(lines, start=2):
+        _check_row(line, cells, path, row)
+    raise InputError(f"{path}: the rows are not numbers separated by commas")
+
+
+def _check_row(line: str, cells: tuple[str, ...], path: Path, row: int) -> None:
     parts = line.split(",")
     if len(parts) != len(cells):
         raise InputError(f"{path}, row {row}: {len(parts)} cells, expected {len(cells)}")
-    found = []
     for text, cell in zip(parts, cells):
         try:
             value = float(text)
@@ -122,5 +139,3 @@ def _numbers(line: str, cells: tuple[str, ...], path: Path, row: int) -> list[fl
             raise InputError(
                 f"{path}, column '{cell}', row {row}: '{text.strip()[:40]}', expected a finite number{least}"
             )
-        found.append(value)
-    return found

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from fogml.benchmark.rounds import RoundDesign
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.make import make_cases
 from fogml.blind.realities import MIX
@@ -18,18 +19,6 @@ from fogml.runs.run import Run
 from fogml.runs.shipped import shipped_run
 from fogml.runs.writing import write_run
 from fogml.signals.averages import block_averages
-
-SAMPLE_S = 10.0
-"""Of synthetic runs, as of the diagnosis' suites [s]."""
-KINDS = ("one", "two", "three", "unknown_invented")
-D_PRIME = ((20.0, 60.0),)
-"""Synthetic units have one to three causes of drift, each of a whitened length between these."""
-AVERAGING_S = 100.0
-_CYCLE = ((("1", "2"), "3"), (("1", "3"), "2"), (("2", "3"), "1"), (("1",), "2"), (("2",), "3"))
-_COLD = (((0, 1), 2), ((1, 2), 0))
-_CYCLE_ROWS, _COLD_S = 20, 20.0
-COLD_SAMPLE_S = 0.3
-"""The cold start is averaged over so long [s]: its 59 Hz say nothing more of its drift."""
 
 
 @dataclass(frozen=True)
@@ -53,23 +42,24 @@ class DriftCase:
     averaging_s: float
 
 
-def real_cases() -> Iterator[DriftCase]:
+def real_cases(design: RoundDesign) -> Iterator[DriftCase]:
     """Legs of the thermal cycle and thirds of the cold start, three axes of MEMS units each."""
     for axis in "xyz":
         runs = {leg: shipped_run(f"thermal-cycle-{leg}-{axis}") for leg in "123"}
-        for train, test in _CYCLE:
+        for train, test in design.cycle_pairs:
             label = f"{axis}, {' + '.join(train)} → {test}"
-            averaging_s = _CYCLE_ROWS * runs[test].sample_s
+            averaging_s = design.cycle_averaging_rows * runs[test].sample_s
             yield DriftCase(
                 "thermal cycle, MEMS", label, tuple(runs[k] for k in train), runs[test], averaging_s
             )
     for axis in "xyz":
-        run = _averaged(shipped_run(f"cold-start-{axis}"), COLD_SAMPLE_S)
+        run = _averaged(shipped_run(f"cold-start-{axis}"), design.cold_sample_s)
         edges = np.linspace(0, len(run), 4).astype(int)
         thirds = [run[low:high] for low, high in pairwise(edges.tolist())]
-        for parts, held in _COLD:
+        for parts, held in design.cold_pairs:
             label = f"{axis}, thirds {' + '.join(str(k + 1) for k in parts)} → {held + 1}"
-            yield DriftCase("cold start, MEMS", label, tuple(thirds[k] for k in parts), thirds[held], _COLD_S)
+            trained = tuple(thirds[k] for k in parts)
+            yield DriftCase("cold start, MEMS", label, trained, thirds[held], design.cold_averaging_s)
 
 
 def _averaged(run: Run, window_s: float) -> Run:
@@ -78,18 +68,29 @@ def _averaged(run: Run, window_s: float) -> Run:
     return Run(run.name, {"time": means.time_s, **dict(zip(names, means.values))}, run.facts)
 
 
-def synthetic_cases(count: int, seed: int, scratch: Path, workers: int) -> Iterator[DriftCase]:
-    """Units of the realities in turn, with the causes that `KINDS` and `D_PRIME` tell."""
+def synthetic_cases(
+    count: int, seed: int, scratch: Path, workers: int, design: RoundDesign
+) -> Iterator[DriftCase]:
+    """Units of the realities in turn, with the causes that the design tells."""
     if not count:
         return
-    make_cases(scratch, count, seed, SAMPLE_S, workers, KINDS, of=MIX, d_prime=D_PRIME)
+    make_cases(
+        scratch,
+        count,
+        seed,
+        design.sample_s,
+        workers,
+        design.drift_kinds,
+        of=MIX,
+        d_prime=(design.drift_d_prime,),
+    )
     suite = BlindFolder(scratch)
     for name in suite.names():
         reality = read_truth(suite.truth / f"{name}.json").reality
         files = case_files(suite.cases / name)
         train = tuple(read_run(path) for path in files.fit)
         yield DriftCase(
-            f"synthetic, {reality} reality", name, train, read_run(files.held_out[0]), AVERAGING_S
+            f"synthetic, {reality} reality", name, train, read_run(files.held_out[0]), design.averaging_s
         )
 
 

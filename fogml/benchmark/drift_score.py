@@ -18,8 +18,6 @@ from fogml.validation.floors import floor_of_run
 from fogml.validation.metrics import RunMetrics
 from fogml.validation.run_errors import RunErrors, run_errors
 
-SETTLING_S = 128.0
-"""Start of a held-out run that enters no figure: windows fill there [s]."""
 ALL = "all"
 
 
@@ -67,9 +65,9 @@ class DriftMark:
 
 
 def drift_marks(
-    folder: TrackFolder, cases: Mapping[str, Mapping[str, Any]], entries: Sequence[str]
+    folder: TrackFolder, cases: Mapping[str, Mapping[str, Any]], entries: Sequence[str], settling_s: float
 ) -> dict[str, list[DriftMark]]:
-    """Every entry's marks, in the order of the cases.
+    """Every entry's marks, in the order of the cases, the first `settling_s` of held-out runs left out.
 
     Raises
     ------
@@ -81,7 +79,7 @@ def drift_marks(
         train = [read_run(path) for path in case_files(folder.cases / case).fit]
         test = read_run(folder.kept(case)[0])
         nothing = run_errors(MeanModel().fit(train), test)
-        nothing = nothing.within(test.time - test.time[0] >= SETTLING_S)
+        nothing = nothing.within(test.time - test.time[0] >= settling_s)
         for name in entries:
             answer = read_drift(folder.answers(name) / case, len(test))
             found[name].append(_mark(case, told["group"], nothing, answer, told["averaging_s"]))

@@ -11,8 +11,18 @@ from pathlib import Path
 from typing import Any
 
 import fogml
-from fogml.benchmark.drift_cases import SAMPLE_S, DriftCase, real_cases, synthetic_cases, write_case
-from fogml.benchmark.rounds import RULES, SCHEMA, SEED, TRACKS, Track, TrackFolder, commitment
+from fogml.benchmark.drift_cases import DriftCase, real_cases, synthetic_cases, write_case
+from fogml.benchmark.rounds import (
+    DESIGN,
+    RULES,
+    SCHEMA,
+    SEED,
+    TRACKS,
+    RoundDesign,
+    Track,
+    TrackFolder,
+    commitment,
+)
 from fogml.blind.folders import BlindFolder
 from fogml.blind.make import make_cases
 from fogml.blind.realities import MIX
@@ -22,8 +32,6 @@ from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import scratch_folder, whole_folder
 
-LEAST_D_PRIME = 10.0
-"""Causes of the diagnosis track are at least so strong: whitened length beside the constants."""
 _APART = 7
 """Of the drift track's seed from the diagnosis track's, whose held-out runs are handed out whole."""
 _SECRET_BITS = 62
@@ -38,6 +46,7 @@ def make_round(
     drift: int = 12,
     diagnosis: int = 12,
     real: bool = True,
+    design: RoundDesign = DESIGN,
     workers: int = 2,
     step: Callable[[str], None] = lambda words: None,
 ) -> dict[str, Any]:
@@ -55,6 +64,8 @@ def make_round(
         Synthetic cases of each track.
     real
         Whether the drift track has the real legs.
+    design
+        What cases are drawn from.
     workers
         Processes.
     step
@@ -72,16 +83,24 @@ def make_round(
         seed = secrets.randbits(_SECRET_BITS)
     with scratch_folder() as scratch:
         step("drift cases")
-        made = list(synthetic_cases(drift, seed + _APART, scratch / "drift", workers))
+        made = list(synthetic_cases(drift, seed + _APART, scratch / "drift", workers, design))
         step("diagnosis cases")
         suite = BlindFolder(scratch / "diagnosis")
-        make_cases(suite.path, diagnosis, seed, SAMPLE_S, workers, None, least_d_prime=LEAST_D_PRIME, of=MIX)
+        least = design.least_d_prime
+        make_cases(suite.path, diagnosis, seed, design.sample_s, workers, None, least_d_prime=least, of=MIX)
         leave_out_relatives(suite, workers)
-        return write_round(directory, chain(real_cases() if real else (), made), suite, seed, closed=closed)
+        drawn = chain(real_cases(design) if real else (), made)
+        return write_round(directory, drawn, suite, seed, closed=closed, design=design)
 
 
 def write_round(
-    directory: str | Path, drift: Iterable[DriftCase], suite: BlindFolder, seed: int, *, closed: bool = False
+    directory: str | Path,
+    drift: Iterable[DriftCase],
+    suite: BlindFolder,
+    seed: int,
+    *,
+    closed: bool = False,
+    design: RoundDesign = DESIGN,
 ) -> dict[str, Any]:
     """Write a round of any drift cases, a laboratory's own among them, and a blind suite of any reality.
 
@@ -97,6 +116,8 @@ def write_round(
         Stated where the round is open.
     closed
         Whether seed and salt are kept.
+    design
+        What the cases are of; the scorer reads ``settling_s`` from it.
 
     Raises
     ------
@@ -132,6 +153,7 @@ def write_round(
             "seed": None if closed else seed,
             "closed": closed,
             "rules": list(RULES),
+            "design": design.stated(),
             "tracks": told,
         }
         write_json(staging / "handout" / "round.json", values, indent=1)

@@ -41,7 +41,8 @@ def score_round(directory: str | Path, entries: Sequence[str] = (), *, workers: 
             )
     if not found:
         raise InputError(f"{home / 'entries'}: holds no answers; run a method first: fogml benchmark run")
-    drift = drift_marks(folders["drift"], told["tracks"]["drift"], chosen["drift"])
+    settling_s = told["design"]["settling_s"]
+    drift = drift_marks(folders["drift"], told["tracks"]["drift"], chosen["drift"], settling_s)
     named = diagnosis_marks(folders["diagnosis"], chosen["diagnosis"], workers)
     return {
         "schema": SCHEMA,
@@ -51,6 +52,7 @@ def score_round(directory: str | Path, entries: Sequence[str] = (), *, workers: 
             "closed": told["closed"],
             "made_by": told["version"],
             "rules": told["rules"],
+            "design": told["design"],
             "handout_sha256": round_hash(home),
         },
         "cases": {track: told["tracks"][track] for track in TRACKS},

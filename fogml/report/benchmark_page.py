@@ -8,7 +8,7 @@ from typing import Any
 import plotly.graph_objects as go
 
 from fogml.benchmark.diagnosis_score import FIGURES
-from fogml.benchmark.drift_score import ALL, SETTLING_S
+from fogml.benchmark.drift_score import ALL
 from fogml.report import style
 from fogml.report.axes import log_axis
 from fogml.report.page import Drawing, render
@@ -24,11 +24,6 @@ _WORDS = (
     ("harmful", "cases where that rms exceeds doing nothing by more than the noise floor of the run"),
     ("coverage", "share of averages within the stated 90 % interval"),
     ("width", "full width of that interval over the rms of doing nothing, geometric mean"),
-    (
-        "start",
-        f"the first {SETTLING_S:g} s of a held-out run enter no figure; averages are over 100 s of synthetic "
-        "runs, 10 s of the thermal cycle, 20 s of the cold start",
-    ),
     ("known cause", "one that a candidate of the catalogue stands for; named: probability of 0.5 or more"),
     ("unknown", "a cause that no candidate stands for: told as unknown with 0.5 or more and no wrong name"),
     (
@@ -57,8 +52,16 @@ def benchmark_page(values: Mapping[str, Any]) -> str:
         diagnosis=diagnosis_table(values),
         rules=values["round"]["rules"],
         about=_about(values),
-        words=_WORDS,
+        words=(*_WORDS, ("averages", _averages(values))),
     )
+
+
+def _averages(values: Mapping[str, Any]) -> str:
+    """What figures of drift are averages over, by data."""
+    told = {case["group"]: case["averaging_s"] for case in values["cases"]["drift"].values()}
+    spans = ", ".join(f"{group} {span:.3g} s" for group, span in told.items())
+    start = values["round"]["design"]["settling_s"]
+    return f"of drift: {spans}; the first {start:g} s of a held-out run enter no figure"
 
 
 def _ranked(values: Mapping[str, Any]) -> list[str]:

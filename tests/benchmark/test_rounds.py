@@ -11,10 +11,10 @@ from click.testing import CliRunner
 
 from fogml.benchmark.answers import answer_by, read_drift, write_drift
 from fogml.benchmark.drift_cases import DriftCase
-from fogml.benchmark.drift_score import SETTLING_S, geometric_mean
+from fogml.benchmark.drift_score import geometric_mean
 from fogml.benchmark.entries import entry_name
 from fogml.benchmark.make import make_round, write_round
-from fogml.benchmark.rounds import TrackFolder
+from fogml.benchmark.rounds import RoundDesign, TrackFolder
 from fogml.benchmark.score import score_round
 from fogml.blind.folders import case_files
 from fogml.cli.main import app
@@ -75,7 +75,7 @@ def test_the_drift_score_is_that_of_averages_by_hand(made: Path) -> None:
     answer = read_drift(made / "entries" / "cubic" / "drift" / "0001", len(kept))
     train = [chamber_run("a", 1, (20.0, -20.0, 60.0)), chamber_run("b", 2, (60.0, -20.0, 30.0))]
     mean = np.mean([run.gyro.mean() for run in train])
-    settled = kept.time >= SETTLING_S
+    settled = kept.time >= RoundDesign().settling_s
 
     def rms(left: np.ndarray) -> float:
         rows = left[settled]

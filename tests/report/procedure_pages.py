@@ -10,7 +10,7 @@ from pathlib import Path
 
 from fogml.benchmark.diagnosis_score import diagnosis_figures
 from fogml.benchmark.drift_score import DriftMark, drift_figures
-from fogml.benchmark.rounds import RULES
+from fogml.benchmark.rounds import DESIGN, RULES
 from fogml.blind.scoring.values import score_values
 from fogml.report import blind_page
 from fogml.report.axes_page import axes_page
@@ -58,9 +58,13 @@ def benchmark(serial: str) -> str:
                 "closed": False,
                 "made_by": "0.2.0",
                 "rules": list(RULES),
+                "design": DESIGN.stated(),
                 "handout_sha256": "0f" * 32,
             },
-            "cases": {"drift": dict.fromkeys(range(8)), "diagnosis": dict.fromkeys(range(40))},
+            "cases": {
+                "drift": {k: {"group": groups[k % 2], "averaging_s": 100.0} for k in range(8)},
+                "diagnosis": dict.fromkeys(range(40)),
+            },
             "drift": {name: {"figures": drift_figures(own)} for name, own in drift.items()},
             "diagnosis": {name: {"figures": diagnosis_figures(own)} for name, own in marks.methods.items()},
         }
