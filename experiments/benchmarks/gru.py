@@ -16,6 +16,8 @@ IndexArray = NDArray[np.intp]
 _WARM_UP = 32
 """Steps before each piece whose outputs do not count: the state settles on them."""
 _PIECES = 8
+_CURVE = 20
+"""Operations of a tanh, as the product counts an exponential."""
 
 
 class GRULearner:
@@ -74,6 +76,15 @@ class GRULearner:
     def _made(self, width: int) -> Any:
         return _network(width, self.hidden)
 
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """The network's numbers."""
+        return {name: array.numpy() for name, array in self._network.state_dict().items()}
+
+    def operations(self) -> int:
+        """Products and sums of a step, and `_CURVE` for each tanh or logistic of the state."""
+        width, h = len(self._shift), self.hidden
+        return 6 * h * (width + h) + h * (3 * _CURVE + 10) + 2 * h
+
     def _pieces(
         self, table: TrainingTable, run: slice, counted: NDArray[np.bool_]
     ) -> list[tuple[FloatArray, FloatArray, FloatArray]]:
@@ -119,6 +130,11 @@ class TCNLearner(GRULearner):
 
     def _made(self, width: int) -> Any:
         return _convolutions(width, self.hidden)
+
+    def operations(self) -> int:
+        """Of a step, what earlier steps gave being kept."""
+        width, h = len(self._shift), self.hidden
+        return 6 * h * (width + 2 * h) + 3 * h * _CURVE + 2 * h
 
 
 def _convolutions(width: int, hidden: int) -> Any:

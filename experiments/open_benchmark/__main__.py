@@ -36,6 +36,7 @@ DRIFT: dict[str, dict[str, Any]] = {
     "Gaussian process": {"method": f"{_METHODS}:gaussian_process", "code": ROOT},
     "boosting": {"method": "sklearn.ensemble.HistGradientBoostingRegressor", "features": "T, dT"},
     "GRU": {"method": f"{_METHODS}:gru", "code": ROOT},
+    "PX4's cubic": {"method": f"{_METHODS}:px4_cubic", "code": ROOT},
 }
 """What each entry of the drift track is called, and how it is run."""
 DIAGNOSIS = {"fogml diagnose": {"method": "diagnosis"}, "greedy BIC": {"method": "bic"}}

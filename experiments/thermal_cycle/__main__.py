@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from experiments.results import write_results
-from experiments.thermal_cycle.recurrent import Convolutional, Recurrent
+from experiments.thermal_cycle.small_models import SMALL, SmallModel
 from fogml import __version__
 from fogml.models.names import make_model
 from fogml.runs.run import Run
@@ -31,6 +31,7 @@ LEGS = {"1": "down", "2": "up", "3": "last down"}
 PROCESS = "sklearn.gaussian_process.GaussianProcessRegressor"
 MACHINE = "sklearn.svm.SVR"
 KERNEL_RIDGE = "sklearn.kernel_ridge.KernelRidge"
+BOOSTING = "sklearn.ensemble.HistGradientBoostingRegressor"
 MODELS = {
     "mean": ("mean", None),
     "cubic in T": ("polynomial", "T^1..3"),
@@ -40,12 +41,15 @@ MODELS = {
     "Gaussian process": (PROCESS, "T, dT"),
     "support vectors": (MACHINE, "T, dT"),
     "kernel ridge": (KERNEL_RIDGE, "T, dT"),
-    "GRU, 404 bytes": ("recurrent", None),
-    "TCN, 340 bytes": ("convolutional", None),
+    "boosting": (BOOSTING, "T, dT"),
+    "GRU, 404 bytes": ("GRU", None),
+    "TCN, 340 bytes": ("TCN", None),
+    "KAN, 364 bytes": ("KAN", None),
+    "PX4's cubic": ("PX4's cubic", None),
+    "ArduPilot's cubic": ("ArduPilot's cubic", None),
     "mixed effects": ("mixed-effects", None),
     "auto": ("auto", None),
 }
-NETWORKS = {"recurrent": Recurrent, "convolutional": Convolutional}
 SINGLE = [((first,), second) for first, second in permutations(LEGS, 2)]
 PAIRS = [(("1", "2"), "3"), (("1", "3"), "2"), (("2", "3"), "1")]
 AXES = "xyz"
@@ -79,7 +83,7 @@ def pairing(
     """One entry for each model on one pairing of legs."""
     averaging_s = ROWS_PER_AVERAGE * test_run.sample_s
     makers = {
-        label: NETWORKS[name] if name in NETWORKS else partial(make_model, name, features)
+        label: partial(SmallModel, name) if name in SMALL else partial(make_model, name, features)
         for label, (name, features) in MODELS.items()
         if label in models or label == WINDOWED
     }
