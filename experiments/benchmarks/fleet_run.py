@@ -142,6 +142,8 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=46, help="of the moments (46)")
     parser.add_argument("--keep", action="store_true", help="keep the results")
     given = parser.parse_args()
+    # Where this was started in the background SIGINT is ignored, and children would inherit that.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     manifest = make_units(given.directory, given.units)
     found: dict[str, Any] = {}
     spent: dict[str, float] = {}

@@ -23,7 +23,7 @@ from experiments.benchmarks.jobs import JOBS, STUDIES
 from experiments.benchmarks.machine import describe_machine
 from experiments.benchmarks.merging import kept_results, merged
 from experiments.benchmarks.pages import results_page
-from experiments.benchmarks.scale import fleet_found, scale_page
+from experiments.benchmarks.scale import found_in, scale_page
 from experiments.benchmarks.study import Study, carried_out
 from experiments.results import html_page
 from fogml.outputs import whole_file
@@ -94,7 +94,9 @@ def write(results: Mapping[str, Any], out: Path) -> None:
         "results.json": json.dumps(results, indent=1, allow_nan=False, ensure_ascii=False) + "\n",
         "results.md": page,
         "results.html": html_page(page, {}),
-        "scale.md": scale_page(results, fleet=fleet_found(out)),
+        "scale.md": scale_page(
+            results, fleet=found_in(out, "fleet_run.json"), shared=found_in(out, "scale_costs.json")
+        ),
     }
     out.mkdir(parents=True, exist_ok=True)
     for name, text in files.items():

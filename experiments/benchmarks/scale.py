@@ -119,8 +119,9 @@ def scale_page(
     load: Load | None = None,
     server: Server | None = None,
     fleet: Mapping[str, Any] | None = None,
+    shared: Mapping[str, Any] | None = None,
 ) -> str:
-    """The page, in Markdown; `fleet` is what ``fleet_run.json`` holds, if a fleet was run."""
+    """The page, in Markdown; `fleet` and `shared` hold ``fleet_run.json`` and ``scale_costs.json``."""
     load, server = load or Load(), server or Server()
     found, missing = costs(results, load)
     machine = results["machine"]
@@ -139,6 +140,7 @@ def scale_page(
         "taken as core-seconds and as linear in samples; both are what `results.md` shows. Nothing here was "
         "run at this size.",
         *(() if fleet is None else _real_run(fleet, load)),
+        *(() if shared is None else _shared_costs(shared, load)),
     ]
     if missing:
         lines += ["", f"Not measured, so not in the sums: {'; '.join(missing)}."]
@@ -188,10 +190,50 @@ def scale_page(
     return "\n".join(lines) + "\n"
 
 
-def fleet_found(folder: Path) -> Mapping[str, Any] | None:
-    """What `experiments.benchmarks.fleet_run` found, if it lies in a folder."""
-    path = folder / "fleet_run.json"
+def found_in(folder: Path, name: str) -> Mapping[str, Any] | None:
+    """What a run of its own found, if it lies in a folder."""
+    path = folder / name
     return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else None
+
+
+def _shared_costs(told: Mapping[str, Any], load: Load) -> list[str]:
+    """What a cluster and a database add to work done in two processes and files."""
+    fleet, sweep, store = told["fleet"], told["sweep"], told["store"]
+    units, trials, held = fleet["units"], sweep["trials"], store["held"]
+    rows = [
+        ("a unit of a fleet", "two processes", fleet["processes"], "Dask, two workers", fleet["dask"], units),
+        ("a trial of a sweep", "journal file", sweep["journal"], "PostgreSQL", sweep["database"], trials),
+    ]
+    lines = [
+        "",
+        "## What a cluster and a database cost",
+        "",
+        f"`python -m experiments.benchmarks.scale_costs DIR`, fogml {told['version']}, {told['date']}: "
+        f"{units} units of two short runs each, {trials} trials, both sides in one run; starting and ending "
+        "workers counts, a server on the same machine that does not wait for its disk.",
+        "",
+        "| work | in | core-seconds | seconds | in | core-seconds | seconds |",
+        "|---|---|---:|---:|---|---:|---:|",
+    ]
+    for what, one, own, other, shared, count in rows:
+        cells = [
+            f"{name} | {spent['core_s'] / count:.2g} | {spent['wall_s'] / count:.2g}"
+            for name, spent in ((one, own), (other, shared))
+        ]
+        lines.append(f"| {what} | {' | '.join(cells)} |")
+    folder, database = store["folder"], store["database"]
+    month = load.units * load.runs
+    return [
+        *lines,
+        "",
+        f"A monitor's store of {held:,} runs (a month's are {month:,}): one more run takes "
+        f"{folder['add_s']:.2g} s in a folder, whose file is read and written whole, and "
+        f"{database['add_s']:.2g} s in PostgreSQL; reading all takes {folder['read_s']:.2g} and "
+        f"{database['read_s']:.2g} s. Runs given in one call are added at once. Added one by one, a "
+        f"month's runs take "
+        f"{folder['add_s'] * month / 3600.0:.2g} h in a folder of that size and "
+        f"{database['add_s'] * month / 3600.0:.2g} h in PostgreSQL.",
+    ]
 
 
 def _real_run(fleet: Mapping[str, Any], load: Load) -> list[str]:
@@ -291,7 +333,8 @@ def main() -> None:
     """Write the page anew."""
     results = json.loads((HERE / "results.json").read_text(encoding="utf-8"))
     with whole_file(HERE / "scale.md") as partial:
-        partial.write_text(scale_page(results, fleet=fleet_found(HERE)), encoding="utf-8")
+        own, shared = (found_in(HERE, name) for name in ("fleet_run.json", "scale_costs.json"))
+        partial.write_text(scale_page(results, fleet=own, shared=shared), encoding="utf-8")
 
 
 if __name__ == "__main__":
