@@ -19,6 +19,7 @@ from typing import Any, Literal, get_args
 from fogml.blind.folders import BlindFolder, read_json
 from fogml.blind.truth import Kind
 from fogml.errors import InputError
+from fogml.signals.averages import AVERAGING_S
 
 Track = Literal["drift", "diagnosis"]
 TRACKS: tuple[Track, ...] = get_args(Track)
@@ -71,7 +72,7 @@ class RoundDesign:
     drift_kinds: tuple[Kind, ...] = ("one", "two", "three", "unknown_invented")
     drift_d_prime: tuple[float, float] = (20.0, 60.0)
     least_d_prime: float = 10.0
-    averaging_s: float = 100.0
+    averaging_s: float = AVERAGING_S
     cycle_pairs: tuple[tuple[str, str], ...] = (("12", "3"), ("13", "2"), ("23", "1"), ("1", "2"), ("2", "3"))
     cycle_averaging_rows: int = 20
     cold_pairs: tuple[tuple[tuple[int, ...], int], ...] = (((0, 1), 2), ((1, 2), 0))

@@ -71,12 +71,12 @@ def _noise(settings: NoiseSettings, terminal: Terminal) -> dict[str, Any]:
 
 def _floor(run: Run, taus_s: Sequence[float]) -> dict[str, Any] | None:
     """The noise floor as drift models are held against, from their usual averaging time on."""
+    from fogml.signals.averages import AVERAGING_S
     from fogml.validation.floors import floors_over
-    from fogml.validation.judge import DEFAULT_AVERAGING_S
 
     longest = 0.5 * run.span_s
-    times = [DEFAULT_AVERAGING_S, *(tau for tau in taus_s if DEFAULT_AVERAGING_S < tau <= longest)]
-    found = floors_over(run, DEFAULT_AVERAGING_S, times)
+    times = [AVERAGING_S, *(tau for tau in taus_s if AVERAGING_S < tau <= longest)]
+    found = floors_over(run, AVERAGING_S, times)
     if not found:
         return None
     return {

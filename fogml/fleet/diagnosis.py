@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import numpy as np
@@ -17,18 +18,37 @@ from fogml.runs.run import FloatArray
 from fogml.signals.random_effects import random_effects
 from fogml.strict import Strict, strictly
 
-FALSE_SHARE = 0.05
-"""Of the units that are said to stand apart, the share that may be wrong in the mean."""
-SHARED = 0.95
-"""A cause is the line's if more than half of its units have it with this probability, and by lot likewise."""
-RARE = 0.1
-"""A cause is rare where no more than this share of the units, or one alone, have it."""
-BEFORE = 1.0 / 60.0
-"""Probability before the data that a unit has a given cause, as a diagnosis takes it: one of the catalogue's
-that runs can show."""
-_RESAMPLES = 400
-"""Lines drawn from the units for an interval: its ends are told to a tenth of its width."""
 Probability = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+@dataclass(frozen=True)
+class LineRules:
+    """What is told of a line of units.
+
+    Attributes
+    ----------
+    false_share
+        Of the units that are said to stand apart, the share that may be wrong in the mean.
+    shared
+        A cause is the line's if more than half of its units have it with this probability; by lot likewise.
+    rare
+        A cause is rare where no more than this share of the units, or one alone, have it.
+    before
+        Probability before the data that a unit has a given cause, as a diagnosis takes it: one of the
+        catalogue's 60 that runs can show.
+    resamples
+        Lines drawn from the units for an interval: its ends are told to a tenth of its width.
+    """
+
+    false_share: float = 0.05
+    shared: float = 0.95
+    rare: float = 0.1
+    before: float = 1.0 / 60.0
+    resamples: int = 400
+
+
+RULES = LineRules()
+"""Of a line's diagnosis unless others are given."""
 
 
 class Cause(Strict, extra="ignore"):
@@ -92,7 +112,9 @@ def _told(item: Any) -> bool:
     return bool(item.before is None or item.recalibrated <= item.before)
 
 
-def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], seed: int = 0) -> dict[str, Any]:
+def line_diagnosis(
+    labels: Sequence[str], told: Sequence[Mapping[str, Any]], seed: int = 0, rules: LineRules = RULES
+) -> dict[str, Any]:
     """What n units' diagnoses tell together, JSON-ready.
 
     Parameters
@@ -103,6 +125,8 @@ def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], see
         As `unit_diagnosis` gives them.
     seed
         Of the intervals' resampling.
+    rules
+        When a cause is shared or rare, and how often a unit may be told apart falsely.
 
     Raises
     ------
@@ -112,8 +136,8 @@ def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], see
     units = [_read(label, one) for label, one in zip(labels, told, strict=True)]
     effects = sorted({cause.effect for unit in units for cause in unit.causes})
     rng = np.random.default_rng(seed)
-    draws = rng.integers(len(units), size=(_RESAMPLES, len(units)))
-    causes = [_cause(effect, labels, units, draws) for effect in effects]
+    draws = rng.integers(len(units), size=(rules.resamples, len(units)))
+    causes = [_cause(effect, labels, units, draws, rules) for effect in effects]
     causes.sort(key=lambda one: -one["energy_share"])
     unknown = prevalence([bayes_factor(unit.unknown, Priors.unknown) for unit in units])
     return {
@@ -121,7 +145,7 @@ def line_diagnosis(labels: Sequence[str], told: Sequence[Mapping[str, Any]], see
         "causes": causes,
         "unknown": {"prevalence": unknown.mean, "prevalence_ci90": list(unknown.ci90)},
         "gap_rms": _rms([unit.gap_square for unit in units]),
-        "apart": _apart(labels, units, causes),
+        "apart": _apart(labels, units, causes, rules),
     }
 
 
@@ -142,15 +166,17 @@ def _probability(unit: UnitDiagnosis, effect: str) -> float:
     return cause.probability if cause is not None else 0.0
 
 
-def _factor(unit: UnitDiagnosis, effect: str) -> float:
-    return bayes_factor(_probability(unit, effect), BEFORE)
+def _factor(unit: UnitDiagnosis, effect: str, rules: LineRules) -> float:
+    return bayes_factor(_probability(unit, effect), rules.before)
 
 
-def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], draws: Any) -> dict[str, Any]:
+def _cause(
+    effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], draws: Any, rules: LineRules
+) -> dict[str, Any]:
     """One cause on the line."""
     # Units whose runs could not show it say nothing on how common it is.
     showing = [unit for unit in units if effect not in unit.undetectable or _of(unit, effect) is not None]
-    common = prevalence([_factor(unit, effect) for unit in showing])
+    common = prevalence([_factor(unit, effect, rules) for unit in showing])
     named = [(label, cause) for label, unit in zip(labels, units) if (cause := _of(unit, effect)) is not None]
     sure = [(label, cause) for label, cause in named if cause.probability >= NAMED]
     by_size = sorted(named, key=lambda item: -item[1].probability)
@@ -168,7 +194,7 @@ def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], d
         "units_named": len(sure),
         "prevalence": common.mean,
         "prevalence_ci90": list(common.ci90),
-        "shared": bool(common.over_half >= SHARED),
+        "shared": bool(common.over_half >= rules.shared),
         "amplitude": None if line is None else line.mean,
         "amplitude_se": None if line is None else line.se,
         "between_units": None if line is None or np.isnan(line.between) else line.between,
@@ -176,7 +202,7 @@ def _cause(effect: str, labels: Sequence[str], units: Sequence[UnitDiagnosis], d
         "energy_share": float(energy.sum() / gap.sum()) if gap.sum() > 0.0 else 0.0,
         "energy_share_ci90": [float(low), float(high)],
         "gap_rms_without": _rms(gap - energy),
-        "depends_on": _depends(effect, showing),
+        "depends_on": _depends(effect, showing, rules),
     }
 
 
@@ -192,26 +218,29 @@ def _rms(squares: Sequence[float] | FloatArray) -> float:
     return float(np.sqrt(np.maximum(np.mean(squares), 0.0)))
 
 
-def _depends(effect: str, units: Sequence[UnitDiagnosis]) -> list[dict[str, Any]]:
+def _depends(effect: str, units: Sequence[UnitDiagnosis], rules: LineRules) -> list[dict[str, Any]]:
     """What is known of production that a cause goes with, and how common it is with each of its values."""
     told = []
     for name in sorted({name for unit in units for name in unit.covariates}):
         groups: dict[str, list[float]] = defaultdict(list)
         for unit in units:
             if name in unit.covariates:
-                groups[unit.covariates[name]].append(_factor(unit, effect))
+                groups[unit.covariates[name]].append(_factor(unit, effect, rules))
         # Where every unit has a value of its own there is nothing to compare.
         if not 2 <= len(groups) <= sum(map(len, groups.values())) / 2:
             continue
         probability = probability_of_difference(list(groups.values()))
-        if probability >= SHARED:
+        if probability >= rules.shared:
             shares = {value: prevalence(group).mean for value, group in sorted(groups.items())}
             told.append({"name": name, "probability": probability, "prevalence": shares})
     return told
 
 
 def _apart(
-    labels: Sequence[str], units: Sequence[UnitDiagnosis], causes: Sequence[Mapping[str, Any]]
+    labels: Sequence[str],
+    units: Sequence[UnitDiagnosis],
+    causes: Sequence[Mapping[str, Any]],
+    rules: LineRules,
 ) -> list[dict[str, Any]]:
     """Units whose size of a cause is unlike the others', that have a rare one, or lack a shared one."""
     told: list[dict[str, Any]] = []
@@ -224,7 +253,7 @@ def _apart(
         for (label, one), p in zip(sure, apart(values, errors)):
             size = f"{one.amplitude:.3g} {one.unit}, the line's is {cause['amplitude']:.3g}"
             tested.append((label, effect, size, float(p)))
-        rare = cause["prevalence_ci90"][1] < 0.5 and len(sure) <= max(1.0, RARE * cause["units_told"])
+        rare = cause["prevalence_ci90"][1] < 0.5 and len(sure) <= max(1.0, rules.rare * cause["units_told"])
         for label, _ in sure:
             if rare and len(units) > 3:
                 why = f"has it, as {cause['units_named']} of {cause['units_told']} units do"
@@ -233,7 +262,7 @@ def _apart(
             lacking = [
                 label
                 for label, unit in zip(labels, units)
-                if _probability(unit, effect) < 1.0 - SHARED and effect not in unit.undetectable
+                if _probability(unit, effect) < 1.0 - rules.shared and effect not in unit.undetectable
             ]
             told += [
                 {
@@ -244,7 +273,7 @@ def _apart(
                 }
                 for label in lacking
             ]
-    found = discoveries([p for *_, p in tested], FALSE_SHARE)
+    found = discoveries([p for *_, p in tested], rules.false_share)
     sizes_apart = [
         {"unit": label, "effect": effect, "kind": "size", "why": why, "p_value": p}
         for (label, effect, why, p), is_told in zip(tested, found)

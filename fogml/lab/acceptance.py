@@ -20,7 +20,8 @@ from fogml.lab.rate_json import rate_json
 from fogml.models.table import usable_rows
 from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, judge_run
+from fogml.signals.averages import AVERAGING_S
+from fogml.validation.judge import judge_run
 from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors
@@ -47,7 +48,7 @@ def acceptance_json(
     model: DriftModel | None = None,
     limits: Limits | None = None,
     *,
-    averaging_s: float = DEFAULT_AVERAGING_S,
+    averaging_s: float = AVERAGING_S,
     turn_on_band: float | None = None,
     noise: Run | None = None,
     date: str | None = None,

@@ -21,6 +21,7 @@ from fogml.models.base import DriftModel
 from fogml.models.names import make_model
 from fogml.models.table import usable_rows
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.signals.averages import AVERAGING_S
 from fogml.validation.metrics import Metrics, RunMetrics
 from fogml.validation.scale_factor import find_steps
 
@@ -128,7 +129,9 @@ def two_step(turning: Run, rest: Run | None = None, *, order: int = 2, one_sense
     return TwoStep(scale, span, model.fit(_divided(base, scale, span)))
 
 
-def run_figures(run: Run, rate_deg_h: FloatArray, full: BoolArray, averaging_s: float = 100.0) -> Metrics:
+def run_figures(
+    run: Run, rate_deg_h: FloatArray, full: BoolArray, averaging_s: float = AVERAGING_S
+) -> Metrics:
     """Figures of a compensated run: bias at rest, scale factor error from the turns.
 
     Parameters

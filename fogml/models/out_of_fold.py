@@ -10,9 +10,8 @@ from fogml.models.folds import Fold, run_folds, time_folds
 from fogml.models.intervals import Intervals, half_widths_of_runs, intervals_from_residuals
 from fogml.models.table import RunRows, TrainingTable, averaged_table, recorded_s
 from fogml.runs.run import FloatArray
+from fogml.signals.averages import AVERAGING_S
 
-AVERAGING_S = 100.0
-"""Averaging time of the residuals [s] where the training runs are long enough."""
 _LEAST_AVERAGES = 60
 _RUNS_TO_LEAVE_OUT = 3
 WHOLE_RUNS = "whole runs"

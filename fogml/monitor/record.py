@@ -20,6 +20,7 @@ from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.runs.thermal_columns import leading_temperature
 from fogml.runs.transitions import transition_mask
 from fogml.runs.turning import turning
+from fogml.signals.averages import AVERAGING_S
 
 FIGURES = {
     "level": "deg/h",
@@ -114,7 +115,7 @@ NUMBERS = tuple(f.name for f in fields(RunRecord) if f.type == "float")
 
 
 def record_run(
-    model: DriftModel, blocks: Iterable[Run], *, averaging_s: float = 100.0, any_unit: bool = False
+    model: DriftModel, blocks: Iterable[Run], *, averaging_s: float = AVERAGING_S, any_unit: bool = False
 ) -> RunRecord:
     """What a model leaves on a run that comes in blocks.
 

@@ -14,6 +14,9 @@ from fogml.signals.clock import GAP_SHARE, Clock, gap_starts
 FloatArray = NDArray[np.float64]
 IndexArray = NDArray[np.intp]
 
+AVERAGING_S = 100.0
+"""Averaging time of figures unless another is asked for [s]: long beside white noise, short beside thermal
+times of a coil."""
 _ROUNDING = 1e-6
 """Share of a sample interval by which a window's edge gives way to rounded times."""
 

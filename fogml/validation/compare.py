@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import FogmlError, InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, judgement_of
+from fogml.signals.averages import AVERAGING_S
+from fogml.validation.judge import judgement_of
 from fogml.validation.leave_one_out import merged_folds, splits_of
 from fogml.validation.limits import check_design_index, check_limits
 from fogml.validation.results import Judgement
@@ -36,7 +37,7 @@ def compare(
     train_runs: Sequence[Run],
     test_runs: Sequence[Run] | None,
     *,
-    averaging_s: float = DEFAULT_AVERAGING_S,
+    averaging_s: float = AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
     turn_on_band: float | None = None,

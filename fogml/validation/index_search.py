@@ -18,7 +18,7 @@ import numpy as np
 from fogml.errors import FogmlError, InputError
 from fogml.models.table import usable_rows
 from fogml.runs.run import BoolArray, FloatArray, Run
-from fogml.signals.averages import block_averages
+from fogml.signals.averages import AVERAGING_S, block_averages
 from fogml.validation.floors import floor_of_run
 from fogml.validation.reach import out_of_reach
 
@@ -119,7 +119,7 @@ def train_until_index(
     *,
     model: str = "auto",
     features: str | None = None,
-    averaging_s: float = 100.0,
+    averaging_s: float = AVERAGING_S,
     seed: int = 0,
     step: Callable[[str], None] | None = None,
 ) -> IndexSearch:

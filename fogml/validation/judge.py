@@ -14,6 +14,7 @@ from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.runs.thermal_columns import leading_temperature
+from fogml.signals.averages import AVERAGING_S
 from fogml.validation.floors import check_noise_run, floor_of_run
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.metrics import RunMetrics
@@ -26,7 +27,6 @@ from fogml.validation.turn_on import check_turn_on_band
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
-DEFAULT_AVERAGING_S = 100.0
 _NOISE = "_validation_noise"
 
 
@@ -35,7 +35,7 @@ def judge(
     train_runs: Run | Sequence[Run],
     test_runs: Run | Sequence[Run],
     *,
-    averaging_s: float = DEFAULT_AVERAGING_S,
+    averaging_s: float = AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
     turn_on_band: float | None = None,

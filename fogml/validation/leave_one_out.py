@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from fogml.errors import InputError
 from fogml.runs.run import Run
-from fogml.validation.judge import DEFAULT_AVERAGING_S, judge, judgement_of
+from fogml.signals.averages import AVERAGING_S
+from fogml.validation.judge import judge, judgement_of
 from fogml.validation.limits import check_design_index, check_limits, outcome_of
 from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import Judgement
@@ -23,7 +24,7 @@ def leave_one_run_out(
     make: Callable[[], DriftModel],
     runs: Sequence[Run],
     *,
-    averaging_s: float = DEFAULT_AVERAGING_S,
+    averaging_s: float = AVERAGING_S,
     design_index: float | None = None,
     limits: Mapping[str, float] | None = None,
     turn_on_band: float | None = None,
