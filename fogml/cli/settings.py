@@ -38,6 +38,8 @@ class Settings(BaseModel):
     """Settings that name files to read."""
     written_keys: ClassVar[tuple[str, ...]] = ()
     """Settings that name files or folders to write."""
+    needed_keys: ClassVar[tuple[str, ...]] = ()
+    """Settings that the job asks for though a file may lack them; named with what a file has to have."""
     seed: Annotated[int, option("Seed of everything random.")] = Field(0, ge=0, lt=1 << 32)
 
     @classmethod
@@ -74,7 +76,7 @@ class Settings(BaseModel):
         try:
             return cls.model_validate({**stated, **given})
         except ValidationError as error:
-            raise InputError(_message(cls, error, source, stated)) from None
+            raise InputError(_message(cls, error, source, stated | given)) from None
 
     def in_full(self) -> Self:
         """The settings with every path in full, to be run from anywhere; what ships keeps its name."""
@@ -187,6 +189,7 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
         lacking = [quoted(".".join(map(str, e["loc"]))) for e in error.errors() if e["type"] == "missing"]
+        lacking += [quoted(key) for key in settings.needed_keys if not stated.get(key)]
         return f"{place}nothing is given for {listed(lacking)}"
     reason = str(first["ctx"]["error"]) if "ctx" in first and "error" in first["ctx"] else first["msg"]
     return f"{place}'{key}': {reason} (found {quoted(first['input'])})"

@@ -34,6 +34,7 @@ class SweepSettings(Settings):
 
     job: ClassVar[str] = "fogml.cli.sweep_job:sweep_and_write"
     config_argument: ClassVar[str] = "YAML file of schema fogml.sweep/1."
+    needed_keys: ClassVar[tuple[str, ...]] = ("runs",)
     schema_: Literal["fogml.sweep/1"] = Field("fogml.sweep/1", alias="schema")
     name: Annotated[str, option("Name of the study in its storage.", metavar="NAME")] = "sweep"
     runs: Annotated[

@@ -52,7 +52,8 @@ class Reader:
 _STORED, _TABLES = "fogml.readers.stored", "fogml.readers.tables"
 _VEHICLES, _MESSAGES = "fogml.readers.vehicles", "fogml.readers.messages"
 READERS = (
-    Reader("parquet", "Parquet", (".parquet", ".pq"), (b"PAR1",), f"{_STORED}:Parquet", "pyarrow.parquet"),
+    Reader("parquet", "Parquet", (".parquet", ".pq"), (b"PAR1",), "fogml.readers.parquet:Parquet",
+           "pyarrow.parquet"),
     Reader("hdf5", "HDF5", (".h5", ".hdf5"), (b"\x89HDF\r\n\x1a\n",), f"{_STORED}:Hdf5", "h5py", "hdf5"),
     Reader("mat", "MATLAB", (".mat",), (b"MATLAB",), f"{_STORED}:Mat", "scipy.io"),
     Reader("npz", "NumPy", (".npz",), (), f"{_TABLES}:Npz", "numpy"),

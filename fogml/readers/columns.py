@@ -37,12 +37,14 @@ class Container:
         self.described: list[dict[str, Any]] = []
         self.origin_s: float | None = None
         """Seconds from 1970 to the time 0 of its columns, where the format has a date."""
+        self.left_out: dict[str, tuple[int, int]] = {}
+        """Groups of which columns are left out: how many there are, and how many of the first are given."""
         self._spool: Spool | None = None
 
     @property
     def told(self) -> dict[str, Any]:
         """What the parent hears."""
-        return {"arrays": self.described, "origin_s": self.origin_s}
+        return {"arrays": self.described, "origin_s": self.origin_s, "left_out": self.left_out}
 
     def add(self, group: str, name: str, unit: str | None, array: Any) -> None:
         """One more column."""

@@ -8,123 +8,30 @@ import struct
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from functools import cache, partial
-from operator import attrgetter, itemgetter
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fogml.readers import mcap_chunks
 from fogml.readers.columns import Column, Container
+from fogml.readers.message_fields import numbers, stamps_in, values_of
 from fogml.readers.spool import Rows
 
-ToFloats = Callable[[Any], Sequence[float]]
-_NUMBER = (bool, int, float, np.number)
-_DEEPEST = 5
-"""Levels of a message; those that ROS 2 ships have three, results of ROS 1 actions six."""
-_LONGEST_ARRAY = 16
-"""Numbers of an array that are columns: vectors, and matrices up to 3 by 4; scans and images are longer."""
 _MOST_FIELDS = 100
-"""Columns of a topic: the widest type that ROS ships holds 41 numbers (``sensor_msgs/CameraInfo``), an
-``Imu`` 39; lists of a message's own may be of any length."""
-_STAMP = "header.stamp"
+"""Columns of a topic, beside those asked for by name: the widest type that ROS ships holds 41 numbers
+(``sensor_msgs/CameraInfo``), an ``Imu`` 39; lists of a message's own may be of any length."""
+_STAMPS = ("header.stamp", "stamp", "timestamp")
+"""Where a message says when it was taken; it counts where it is a time of seconds and their parts."""
 _CLOCK = "time"
-_STAMPS = {("sec", "nanosec"), ("secs", "nsecs"), ("sec", "nsec")}
-
-
-def leaves(message: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, ToFloats]]:
-    """What holds the numbers of a message: path, value, and what makes numbers of it.
-
-    It is a number, a short array of numbers, or a stamp.
-    """
-    if isinstance(message, _NUMBER):
-        yield above, message, _one
-    elif isinstance(message, list | tuple | np.ndarray):
-        if len(message) <= _LONGEST_ARRAY:
-            if all(isinstance(item, _NUMBER) for item in message):
-                yield above, message, list
-            else:
-                for i, item in enumerate(message):
-                    yield from leaves(item, f"{above}.{i}", depth + 1)
-    elif not isinstance(message, str | bytes | None.__class__):
-        fields = message if isinstance(message, dict) else _fields(message)
-        if tuple(fields) in _STAMPS:
-            yield above, message, _stamp_of(fields, isinstance(message, dict))
-        elif depth < _DEEPEST:
-            for name, item in fields.items():
-                yield from leaves(item, f"{above}.{name}" if above else str(name), depth + 1)
-
-
-def _fields(message: Any) -> dict[str, Any]:
-    known: Any = getattr(message, "__dataclass_fields__", None)
-    names = tuple(known or getattr(message, "__slots__", ()))
-    return {name: getattr(message, name) for name in names if not name.startswith("__")}
-
-
-def _one(value: Any) -> tuple[float]:
-    return (float(value),)
-
-
-def _stamp_of(fields: dict[str, Any], is_dict: bool) -> ToFloats:
-    """What gives the seconds of a stamp."""
-    got = (itemgetter if is_dict else attrgetter)(*fields)
-
-    def seconds(stamp: Any) -> tuple[float]:
-        whole, parts = got(stamp)
-        return (float(whole) + 1e-9 * float(parts),)
-
-    return seconds
-
-
-def numbers(message: Any) -> Iterator[tuple[str, float]]:
-    """The numbers of a message by their paths, those of short arrays by place; stamps as seconds."""
-    for path, value, to_floats in leaves(message):
-        found = to_floats(value)
-        if to_floats is list:
-            yield from ((f"{path}.{i}", float(each)) for i, each in enumerate(found))
-        else:
-            yield path, found[0]
-
-
-def values_of(first: Any, names: Sequence[str]) -> Callable[[Any], Sequence[float]]:
-    """What gives the numbers of these paths of a message, NaN where it has none.
-
-    Messages of a topic are mostly of the shape of the first, whose attributes are got at once; what is of
-    another, or no object, is searched through.
-    """
-
-    def search(message: Any) -> Sequence[float]:
-        found = dict(numbers(message))
-        return [found.get(name, math.nan) for name in names]
-
-    held = [(path, to_floats, len(to_floats(value))) for path, value, to_floats in leaves(first)]
-    if isinstance(first, dict) or any(part.isdigit() for path, *_ in held for part in path.split(".")):
-        return search
-    attributes = attrgetter(*(path for path, *_ in held))
-    parts = [(to_floats, count) for _, to_floats, count in held]
-
-    def get(message: Any) -> Sequence[float]:
-        try:
-            found: list[float] = []
-            together = attributes(message) if len(parts) > 1 else (attributes(message),)
-            for value, (to_floats, count) in zip(together, parts, strict=True):
-                floats = to_floats(value)
-                if len(floats) != count:
-                    return search(message)
-                found.extend(floats)
-            return found[: len(names)]
-        except (AttributeError, TypeError, ValueError):
-            return search(message)
-
-    return get
 
 
 class Messages(Container):
     """Topics of messages; a topic is unpacked, block by block, when the first of its columns is asked for."""
 
-    def __init__(self) -> None:
+    def __init__(self, keys: Collection[str] = ()) -> None:
         super().__init__()
+        self.wanted = frozenset(keys)
         self.kept = cache(self.unpacked)
+        self.stamps: dict[str, frozenset[str]] = {}
         self.fields: dict[str, tuple[list[str], Callable[[Any], Sequence[float]], int]] = {}
 
     def messages(self, topic: str) -> Iterator[tuple[int, Any]]:
@@ -145,9 +52,15 @@ class Messages(Container):
     def topic(self, topic: str, kind: str, count: int) -> None:
         """The columns of a topic of so many messages."""
         first = next(self.messages(topic), None)
-        if first is None or not (names := [name for name, _ in numbers(first[1])][:_MOST_FIELDS]):
+        held = [] if first is None else [name for name, _ in numbers(first[1])]
+        if first is None or not held:
             return
+        rest = (name for name in held[_MOST_FIELDS:] if {name, f"{topic}/{name}"} & self.wanted)
+        names = [*held[:_MOST_FIELDS], *rest]
+        if len(held) > _MOST_FIELDS:
+            self.left_out[topic] = len(held), _MOST_FIELDS
         self.fields[topic] = names, values_of(first[1], names), count
+        self.stamps[topic] = stamps_in(first[1])
         self.add(topic, _CLOCK, "s", Column(count, partial(self.part, topic, _CLOCK)))
         for place, name in enumerate(names):
             self.add(topic, name, None, Column(count, partial(self.part, topic, str(place))))
@@ -162,7 +75,7 @@ class Messages(Container):
         names, values, count = self.fields[topic]
         rows = Rows(self.spool, [(name, "<f8") for name in (_CLOCK, *map(str, range(len(names))))])
         pack = struct.Struct(f"<{1 + len(names)}d").pack
-        stamp = names.index(_STAMP) if _STAMP in names else None
+        stamp = next((names.index(name) for name in _STAMPS if name in self.stamps[topic]), None)
         for recorded_ns, message in self.messages(topic):
             found = values(message)
             # Stamps of 0 are none.
@@ -188,7 +101,7 @@ class RosBag(Messages):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
 
-        super().__init__()
+        super().__init__(keys)
         place = Path(path)
         place = place.parent if place.suffix == ".db3" else place
         self.file = AnyReader([place], default_typestore=get_typestore(Stores.LATEST))
@@ -260,7 +173,7 @@ class Mcap(Messages):
         from mcap.reader import make_reader
         from mcap_ros2.decoder import DecoderFactory
 
-        super().__init__()
+        super().__init__(keys)
         self.opened = Path(path).open("rb")  # noqa: SIM115  closed by `close`
         self.decoders: list[Any] = [DecoderFactory(), _Json()]
         self.file = make_reader(self.opened, decoder_factories=self.decoders)

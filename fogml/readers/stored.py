@@ -1,4 +1,4 @@
-"""Readers of HDF5, MATLAB and Parquet files: their arrays, and what stands beside them.
+"""Readers of HDF5 and MATLAB files: their arrays, and what stands beside them.
 
 Each format is a class with `arrays`, `told` (what the parent hears of them) and `close`.
 """
@@ -13,14 +13,11 @@ import numpy as np
 from fogml.readers.columns import MOST_COLUMNS
 
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
-_MOST_NAMES = 10_000
+MOST_NAMES = 10_000
 _MOST_TEXT = 1 << 20
 _DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
-_BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
-_BATCH_ROWS = 1 << 16
-_LONGEST_MARK = 100
 _RESERVED = ("units", "facts")
 
 
@@ -48,22 +45,32 @@ class Hdf5:
         self.seen = 0
         link = self.file.get("run", getlink=True)
         is_group = isinstance(link, h5py.HardLink) and isinstance(self.file["run"], h5py.Group)
-        group = self.file["run"] if is_group else self.file
+        group = self.file["run"] if is_group else self.only_group(self.file)
         self.arrays: list[Any] = []
         told = []
         for name, item, fault in self.datasets(group):
-            unit = None if fault else item.attrs.get("unit")
+            unit = None if fault else item.attrs.get("unit", item.attrs.get("units"))
             self.arrays.append(item)
             told.append(described(name, item, None if unit is None else text_of(unit), fault))
         stated = {key: plain(group.attrs[key]) for key in keys if key in group.attrs}
         self.told = {"arrays": told, "facts": stated}
 
+    def only_group(self, group: Any) -> Any:
+        """The group that holds the datasets, where it is all that the one above it holds."""
+        for _ in range(_DEEPEST):
+            names = list(group) if len(group) == 1 else []
+            is_hard = names and isinstance(group.get(names[0], getlink=True), self.h5py.HardLink)
+            if not is_hard or "[" in names[0] or not isinstance(group[names[0]], self.h5py.Group):
+                break
+            group = group[names[0]]
+        return group
+
     def datasets(self, group: Any, above: str = "", depth: int = 0) -> Iterator[tuple[str, Any, str | None]]:
         """Datasets by name, also where the unit holds a slash, with what keeps them from being read."""
         for name in group:
             self.seen += 1
-            if self.seen > _MOST_NAMES:
-                raise Refused(f"more than {_MOST_NAMES} names")
+            if self.seen > MOST_NAMES:
+                raise Refused(f"more than {MOST_NAMES} names")
             full = above + name
             if not isinstance(group.get(name, getlink=True), self.h5py.HardLink):
                 yield full, None, "is a link to another place"
@@ -99,28 +106,35 @@ class Mat:
         self.opened = Hdf5(path, []) if is_hdf5 else None
         variables = self.members(self.opened.file) if self.opened else self.loaded(path)
         run = variables.get("run")
-        structs = [v for v in variables.values() if isinstance(v, dict) and "time" in map(str.lower, v)]
-        if not isinstance(run, dict) and "time" not in map(str.lower, variables) and len(structs) == 1:
-            run = structs[0]
         held: Mapping[str, Any] = run if isinstance(run, dict) else variables
         units = held.get("units", variables.get("units", {}))
         facts = held.get("facts", variables.get("facts"))
-        columns = [
-            column
-            for name in held
-            if name not in _RESERVED
-            for column in columns_of(name, self.array(held[name]))
-        ]
-        names, self.arrays = [name for name, _ in columns], [array for _, array in columns]
+        columns = [column for group in self.groups(held) for column in group]
+        self.arrays = [array for *_, array in columns]
         told = [
-            described(name, array, fault=self.fault_of(array))
-            for name, array in zip(names, self.arrays, strict=True)
+            described(name, array, unit, self.fault_of(array)) | {"group": group}
+            for group, name, unit, array in columns
         ]
         self.told = {
             "arrays": told,
             "units": {str(k): text_of(v) for k, v in units.items()} if isinstance(units, dict) else None,
             "facts": plain_struct(facts),
         }
+
+    def groups(self, held: Mapping[str, Any], above: str = "") -> Iterator[list[tuple[str, str, Any, Any]]]:
+        """Group, name, unit and array of each column, of the structs within a struct too."""
+        own = held.get("units")
+        units = own if isinstance(own, dict) else {}
+        names = [name for name in held if name not in _RESERVED]
+        plain = [name for name in names if not isinstance(held[name], dict)]
+        yield [
+            (above, column, units.get(name) and text_of(units[name]), array)
+            for name in plain
+            for column, array in columns_of(name, self.array(held[name]))
+        ]
+        for name in names:
+            if isinstance(held[name], dict):
+                yield from self.groups(held[name], f"{above}.{name}" if above else name)
 
     @staticmethod
     def loaded(path: str) -> dict[str, Any]:
@@ -162,111 +176,6 @@ class Mat:
         self.arrays.clear()
         if self.opened:
             self.opened.close()
-
-
-class Parquet:
-    """A Parquet file: one array per column."""
-
-    def __init__(self, path: str, keys: list[str]) -> None:
-        from pyarrow.parquet import ParquetFile
-
-        # Without a buffer, streaming would hold a column's whole row group, however large.
-        self.file = ParquetFile(
-            path,
-            pre_buffer=False,
-            memory_map=False,
-            buffer_size=_BUFFER_BYTES,
-            page_checksum_verification=True,
-        )
-        schema = self.file.schema_arrow
-        self.arrays = [ParquetColumn(self.file, i) for i in range(len(schema.names))]
-        metadata = {text_of(key): text_of(value) for key, value in (schema.metadata or {}).items()}
-        self.told = {
-            "arrays": [array.told for array in self.arrays],
-            "facts": {key: metadata[key] for key in keys if key in metadata},
-            "origin_s": next((array.first_ns / 1e9 for array in self.arrays if array.is_stamp), None),
-        }
-
-    def close(self) -> None:
-        self.arrays.clear()
-        self.file.close()
-
-
-def nanoseconds(stamps: Any) -> Any:
-    """Arrow's stamps as nanoseconds since 1970."""
-    import pyarrow as arrow
-
-    return stamps.cast(arrow.timestamp("ns", stamps.type.tz)).cast(arrow.int64())
-
-
-class ParquetColumn:
-    """A column, read forward in batches: a slice that begins where the last one ended costs its own rows."""
-
-    ndim = 1
-
-    def __init__(self, file: Any, index: int) -> None:
-        import pyarrow.types as types
-
-        names, held = file.schema_arrow.names, file.schema_arrow.types[index]
-        self.file, self.name = file, names[index]
-        self.same = names[:index].count(self.name)
-        self.shape = (file.metadata.num_rows,)
-        kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
-        self.is_stamp = types.is_timestamp(held)
-        kind = "f" if self.is_stamp or any(is_kind(held) for is_kind in kinds) else "O"
-        unit = "s" if self.is_stamp else None
-        self.told = {"name": self.name[:1000], "unit": unit, "fault": None, "kind": kind}
-        self.told |= {"type": str(held)[:60], "shape": list(self.shape)}
-        self.at, self.ahead, self.batches = 0, None, iter(())
-        self.first_ns = 0
-        if self.is_stamp and self.shape[0]:
-            first = next(self.parts(0, 1))
-            self.first_ns = (nanoseconds(first).to_pylist() or [0])[0] or 0
-            self.at = self.shape[0]
-
-    def parts(self, start: int, stop: int) -> Iterator[Any]:
-        """The rows from `start` to `stop`, as Arrow holds them, in pieces."""
-        if start == 0 or start < self.at:
-            rows = min(max(stop - start, 1), _BATCH_ROWS)
-            batches = self.file.iter_batches(batch_size=rows, columns=[self.name], use_threads=False)
-            self.at, self.ahead, self.batches = 0, None, (batch.column(self.same) for batch in batches)
-        while self.at < stop:
-            part = self.ahead if self.ahead is not None else next(self.batches, None)
-            if part is None:
-                raise Refused(f"row {self.at + 1} of column {self.name} is missing")
-            self.ahead = None
-            if len(part) > stop - self.at:
-                part, self.ahead = part[: stop - self.at], part[stop - self.at :]
-            skipped = min(max(start - self.at, 0), len(part))
-            self.at += len(part)
-            yield part[skipped:]
-
-    def __getitem__(self, part: tuple[slice]) -> np.ndarray[Any, Any]:
-        start, stop = part[0].start, part[0].stop
-        found, at = np.empty(stop - start), 0
-        for piece in self.parts(start, stop):
-            if self.is_stamp:
-                since = nanoseconds(piece).fill_null(self.first_ns).to_numpy(zero_copy_only=False)
-                held = np.where(piece.is_null().to_numpy(zero_copy_only=False), np.nan, since - self.first_ns)
-                found[at : at + len(piece)] = held / 1e9
-            else:
-                # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
-                found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
-            at += len(piece)
-        return found
-
-    def marks(self) -> tuple[list[str], np.ndarray[Any, Any]]:
-        """The different texts of a column of marks, and the place of each row's among them."""
-        found: dict[str, int] = {}
-        codes = np.empty(self.shape[0])
-        at = 0
-        for piece in self.parts(0, self.shape[0]):
-            for value in piece.to_pylist():
-                codes[at] = found.setdefault(text_of(value)[:_LONGEST_MARK], len(found))
-                at += 1
-            if len(found) > _MOST_NAMES:
-                raise Refused(f"more than {_MOST_NAMES} different marks")
-        return list(found), codes
 
 
 class MatrixColumn:

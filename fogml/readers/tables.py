@@ -138,9 +138,9 @@ class Workbook(Container):
 
 
 def _cell(value: Any) -> str:
-    """A cell as text, dates by ISO 8601, whole numbers without decimals."""
+    """A cell as a line of text, dates by ISO 8601, whole numbers without decimals."""
     if value is None or isinstance(value, str):
-        return (value or "").replace("\0", "")
+        return " ".join((value or "").replace("\0", "").splitlines())
     if isinstance(value, bool):
         return str(int(value))
     if isinstance(value, float):

@@ -80,17 +80,22 @@ class Group:
         return self.columns[self.names.index(name)]
 
 
-def groups_of(stored: StoredFile, kind: str) -> list[Group]:
-    """The groups of a file, in its order."""
+def grouped(stored: StoredFile) -> dict[str, list[StoredArray]]:
+    """The arrays of a file by their groups."""
     found: dict[str, list[StoredArray]] = {}
     for array in stored.arrays:
         found.setdefault(array.group, []).append(array)
+    return found
+
+
+def groups_of(stored: StoredFile, kind: str) -> list[Group]:
+    """The groups of a file, in its order."""
     rotations = [array.name for array in stored.arrays if kind == "miniseed" and _ROTATION.search(array.name)]
     return [
         Group(
             name, tuple(zip(canonical_cells(_cells(kind, name, arrays, len(rotations))), arrays, strict=True))
         )
-        for name, arrays in found.items()
+        for name, arrays in grouped(stored).items()
     ]
 
 
@@ -100,7 +105,8 @@ def _cells(kind: str, group: str, arrays: Sequence[StoredArray], rotations: int)
         if reader == kind and re.fullmatch(pattern, group):
             known = known or fields
     names = {array.name for array in arrays}
-    if known and not any(cell == "time [us]" and name in names for name, cell in known.items()):
+    is_vehicle = kind in ("ulog", "dataflash")
+    if known and is_vehicle and not any(c == "time [us]" and name in names for name, c in known.items()):
         known = known | {"timestamp": "time [us]"}
     cells = []
     for array in arrays:
@@ -149,7 +155,7 @@ def container_blocks(
             for cell, array in group.columns
             if _is_joined(cell, main) and (columns is None or parse_header(cell)[0] in columns)
         ]
-        findings += [*left_out, *_joined_findings(joined)]
+        findings += [*left_out, *_joined_findings(joined), *_fields_left_out(stored)]
         started = moment(stored.told.get("origin_s"))
         beside = [Beside(cell, group.column("time"), array) for cell, group, array in joined]
         for table in stored_blocks(stored, vectors, tuple(findings), None, rows, columns):
@@ -169,6 +175,15 @@ def _joined_findings(joined: Sequence[tuple[str, Group, StoredArray]]) -> Iterat
             f"'{name}' of {quoted(group.name)}, {max(array.shape)} values, interpolated at its true times"
         )
         yield Finding("other_rate", message, column=name, count=max(array.shape))
+
+
+def _fields_left_out(stored: StoredFile) -> Iterator[Finding]:
+    for group, (held, given) in stored.told.get("left_out", {}).items():
+        message = (
+            f"{quoted(group)} holds {held} numbers a message, of which the first {given} are columns; an "
+            f"import profile reads any other by its name, 'source: {printable(group)}/NAME'"
+        )
+        yield Finding("fields_left_out", message, count=held - given)
 
 
 def _with_joined(table: RawTable, stored: StoredFile, joined: Sequence[Beside]) -> RawTable:
@@ -193,7 +208,8 @@ def container_columns(
     InputError
         If a source is not there, or a group of another rate has no clock.
     """
-    with stored_file(path, kind, (), DEFAULT_LIMITS) as stored:
+    names = [source for source in sources if isinstance(source, str)]
+    with stored_file(path, kind, names, DEFAULT_LIMITS) as stored:
         groups = {group.name: group for group in groups_of(stored, kind)}
         found = {source: _source(path, stored, source) for source in sources}
         names = [array.group for array in found.values()]

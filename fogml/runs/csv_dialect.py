@@ -8,33 +8,17 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
-import numpy as np
-
-from fogml.errors import InputError
+from fogml.errors import InputError, printable
 from fogml.runs.columns import column_spec, parse_header
-from fogml.runs.csv_header import fields_of, find_header
+from fogml.runs.csv_header import fields_of, header_over_lines
+from fogml.runs.csv_numbers import Marks, marks_of, number
 from fogml.runs.csv_source import CsvSource, csv_source
 from fogml.runs.header_spelling import DATE_NAMES
 from fogml.runs.raw_table import empty_file, wanted_cells
-from fogml.runs.stamps import Stamps, stamps_of
+from fogml.runs.stamps import FRACTION, StampForm, Stamps, stamps_of
 
-MISSING = frozenset({"", "nan", "na", "n/a", "null", "-nan", "#n/a", "none"})
-"""What stands for a missing value, in lower case."""
 _HEAD_BYTES = 1 << 16
 _LINE_END = re.compile(r"\r\n|\r|\n")
-_SEARCH_BYTES = 1 << 24
-_MARK = re.compile(rb"\d[.,]\d")
-_DECIMAL = {mark: re.compile(rf"\s*[+-]?\d*{re.escape(mark)}\d+([eE][+-]?\d+)?\s*\Z") for mark in ".,"}
-# Groups of three digits; with decimals, or of more than one mark, nobody takes them for anything else.
-_GROUPS = {
-    mark: re.compile(rf"\s*[+-]?\d{{1,3}}({group}\d{{3}})+({re.escape(mark)}\d*)?\s*\Z")
-    for mark, group in ((".", "[,'\u00a0\u202f ]"), (",", "[.'\u00a0\u202f ]"))
-}
-_EVIDENT = {
-    mark: re.compile(rf"\s*[+-]?\d{{1,3}}({group}\d{{3}})+({re.escape(mark)}\d+|{group}\d{{3}})\s*\Z")
-    for mark, group in ((".", "[,'\u00a0\u202f ]"), (",", "[.'\u00a0\u202f ]"))
-}
-_OTHER = {".": ",", ",": "."}
 
 
 @dataclass(frozen=True)
@@ -63,6 +47,8 @@ class CsvDialect:
         Positions of columns unknown to the run format that hold text.
     unwanted
         Positions of other columns that are not read.
+    doubt
+        What is to be said of the marks in its numbers.
     """
 
     source: CsvSource
@@ -77,6 +63,7 @@ class CsvDialect:
     blanks: int = 0
     text: frozenset[int] = frozenset()
     unwanted: frozenset[int] = frozenset()
+    doubt: str | None = None
 
     @cached_property
     def stamp_places(self) -> tuple[int, ...]:
@@ -131,7 +118,7 @@ def csv_dialect(path: Path) -> CsvDialect:
     lines = _LINE_END.split(head.decode(encoding, errors="ignore"))
     if cut and len(lines) > 1:
         lines.pop()  # incomplete
-    header = find_header(lines)
+    header = header_over_lines(lines)
     if cut and (header is None or len(lines) == 1):
         raise InputError(
             f"{path.name}: no line ends within the first {_HEAD_BYTES} bytes; a header such as "
@@ -145,25 +132,23 @@ def csv_dialect(path: Path) -> CsvDialect:
     ):
         raise _no_text(path.name)
     rows = [fields_of(line, header.separator) for line in lines[header.data :] if line.strip()]
-    decimal, grouped = _marks(source, rows, header.separator)
-    stamps = _stamps(header.cells, rows, decimal)
-    cells = list(header.cells)
-    for place in [column[0] for column in stamps.columns[-1:]] if stamps else []:
-        cells[place] = "time [s]"
+    marks = marks_of(source, rows, header.separator)
+    cells, stamps = _clock(header.cells, rows, marks)
     dialect = CsvDialect(
         source,
         header.separator,
-        decimal,
+        marks.decimal,
         encoding,
         header.line + 1,
         header.data,
-        tuple(cells),
-        grouped,
+        cells,
+        marks.grouped,
         stamps,
         _blanks(rows[0], len(cells)) if rows else 0,
+        doubt=marks.doubt,
     )
-    _check_header(path.name, dialect)
-    unknown = set(range(len(cells))) - dialect.known
+    _check_header(path.name, dialect, rows[0] if rows else [])
+    unknown = set(range(len(cells))) - dialect.known - set(dialect.stamp_places)
     text = {i for i in unknown if any(i < len(row) and dialect.value(row[i]) is None for row in rows)}
     return replace(dialect, text=frozenset(text))
 
@@ -189,64 +174,40 @@ def decoded_head(path: Path) -> tuple[str, str]:
     return text if len(head) < _HEAD_BYTES else text[: text.rfind("\n") + 1], source.wide or encoding
 
 
-def marks_of(path: Path, rows: Sequence[Sequence[str]], separator: str) -> str:
-    """The decimal mark of a text file, told from its first rows."""
-    return _marks(CsvSource(path), rows, separator)[0]
-
-
 def is_sure(content: bytes) -> bool:
     """Whether a text has a header that names a time and a gyro."""
     head = content[:_HEAD_BYTES].decode("utf-8", errors="ignore")
-    header = find_header(_LINE_END.split(head))
+    header = header_over_lines(_LINE_END.split(head))
     return header is not None and header.is_sure
 
 
-def number(field: str, decimal: str, grouped: bool = False) -> float | None:
-    """The value of a field, NaN where it is missing, None where it is no number.
+def _clock(
+    cells: tuple[str, ...], rows: Sequence[Sequence[str]], marks: Marks
+) -> tuple[tuple[str, ...], Stamps | None]:
+    """The header cells with the clock's as ``time [s]``, and the clock where it is one of stamps."""
+    stamps = _stamps(cells, rows, marks.decimal)
+    if stamps is None:
+        return cells, None
+    place = stamps.columns[-1][0]
+    if (fractions := _fractions(rows, len(cells), place)) is not None:
+        whole, form = stamps.columns[-1]
+        begin = replace(stamps, first_ns=stamps.first_ns + fractions)
+        columns = (*stamps.columns[:-1], (whole, form), (whole + 1, StampForm(FRACTION)))
+        named = (*cells[:place], "time of day", "time [s]", *cells[place + 1 :])
+        return named, replace(begin, columns=tuple((i, f) for i, f in columns))
+    return (*cells[:place], "time [s]", *cells[place + 1 :]), stamps
 
-    Marks of thousands are taken out where they can be nothing else, or where a file is known to have them.
-    """
-    field = field.strip()
-    if field.lower() in MISSING:
-        return np.nan
-    if (_GROUPS if grouped else _EVIDENT)[decimal].match(field):
-        field = "".join(c for c in field if c.isdigit() or c in f"+-{decimal}")
-    if decimal == ",":
-        # A point would be a thousands separator or a mix of both marks: nobody can tell.
-        if "." in field:
-            return None
-        field = field.replace(",", ".")
-    # Python also takes 1_000 and digits of other scripts, which no logger means.
-    if "_" in field or not field.isascii():
+
+def _fractions(rows: Sequence[Sequence[str]], width: int, place: int) -> int | None:
+    """The first row's part of a second [ns] where a comma before it separates fields too; else None."""
+    full = [row for row in rows if len(row) >= width]
+    behind = [row[place + 1].strip() for row in full if len(row) > width]
+    sizes = {len(field) if field.isdigit() else 0 for field in behind}
+    if len(behind) < len(full) or len(sizes) != 1 or not 0 < (size := sizes.pop()) <= 9:
         return None
-    try:
-        return float(field)
-    except ValueError:
+    if not all(re.search(r":\d\d\Z", row[place].strip()) for row in full):
         return None
-
-
-def _marks(source: CsvSource, rows: Sequence[Sequence[str]], separator: str) -> tuple[str, bool]:
-    """Decimal mark, and whether thousands have marks, from the first rows, else from the rest."""
-    fields = [field for row in rows for field in row]
-    for mark in ".,":
-        if any(_EVIDENT[mark].match(field) and mark in field and _OTHER[mark] in field for field in fields):
-            return mark, True
-    with_mark = {mark: [field for field in fields if _DECIMAL[mark].match(field)] for mark in ".,"}
-    for mark, other in _OTHER.items():
-        # Numbers such as 10.78 beside 1,000: all that have a comma are groups of three, and points are not.
-        grouped = with_mark[other] and all(_GROUPS[mark].match(field) for field in with_mark[other])
-        if grouped and any(not _GROUPS[other].match(field) for field in with_mark[mark]):
-            return mark, True
-    if with_mark[","]:
-        return ",", False
-    if separator == "," or with_mark["."]:
-        return ".", separator == "," and bool(with_mark["."])
-    with source.open() as file:
-        file.read(_HEAD_BYTES)
-        while part := file.read(_SEARCH_BYTES):
-            if found := _MARK.search(part):
-                return found[0][1:2].decode("ascii"), False
-    return ".", False
+    return int(behind[0]) * 10 ** (9 - size)
 
 
 def _stamps(cells: Sequence[str], rows: Sequence[Sequence[str]], decimal: str) -> Stamps | None:
@@ -287,7 +248,14 @@ def _blanks(row: Sequence[str], width: int) -> int:
     return 0 if any(field.strip() for field in beyond) else len(beyond)
 
 
-def _check_header(file: str, dialect: CsvDialect) -> None:
+def _check_header(file: str, dialect: CsvDialect, row: Sequence[str]) -> None:
+    """Refuse a file without a header, or whose fields blanks separate; `row` is its first one of data."""
+    between = [number(field, dialect.decimal) is not None for field in " ".join(row).split()]
+    if len(dialect.cells) == len(row) == 1 < len(between) and all(between):
+        raise InputError(
+            f"{file}: blanks between its fields, where commas, semicolons or tabs were expected; "
+            f"'fogml import {printable(file)} --draft -o profile.yaml' writes a profile that reads them"
+        )
     numbers = sum(number(cell, mark) is not None for cell in dialect.cells for mark in (".", ","))
     if not dialect.cells or numbers >= len(dialect.cells) / 2:
         found = "holds numbers" if dialect.cells else "names no columns"

@@ -7,8 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 
 from fogml.errors import InputError, quoted
-from fogml.runs.csv_dialect import CsvDialect, number
+from fogml.runs.csv_dialect import CsvDialect
 from fogml.runs.csv_header import fields_of
+from fogml.runs.csv_numbers import number
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
 
@@ -20,17 +21,24 @@ _LINE = re.compile(r"[^\r\n]*(?:\r\n|\r|\n)|[^\r\n]+\Z")
 def without_footer(dialect: CsvDialect) -> tuple[CsvDialect, list[Finding]]:
     """The dialect for reading a file's table alone, and a note of the lines of text below it, if any.
 
-    Such a line has neither a time nor a gyro's number in their places.
+    Such a line has neither a time nor a gyro's number in their places, or words in that of the time.
     """
     text = dialect.source.tail(_TAIL_BYTES).decode(dialect.encoding, errors="replace")
     lines = _LINE.findall(text)[1:]  # the first of them may be a part of one
     places = [i for i in dialect.known if dialect.name(i) == "time" or dialect.name(i).startswith("gyro")]
     forms = dict(dialect.stamps.columns) if dialect.stamps else {}
+    clock = {*forms, *(i for i in places if dialect.name(i) == "time")}
+
+    def is_value(field: str) -> bool:
+        return dialect.value(field) is not None
 
     def is_sample(line: str) -> bool:
         fields = fields_of(line, dialect.separator)
-        held = [(i, fields[i]) for i in {*places, *forms} if i < len(fields) and fields[i].strip()]
-        return any(forms[i].matches(f) if i in forms else dialect.value(f) is not None for i, f in held)
+        held = {i: fields[i] for i in {*places, *forms} if i < len(fields) and fields[i].strip()}
+        found = {i: forms[i].matches(f) if i in forms else is_value(f) for i, f in held.items()}
+        # Means below a column stand beside a word.
+        is_told = any(not found[i] and held[i].strip(' "')[:1].isalpha() for i in clock & found.keys())
+        return any(found.values()) and not is_told
 
     # The longest last part of the lines without a sample; its blank lines stay.
     last = next((n for n, line in enumerate(reversed(lines)) if line.strip() and is_sample(line)), None)

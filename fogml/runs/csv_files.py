@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.runs.csv_dialect import MISSING, CsvDialect, csv_dialect
+from fogml.runs.csv_dialect import CsvDialect, csv_dialect
 from fogml.runs.csv_end import cut_error, cut_line, note_of_end, without_footer
 from fogml.runs.csv_lines import LineReader, line_of_row
+from fogml.runs.csv_numbers import MISSING
 from fogml.runs.csv_quotes import quotes_are_plain
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
@@ -52,7 +53,7 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
         if table.num_rows == 0:
             raise no_samples(path.name)
     cut = cut_line(dialect.source, dialect.separator, dialect.decimal)
-    whole = whole.noting(notes)
+    whole = whole.noting([*_doubts(dialect), *notes])
     if cut is None:
         return whole.noting([] if notes else note_of_end(dialect.source))
     if not repair:
@@ -76,7 +77,7 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     from pyarrow import csv as arrow_csv
 
     dialect, notes = without_footer(csv_dialect(path).only(columns))
-    notes = notes or note_of_end(dialect.source)
+    notes = [*_doubts(dialect), *(notes or note_of_end(dialect.source))]
     if (cut := cut_line(dialect.source, dialect.separator, dialect.decimal)) is not None:
         raise cut_error(path, cut)
     start = 0
@@ -97,6 +98,11 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
             start += len(raw)
     if start == 0:
         raise no_samples(path.name)
+
+
+def _doubts(dialect: CsvDialect) -> list[Finding]:
+    """What is to be said of the marks in a file's numbers."""
+    return [Finding("marks_of_thousands", dialect.doubt)] if dialect.doubt else []
 
 
 def _opened(dialect: CsvDialect) -> Any:

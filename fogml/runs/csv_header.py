@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from fogml.runs.columns import parse_header
 from fogml.runs.header_spelling import DATE_NAMES, canonical_cells, uncommented, with_units_below
@@ -13,6 +13,7 @@ from fogml.runs.stamps import stamp_form
 
 SEPARATORS = (",", ";", "\t")
 _MOST_TITLE_LINES = 100
+_LINES_BELOW = 5
 _SEPARATOR_LINE = re.compile(r'\s*"?sep\s*=\s*(\S|\t)"?\s*\Z', re.IGNORECASE)
 _NUMBER_LIKE = re.compile(r"\s*[+-]?[\d.,' ]*\d[\d.,' ]*([eE][+-]?\d+)?\s*\Z")
 
@@ -49,8 +50,8 @@ class Header:
 def find_header(lines: Sequence[str]) -> Header | None:
     """The header among a file's first lines; None where all of them are blank.
 
-    It is the first line that names a time and a gyro, else the last line of text above the first numbers that
-    has as many fields as these, else the first line.
+    It is the first line that names a time and a gyro and has numbers below, else the first that names them,
+    else the last line of text above the first numbers that has as many fields as these, else the first line.
     """
     filled = [i for i, line in enumerate(lines) if line.strip()]
     stated = None
@@ -62,11 +63,33 @@ def find_header(lines: Sequence[str]) -> Header | None:
     plain = []
     for i in filled[:_MOST_TITLE_LINES]:
         found = _header(lines, i, stated)
-        if found.is_sure:
+        if found.is_sure and _has_numbers(lines, found):
             return found
         plain.append(found)
+    if sure := next((found for found in plain if found.is_sure), None):
+        return sure
     above = _above_numbers(lines, filled[:_MOST_TITLE_LINES], plain, stated)
     return above or plain[0]
+
+
+def header_over_lines(lines: Sequence[str]) -> Header | None:
+    """As `find_header`, also where its cells hold line ends, as in a spreadsheet, within quotation marks."""
+    found = find_header(lines)
+    if found is None or (found.is_sure and lines[found.line].count('"') % 2 == 0):
+        return found
+    whole, begins = [], []
+    at = 0
+    while at < len(lines):
+        ends = range(at + 1, min(at + 1 + _LINES_BELOW, len(lines)) + 1)
+        end = next((end for end in ends if "".join(lines[at:end]).count('"') % 2 == 0), at + 1)
+        whole.append(" ".join(lines[at:end]))
+        begins.append(at)
+        at = end
+    joined = find_header(whole)
+    if joined is None or not joined.is_sure:
+        return found
+    begins.append(len(lines))
+    return replace(joined, line=begins[joined.line], data=begins[joined.data])
 
 
 def fields_of(line: str, separator: str) -> list[str]:
@@ -83,7 +106,7 @@ def is_number_like(field: str) -> bool:
 
 def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
     text = uncommented(lines[i])
-    separator = separator or max(SEPARATORS, key=lambda s: re.sub(r'"[^"]*"', "", text).count(s))
+    separator = separator or _separator(text, lines[i + 1 : i + 1 + _LINES_BELOW])
     cells = _cells(fields_of(text, separator))
     below = next((j for j in range(i + 1, len(lines)) if lines[j].strip()), None)
     if below is not None:
@@ -91,6 +114,26 @@ def _header(lines: Sequence[str], i: int, separator: str | None) -> Header:
         if units is not None:
             return Header(i, below + 1, separator, units)
     return Header(i, i + 1, separator, canonical_cells(cells))
+
+
+def _separator(header: str, below: Sequence[str]) -> str:
+    """The mark between a header's fields: that of the numbers below it, where the header holds several."""
+    counts = {mark: re.sub(r'"[^"]*"', "", header).count(mark) for mark in SEPARATORS}
+    found = [mark for mark in SEPARATORS if counts[mark]]
+    if len(found) < 2:
+        return found[0] if found else SEPARATORS[0]
+
+    def numbers(mark: str) -> int:
+        return sum(is_number_like(field.strip(' "')) for line in below for field in fields_of(line, mark))
+
+    return max(found, key=lambda mark: (numbers(mark), counts[mark]))
+
+
+def _has_numbers(lines: Sequence[str], header: Header) -> bool:
+    """Whether the first line below a header is one of numbers, or there is none."""
+    line = next((line for line in lines[header.data :] if line.strip()), "")
+    fields = [field for field in fields_of(line, header.separator) if field.strip()]
+    return 2 * sum(is_number_like(field.strip(' "')) for field in fields) >= len(fields)
 
 
 def _cells(fields: Sequence[str]) -> tuple[str, ...]:

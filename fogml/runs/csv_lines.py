@@ -179,7 +179,9 @@ class LineReader:
         width = len(dialect.cells)
         if len(fields) < width or any(text.strip() for text in fields[width:]):
             kind = "cut short" if len(fields) < width else "too long"
-            raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind})")
+            is_split = dialect.separator == "," and any(text.strip().isdigit() for text in fields[width:])
+            hint = "; is the comma a decimal mark too? Export it with semicolons between" if is_split else ""
+            raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind}){hint}")
         for place, form in dialect.stamps.columns if dialect.stamps else ():
             if not form.matches(fields[place]):
                 raise _Fault(

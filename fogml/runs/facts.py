@@ -209,7 +209,7 @@ def side_file(run_path: Path) -> Path | None:
 
 
 def read_side_file(run_path: Path) -> Facts:
-    """The facts in the side file beside a run; none if there is no side file.
+    """The facts in the side file beside a run; none if there is none, or an import profile of that name.
 
     Raises
     ------
@@ -219,6 +219,19 @@ def read_side_file(run_path: Path) -> Facts:
     side = side_file(run_path)
     if side is None:
         return Facts()
+    values = read_yaml(side, NAMES)
+    is_profile = isinstance(values, dict) and str(values.get("schema", "")).startswith("fogml.import/")
+    return Facts() if is_profile else facts_from(values, side.name)
+
+
+def stated_facts(side: Path) -> Facts:
+    """The facts in a file.
+
+    Raises
+    ------
+    InputError
+        As `read_side_file`, and if it is an import profile.
+    """
     return facts_from(read_yaml(side, NAMES), side.name)
 
 

@@ -13,6 +13,7 @@ FIRST_OF_ALL = (
     "implausible_earth_rate",
     "implausible_scale_factor",
     "temperature_dropouts",
+    "marks_of_thousands",
 )
 """Codes of the findings that make every figure wrong, and are said before any other."""
 

@@ -11,22 +11,31 @@ from fogml.runs.units import canonical_unit, is_unit, signs
 
 DATE_NAMES = frozenset({"date", "datum", "日期"})
 """What a column of dates beside one of times of day is called."""
+_OF_THE_GYRO = ("gyro", "fog", "coil", "sensor", "die", "imu")
+_WARM = ("temp", "temperature", "temperatur")
 _SYNONYMS = {
     "time": ("t", "timestamp", "datetime", "date/time", "dateandtime", "elapsed", "elapsedtime", "zeit",
              "uhrzeit", "时间", "indexlevel0"),
-    "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "陀螺", "陀螺输出"),
-    "T": ("temp", "temperature", "temperatur", "温度"),
+    "gyro": ("gyroscope", "gyrooutput", "gyrorate", "fog", "fogoutput", "fograte", "omega", "ω",
+             "angularrate", "angularvelocity", "rotationrate", "drehrate", "陀螺", "陀螺输出", "角速度"),
+    "T": ("temp", "temperature", "temperatur", "温度",
+          *(name for of in _OF_THE_GYRO for name in (f"t{of}", *(of + word for word in _WARM)))),
+    **{f"T_{of}": tuple(of + word for word in _WARM) for of in ("chamber", "case", "electronics")},
 }  # fmt: skip
 _SPELLED = {re.sub(r"[\s_-]", "", name.lower()): name for name in KNOWN}
 _MEANT = {re.sub(r"[\s_-]", "", word): name for name, words in _SYNONYMS.items() for word in words}
 _OF_AN_AXIS = re.compile(r"(?:gyro?|gyroscope|omega|angular(?:rate|velocity)|[gw])([xyz])\Z")
+_FORM_OF_TIMES = re.compile(
+    r"(?=.*[:y])(?:[ymdhs]{1,4}|f{1,9})(?:[-/.:, t]+(?:[ymdhs]{1,4}|f{1,9}))+\Z", re.IGNORECASE
+)
+_NUMBER = re.compile(r"[-+\d.,:' ]+\Z")
 _COMMENT = re.compile(r"\s*(#|%|//)+\s*")
 _FORMS = (
     re.compile(r"(?P<name>.*?)\s*\((?P<unit>[^()]*)\)\Z"),
     re.compile(r"(?P<name>.*?)\s*\[(?P<unit>[^][]*)\]\Z"),
     re.compile(r"(?P<name>[^/,]*?)\s*[/,]\s*\(?(?P<unit>[^()]*)\)?\Z"),
     re.compile(r"(?P<name>.*?)\s+(?:in\s+)?(?P<unit>\S+)\Z"),
-    re.compile(r"(?P<name>.*?)_(?P<unit>[A-Za-z%]+(?:_[hs])?)\Z"),
+    re.compile(r"(?P<name>.*?)_(?P<unit>[A-Za-z%]+(?:_(?:per_)?(?:h|s|hr|sec))?)\Z"),
 )
 
 
@@ -61,17 +70,28 @@ def canonical_cells(cells: Sequence[str]) -> tuple[str, ...]:
 
 
 def with_units_below(cells: Sequence[str], row: Sequence[str]) -> tuple[str, ...] | None:
-    """The cells with their units from the row below them; None where that is no row of units."""
-    below = [re.sub(r"\A[\[(](.*)[\])]\Z", r"\1", field.strip()) for field in row]
-    stated = [field for field in below if field.strip("-_. ")]
-    if not stated or len(row) < len(cells) or not all(is_unit(f) and not f.isdigit() for f in stated):
+    """The cells with their units from the row below them; None where that is no row of units.
+
+    It is one of spellings of units and form of times alone, or one of words that has accepted units below two
+    columns of the run format.
+    """
+    below = [re.sub(r"\A[\[(](.*)[\])]\Z", r"\1", field.strip().strip('"')) for field in row]
+    units = ["" if not f.strip("-_. ") or _FORM_OF_TIMES.match(f) else f for f in below]
+    stated = [unit for unit in units if unit]
+    if not stated or any(_NUMBER.match(unit) or set("[]") & set(unit) for unit in stated):
         return None
-    return canonical_cells(
-        [
-            f"{cell} [{unit}]" if unit.strip("-_. ") and parse_header(cell)[1] is None else cell
-            for cell, unit in zip(cells, below)
-        ]
-    )
+    units += [""] * (len(cells) - len(units))
+    taken = [bool(unit) and parse_header(cell)[1] is None for cell, unit in zip(cells, units)]
+    below_it = zip(cells, units, taken, strict=False)
+    found = canonical_cells([f"{cell} [{unit}]" if is_new else cell for cell, unit, is_new in below_it])
+    told = [parse_header(cell) for cell, is_new in zip(found, taken, strict=True) if is_new]
+    known = sum(unit is not None and is_accepted(_known_name(name), unit) for name, unit in told)
+    return found if (all(map(is_unit, stated)) and len(row) >= len(cells)) or known > 1 else None
+
+
+def _known_name(name: str) -> str:
+    """The column of the run format of which a column of one axis is."""
+    return re.sub(r"\A(gyro|rate)_[xyz]\Z", r"\1", name)
 
 
 def _plain(name: str) -> str:
@@ -113,5 +133,5 @@ def _splits(cell: str) -> Iterator[tuple[str, str | None]]:
     yield cell, None
     for form in _FORMS:
         if match := form.match(cell):
-            unit = match["unit"].replace("_", "/")
+            unit = re.sub("_(per_)?", "/", match["unit"])
             yield match["name"], canonical_unit(unit)

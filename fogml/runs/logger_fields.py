@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,32 @@ from numpy.typing import NDArray
 from fogml.runs.logger_lines import single_blanks
 from fogml.runs.profile_parts import TextLayout
 
+HIDDEN = "\x1a"
+"""Stands for a separator within quotation marks while a line's fields are told apart."""
+_QUOTED = re.compile(rb'"[^"\n]*"')
+
+
+def hide_quoted(content: bytes, separator: str | None) -> bytes:
+    """Lines whose separators within quotation marks are hidden, where one character separates."""
+    if separator is None or b'"' not in content:
+        return content
+    mark = separator.encode()
+    return _QUOTED.sub(lambda found: found[0].replace(mark, HIDDEN.encode()), content)
+
+
+def shown(text: str, separator: str | None) -> str:
+    """A text of hidden separators as it stands in the file."""
+    return text if separator is None else text.replace(HIDDEN, separator)
+
 
 def field_texts(content: bytes, profile: TextLayout, fields: int, position: int) -> NDArray[np.str_]:
     """A source column as texts without blanks and quotation marks about them, shape (rows,)."""
     import pyarrow as pa
 
     (column,) = _fields(content, profile, fields, [position], pa.string(), []).columns
-    return np.char.strip(np.array(column.to_pylist(), dtype=np.str_), ' \t"')
+    texts = np.char.strip(np.array(column.to_pylist(), dtype=np.str_), ' \t"')
+    mark = profile.text_separator
+    return texts if mark is None or b'"' not in content else np.char.replace(texts, HIDDEN, mark)
 
 
 def _fields(
@@ -72,8 +92,13 @@ def _numbers(text: Any, decimal: str) -> Any:
 
     plain = compute.replace_substring_regex(compute.utf8_trim_whitespace(text), r'^"(.*)"$', r"\1")
     plain = compute.utf8_trim_whitespace(plain)
+    # The decimal mark is stated, so that another one before three digits is one of thousands.
+    marks = f"[{'.' if decimal == ',' else ','}'{HIDDEN}\u00a0\u202f]"
+    groups = rf"^[-+]?[1-9]\d{{0,2}}({marks}\d{{3}})+({re.escape(decimal)}\d*)?$"
+    bare = compute.replace_substring_regex(plain, marks, "")
+    plain = compute.if_else(compute.match_substring_regex(plain, groups), bare, plain)
     if decimal == ",":
-        plain = compute.replace_substring(plain, ",", ".")
+        plain = compute.replace_substring(compute.replace_substring(plain, ".", HIDDEN), ",", ".")
     plain = compute.replace_substring_regex(plain, r"^\+", "")
     valid = compute.match_substring_regex(plain, r"^-?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?$")
     return compute.cast(compute.if_else(valid, plain, pa.scalar(None, pa.string())), pa.float64())

@@ -23,6 +23,7 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
     """
     ready = begun = b""
     read = 0
+    only_returns = False
     decoder = codecs.getincrementaldecoder(encoding)()
     try:
         with path.open("rb") as file:
@@ -32,6 +33,8 @@ def text_parts(path: Path, encoding: str, part_bytes: int) -> Iterator[tuple[byt
                     text = text.removeprefix("\ufeff")
                     if "\0" in text[:4096]:
                         raise InputError(f"{path.name}: this is a binary file, a text file was expected")
+                    only_returns = "\r" in text and "\n" not in text
+                text = text.replace("\r", "\n") if only_returns else text
                 read += len(raw)
                 content = begun + text.encode()
                 end = content.rfind(b"\n") + 1

@@ -14,7 +14,7 @@ from fogml.errors import InputError, counted, listed, quoted
 from fogml.runs.csv_end import cut_error, cut_line
 from fogml.runs.csv_source import CsvSource
 from fogml.runs.findings import Finding
-from fogml.runs.logger_fields import field_numbers, field_texts
+from fogml.runs.logger_fields import field_numbers, field_texts, hide_quoted, shown
 from fogml.runs.logger_lines import Lines
 from fogml.runs.logger_parts import PART_BYTES, text_parts
 from fogml.runs.other_rate import is_of_another_rate
@@ -116,7 +116,7 @@ class _Reader:
         texts: dict[str | int, list[NDArray[np.str_]]] = {}
         fields, places = 0, dict[str | int, int]()
         for content, is_last in parts:
-            lines = Lines.of(content)
+            lines = Lines.of(hide_quoted(content, self.profile.text_separator))
             is_first = self.lines_before == 0
             numbers = np.flatnonzero(self._used(lines, is_first))
             if is_first:
@@ -141,6 +141,10 @@ class _Reader:
             None if self.clock is None else self.clock.stamps,
         )
 
+    def _line(self, lines: Lines, number: int) -> str:
+        """A line as it stands in the file."""
+        return shown(lines.line(number), self.profile.text_separator)
+
     def _used(self, lines: Lines, first: bool) -> NDArray[np.bool_]:
         """Which lines of a part are neither blank, nor comments, nor above the header."""
         profile = self.profile
@@ -150,7 +154,9 @@ class _Reader:
             self._check_signature(lines)
             used[: profile.skip_lines] = False
             if profile.header_text is not None:
-                found = (n for n in np.flatnonzero(used).tolist() if profile.header_text in lines.line(n))
+                found = (
+                    n for n in np.flatnonzero(used).tolist() if profile.header_text in self._line(lines, n)
+                )
                 header = next(found, None)
                 if header is None:
                     raise InputError(
@@ -168,7 +174,7 @@ class _Reader:
     def _check_signature(self, lines: Lines) -> None:
         signature = self.profile.signature
         if signature is not None:
-            head = [lines.line(number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
+            head = [self._line(lines, number) for number in range(min(_SIGNATURE_LINES, len(lines.starts)))]
             if not any(signature in line for line in head):
                 raise InputError(
                     f"{self.file}: {quoted(signature)} was expected in its first lines; {self.hint}"
@@ -188,7 +194,7 @@ class _Reader:
 
     def _names(self, line: str) -> list[str]:
         separator = self.profile.text_separator
-        names = line.split(separator)
+        names = [shown(name, separator) for name in line.split(separator)]
         return [name.strip().strip('"') for name in names] if self.profile.strip_names else names
 
     def _places(self, names: list[str] | None, fields: int) -> dict[str | int, int]:
@@ -250,7 +256,7 @@ class _Reader:
             if not self.profile.reject.not_numbers or 2 * np.count_nonzero(faulty) > len(rows):
                 raise InputError(
                     f"{self.file}: {place} holds text or nothing in a number's place "
-                    f"({int(faulty.sum())} such rows): {quoted(lines.line(line))}; {self.hint}"
+                    f"({int(faulty.sum())} such rows): {quoted(self._line(lines, line))}; {self.hint}"
                 )
             bad = np.zeros(len(numbers), dtype=bool)
             bad[rows[faulty]] = True

@@ -13,19 +13,20 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, listed, quoted
 from fogml.runs.columns import parse_header
+from fogml.runs.container_files import Group, grouped, unknown_fields
 from fogml.runs.facts import facts_from
 from fogml.runs.hdf5_files import h5py_module
 from fogml.runs.header_spelling import canonical_cells
 from fogml.runs.raw_table import RawTable, choose_vectors, facts_from_json, stored_blocks
-from fogml.runs.reader_process import stored_file
+from fogml.runs.reader_process import StoredArray, StoredFile, stored_file
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 from fogml.runs.run import Run
 
@@ -58,11 +59,32 @@ def mat_blocks(
             raise InputError(f"{path.name}: 'units' must be a struct of texts, e.g. units.time = 's'")
         if not stored.arrays:
             raise InputError(f"{path.name}: holds no numeric vectors; time, gyro and others were expected")
-        cells = canonical_cells([_cell(array.name, units.get(array.name)) for array in stored.arrays])
-        vectors, findings = choose_vectors(path.name, list(zip(cells, stored.arrays, strict=True)))
+        vectors, findings = choose_vectors(path.name, _chosen(path, stored, units))
         source = f"{path.name}, facts"
         facts = facts_from_json(stated, source) if isinstance(stated, str) else facts_from(stated, source)
         yield from stored_blocks(stored, vectors, findings, None if stated is None else facts, rows, columns)
+
+
+def _chosen(path: Path, stored: StoredFile, units: Mapping[str, str]) -> list[tuple[str, StoredArray]]:
+    """The variables at the top, or those of the only struct that holds a time and a gyro."""
+    groups = [
+        Group(
+            name,
+            tuple(zip(canonical_cells([_cell(a.name, a.unit or units.get(a.name)) for a in held]), held)),
+        )
+        for name, held in grouped(stored).items()
+    ]
+    runs = [group for group in groups if group.is_run]
+    # What stands at the top comes before what else is kept.
+    runs = [group for group in runs if not group.name] or runs
+    if len(runs) > 1:
+        names = listed([group.name for group in runs])
+        raise InputError(
+            f"{path.name}: {names} each hold a time and a gyro; save the one that is meant as its own file"
+        )
+    if not runs and len(groups) > 1:
+        raise unknown_fields(path, "mat", groups)
+    return list((runs or groups)[0].columns)
 
 
 def _cell(name: str, unit: str | None) -> str:

@@ -13,8 +13,10 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.columns import column_spec, is_accepted, parse_header
 from fogml.runs.container_files import groups_of, sheet_file
-from fogml.runs.csv_dialect import decoded_head, marks_of
+from fogml.runs.csv_dialect import decoded_head
 from fogml.runs.csv_header import fields_of, is_number_like
+from fogml.runs.csv_numbers import PLAIN, Marks, marks_of, number
+from fogml.runs.csv_source import CsvSource
 from fogml.runs.header_spelling import canonical_cells, with_units_below
 from fogml.runs.profile_parts import SEPARATORS
 from fogml.runs.reader_process import stored_file
@@ -25,10 +27,12 @@ from fogml.runs.stamps import stamp_form
 _MOST_ROWS = 200
 _TIME = re.compile(r"time|stamp|clock|zeit|epoch|^t$|^ts$|^[mun]?s(ec)?$|sow|tow|时间", re.IGNORECASE)
 _DATE = re.compile(r"date|datum|日期", re.IGNORECASE)
-_GYRO = re.compile(r"gyr|fog|omega|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
+_GYRO = re.compile(r"gyr|fog|omega|^om|ang.*(vel|rate)|^w[_.]?[xyz]?$|^g[_.]?[xyz]$|rate|陀螺", re.IGNORECASE)
 _WARM = re.compile(r"temp|die|oven|therm|^t[_.]?\w{0,3}$|温", re.IGNORECASE)
 _AXIS = re.compile(r"([xyz])\W*\Z", re.IGNORECASE)
 _UNIT_IN_NAME = (("us", r"us\b|µs|micro"), ("ns", r"ns\b|nano"), ("ms", r"ms\b|milli"))
+_FEW_VALUES = 20
+_TAIL_BYTES = 1 << 12
 _KELVIN = 200.0  # no chamber is so hot in degC, and none so cold in kelvin
 _MARK = "# GUESS: "
 
@@ -41,12 +45,12 @@ class _Field:
     name: str
     unit: str | None
     first: list[str] = field(default_factory=list)
-    mark: str = "."
+    marks: Marks = PLAIN
 
     @property
     def numbers(self) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-        texts = [text.strip(' "').replace(self.mark, ".") for text in self.first]
-        return np.array([float(text) if _is_float(text) else np.nan for text in texts])
+        found = (number(t.strip(' "'), self.marks.decimal, self.marks.grouped) for t in self.first)
+        return np.array([np.nan if value is None else value for value in found])
 
 
 def draft_profile(path: Path) -> str:
@@ -83,23 +87,23 @@ def _of_text(path: Path) -> tuple[list[str], list[_Field]]:
         raise InputError(f"{path.name}: no rows of numbers in its first lines; a draft needs some")
     rows = [_split(line, mark) for line in lines[data : data + _MOST_ROWS] if line.strip()]
     width = len(rows[0])
-    decimal = marks_of(path, rows, mark or " ")
-    layout = [f"separator: {name}"] + ([f'decimal: "{decimal}"'] if decimal != "." else [])
+    marks = marks_of(CsvSource(path), rows, mark or " ")
+    layout = [f"separator: {name}"] + ([f'decimal: "{marks.decimal}"'] if marks.decimal != "." else [])
     if encoding not in ("utf-8-sig", "utf-8"):
         layout.append(f"encoding: {encoding}")
     above = [i for i in range(data) if lines[i].strip() and len(_split(lines[i], mark)) == width]
     names = [
         _split(lines[i], mark) for i in above if not any(is_number_like(f) for f in _split(lines[i], mark))
     ]
+    units: tuple[str, ...] | None = None
     if not names:
         layout += [f"skip_lines: {data}"] if data else []
         layout += ["header: false", f"fields: {width}"]
         fields = [_Field(i, f"column {i}", None) for i in range(width)]
     else:
-        cells, units = names[-1], None
+        cells = names[-1]
         if len(names) > 1 and (units := with_units_below([c.strip() for c in names[-2]], names[-1])):
             cells = names[-2]
-            layout.append("reject: {not_numbers: true}    # the row of units below the header is left out")
         line = lines[above[len(above) - (2 if units else 1)]].strip()
         if next(i for i, text in enumerate(lines) if text.strip()) < data - (2 if units else 1):
             layout.append(
@@ -109,9 +113,22 @@ def _of_text(path: Path) -> tuple[list[str], list[_Field]]:
         fields = [
             _Field(cell.strip(' "'), *parse_header(right)) for cell, right in zip(cells, known, strict=False)
         ]
+    below = _are_below(path, encoding, mark, width)
+    if units or below:
+        keys = ["not_numbers: true", *(["wrong_field_count: true"] if below else [])]
+        what = ["the row of units below the header"] * bool(units) + ["the lines below the data"] * below
+        layout.append(f"reject: {{{', '.join(keys)}}}    # {' and '.join(what)}: left out")
     for place, one in enumerate(fields):
-        one.first, one.mark = [row[place] for row in rows if len(row) == width], decimal
+        one.first, one.marks = [row[place] for row in rows if len(row) == width], marks
     return layout, fields
+
+
+def _are_below(path: Path, encoding: str, mark: str | None, width: int) -> bool:
+    """Whether lines other than of numbers stand below them."""
+    wide = encoding if encoding.startswith("utf-16") else None
+    tail = CsvSource(path, wide).tail(_TAIL_BYTES).decode(errors="replace").rstrip("\0")
+    lines = [line for line in re.split(r"\r\n|\r|\n", tail)[1:] if line.strip()]
+    return any(not _is_data(_split(line, mark), width) for line in lines)
 
 
 def _table_of(text: str) -> tuple[str, list[str], int | None]:
@@ -167,19 +184,24 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
     )
     if not gyros:
         held = [f for f in left if np.isfinite(f.numbers).any() or not f.first]
-        gyros = held[:1]
+        # States and marks take few values; a thermometer is named as one.
+        gyros = sorted(held, key=lambda f: (bool(_WARM.search(f.name)), _takes_few(f)))[:1]
         left = [f for f in left if f not in gyros]
     axes = {m[1].lower(): f for f in gyros if (m := _AXIS.search(f.name))}
     many = len(gyros) > 1 and len(axes) == len(gyros)
     lines.append("  gyro: " + _gyro(gyros[0] if gyros else None, many))
     used: set[str] = set()
-    for one in _taken(left, lambda f: column_spec(f.name) is not None or bool(_WARM.search(f.name))):
+    warm_before = len(lines)
+    for one in _taken(left, _is_of_a_run):
         lines.append(_other(one, used))
+    if len(lines) == warm_before and (rest := sorted((f for f in left if f not in gyros), key=_takes_few)):
+        lines.append(f"  # T: {{source: {_quoted(rest[0].source)}, unit: degC}}    # a drift model needs one")
     if many:
         lines.append("axes: {" + ", ".join(f"{axis}: {_quoted(f.source)}" for axis, f in axes.items()) + "}")
     if "time" not in "".join(lines[1:3]):
         lines.append(f"sample_s: 0.01    {_MARK}no clock was found; write the true interval [s]")
-    rest = [f for f in [*left, *([] if many else gyros[1:])] if isinstance(f.source, str)]
+    others = [*left, *([] if many else gyros[1:])]
+    rest = [f for f in others if isinstance(f.source, str) and (np.isfinite(f.numbers).any() or not f.first)]
     if rest:
         lines.append(
             f"# keep: [{', '.join(_quoted(f.source) for f in rest)}]    # other columns, under their names"
@@ -190,6 +212,17 @@ def _columns(fields: Sequence[_Field]) -> list[str]:
         "# legs: {up: {from_s: 0, to_s: 3600}}        # runs of their own",
     ]
     return lines
+
+
+def _takes_few(one: _Field) -> bool:
+    """Whether a field takes few values, as a state does, or none that is a number."""
+    return len(set(one.numbers[np.isfinite(one.numbers)].tolist())) < _FEW_VALUES
+
+
+def _is_of_a_run(one: _Field) -> bool:
+    """Whether a field is a column of the run format, or a temperature by name or unit."""
+    is_warm = bool(_WARM.search(one.name)) or (one.unit is not None and is_accepted("T", one.unit))
+    return column_spec(one.name) is not None or is_warm
 
 
 def _clock(left: list[_Field]) -> list[str]:
@@ -266,11 +299,3 @@ def _quoted(value: str | int) -> str:
     """A value for YAML."""
     is_plain = isinstance(value, int) or re.fullmatch(r"[A-Za-z_][\w./]*", value)
     return str(value) if is_plain else json.dumps(value, ensure_ascii=False)
-
-
-def _is_float(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text

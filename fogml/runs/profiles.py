@@ -12,7 +12,7 @@ from fogml.errors import InputError, counted, quoted
 from fogml.runs.assemble import MOST_DROPPED, runs_of_columns
 from fogml.runs.checks import check_run
 from fogml.runs.columns import conversion, parse_header
-from fogml.runs.facts import NAMES, Facts, read_side_file, side_file
+from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
 from fogml.runs.logger_rows import (
     chosen_rows,
@@ -29,7 +29,6 @@ from fogml.runs.row_faults import Rows
 from fogml.runs.run import Run
 from fogml.runs.sources import run_sources, unchanged
 from fogml.signals import large
-from fogml.yaml_text import read_yaml
 
 __all__ = ["import_recording", "load_profile", "profile_names", "run_names", "runs_from_table"]
 
@@ -72,16 +71,12 @@ def import_recording(
     """
     path = Path(path)
     name = "given" if isinstance(profile, ImportProfile) else Path(profile).stem
-    beside = side_file(path)
-    if beside is not None and not isinstance(profile, ImportProfile) and Path(profile).is_file():
-        # A profile of the log's own name lies where its side file would.
-        beside = None if beside.samefile(profile) or _is_profile(beside) else beside
     profile = profile if isinstance(profile, ImportProfile) else load_profile(profile)
     _check_axis(profile, axis)
     with unchanged(*run_sources(path)):
         table = read_logger(path, profile, name)
         joined = [joined_columns(path, log, table.stamps) for log in profile.join]
-        facts = Facts() if beside is None else read_side_file(path)
+        facts = read_side_file(path)
     return runs_from_table(
         table,
         profile,
@@ -93,12 +88,6 @@ def import_recording(
         repair=repair or profile.repair,
         most_dropped=most_dropped,
     )
-
-
-def _is_profile(side: Path) -> bool:
-    """Whether a file beside a log is an import profile and states no facts."""
-    values = read_yaml(side, NAMES)
-    return isinstance(values, dict) and str(values.get("schema", "")).startswith("fogml.import/")
 
 
 def run_names(profile: ImportProfile, stem: str) -> dict[str, tuple[str | None, str | None]]:
@@ -157,7 +146,8 @@ def runs_from_table(
             part, found = _leg(table, profile, leg, file)
             rows = large.chosen(table.rows, part)
             if not len(rows):
-                raise InputError(f"{file}: no rows are left; the profile rejects them all")
+                what = "the profile rejects them all" if leg is None else f"no row is of the leg '{leg}'"
+                raise InputError(f"{file}: no rows are left; {what}")
             findings = [*table.findings, *found]
             runs += runs_of_columns(
                 _columns(table, part, profile, this_axis, file, joined),

@@ -31,6 +31,8 @@ _FOREIGN = {
     b"\x28\xb5\x2f\xfd": "compressed by zstd; unpack it first",
     b"7z\xbc\xaf": "a 7-Zip archive; unpack it first",
     b"%PDF": "a PDF; export the table as CSV",
+    b"ARROW1": "a Feather (Arrow) file; write it as Parquet",
+    b"\x93NUMPY": "one NumPy array, whose columns have no names; write it with names, as numpy.savez does",
 }
 
 

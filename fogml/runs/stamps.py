@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 
 FloatArray = NDArray[np.float64]
 
-_DATE = r"(?P<a>\d{4}|\d{1,2})[-/.年](?P<b>\d{1,2})[-/.月](?P<c>\d{4}|\d{1,2})日?"
+_DATE = (
+    r"(?P<a>\d{4}|\d{1,2})\s*[-/.年\s]\s*(?P<b>\d{1,2}|[A-Za-z]{3,9})\s*[-/.月\s]\s*"
+    r"(?P<c>\d{4}|\d{1,2})日?"
+)
 _TIME = (
     r"(?P<H>\d{1,3}):(?P<M>\d{2})(?::(?P<S>\d{2})(?:[.,:](?P<F>\d{1,9}))?)?"
     r"\s*(?P<p>[AaPp][Mm])?\s*(?P<z>Z|UTC|[+-]\d{2}:?\d{2})?"
@@ -27,9 +30,20 @@ _FORMS = {
     "date and time": rf"^\s*{_DATE}(?:\s*T\s*|[\s_,;]+){_TIME}\s*$",
     "date": rf"^\s*{_DATE}\s*$",
     "time": rf"^\s*{_TIME}\s*$",
+    "minutes and seconds": r"^\s*(?P<M>\d{1,3}):(?P<S>\d{2})[.,](?P<F>\d{1,9})\s*$",
+    "date and time without marks": (
+        r"^\s*(?P<a>\d{4})(?P<b>\d{2})(?P<c>\d{2})\s*[T_ -]\s*(?P<H>\d{2}):?(?P<M>\d{2}):?(?P<S>\d{2})"
+        r"(?:[.,](?P<F>\d{1,9}))?\s*(?P<z>Z|UTC|[+-]\d{2}:?\d{2})?\s*$"
+    ),
+    "fraction of a second": r"^\s*(?P<F>\d{1,9})\s*$",
 }
+FRACTION = "fraction of a second"
+"""Digits in a field of their own, where a comma before them separates fields too."""
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+_HOURS_OR_MINUTES = "h?"
 _NS = 1_000_000_000
 _DAY_NS = 86_400 * _NS
+_GOES_ROUND_NS = {"time": _DAY_NS, "minutes and seconds": 3600 * _NS}
 
 
 @dataclass(frozen=True)
@@ -39,10 +53,10 @@ class StampForm:
     Attributes
     ----------
     kind
-        Key of the forms: ``date and time``, ``date`` or ``time``.
+        Key of the forms, such as ``date and time``, ``date`` or ``time``.
     order
         Order of year, month and day: ``ymd``, ``dmy``, ``mdy``; ``?`` where day and month can't be told
-        apart.
+        apart. Of a time ``h?`` where hours and minutes may be minutes and seconds.
     """
 
     kind: str
@@ -72,9 +86,9 @@ class StampForm:
         parts = {field.name: found.field(field.name) for field in found.type}
         total = np.zeros(len(texts), dtype=np.int64)
         if "a" in parts:
-            days, bad = self._days(*(_whole(parts[key]) for key in "abc"))
+            days, bad = self._days(_whole(parts["a"]), _month(parts["b"]), _whole(parts["c"]))
             total, wrong = total + days * _DAY_NS, wrong | bad
-        if "H" in parts:
+        if "F" in parts:
             seconds, bad = _seconds(parts)
             total, wrong = total + seconds, wrong | bad
         return total, wrong
@@ -110,7 +124,7 @@ class Stamps:
     @property
     def started(self) -> datetime | None:
         """When the recording began, where the stamps state a date that can be told."""
-        if all(form.kind == "time" for _, form in self.columns) or any(
+        if all("date" not in form.kind for _, form in self.columns) or any(
             f.order == "?" for _, f in self.columns
         ):
             return None
@@ -119,13 +133,20 @@ class Stamps:
 
 
 class StampClock:
-    """Turns the stamps of consecutive blocks into seconds since the first; days are counted over midnight."""
+    """Turns stamps of consecutive blocks into seconds since the first; days are counted over midnight,
+    hours where only minutes and seconds are shown."""
 
     def __init__(self, stamps: Stamps, file: str) -> None:
         self.stamps, self.file = stamps, file
         self.is_open = any(form.order == "?" for _, form in stamps.columns)
-        self.last_ns, self.days = stamps.first_ns, 0
-        self.of_day = all(form.kind == "time" for _, form in stamps.columns)
+        self.last_ns, self.rounds = stamps.first_ns, 0
+        rounds = [_GOES_ROUND_NS.get(form.kind, 0) for _, form in stamps.columns if form.kind != FRACTION]
+        self.round_ns = 0 if 0 in rounds else min(rounds, default=0)
+        if self.round_ns and any(form.order == _HOURS_OR_MINUTES for _, form in stamps.columns):
+            raise InputError(
+                f"{file}, column 'time': two numbers with a colon may be hours and minutes, or minutes and "
+                "seconds; write them as HH:MM:SS"
+            )
 
     def seconds(self, texts: Sequence[Array]) -> FloatArray:
         """Seconds of each row, shape (n,); NaN where the texts, one array for each column, are no stamps."""
@@ -139,25 +160,28 @@ class StampClock:
                 f"{self.file}, column 'time': day and month of the dates can't be told apart and the "
                 "recording goes on over midnight; write them as year-month-day"
             )
-        if self.of_day and len(total):
-            total = np.where(wrong, self.last_ns % _DAY_NS, total)
-            steps = np.diff(np.concatenate([[self.last_ns % _DAY_NS], total]))
-            midnights = np.cumsum((steps < -_DAY_NS // 2).astype(np.int64))
+        if self.round_ns and len(total):
+            total = np.where(wrong, self.last_ns % self.round_ns, total)
+            steps = np.diff(np.concatenate([[self.last_ns % self.round_ns], total]))
+            rounds = np.cumsum((steps < -self.round_ns // 2).astype(np.int64))
             self.last_ns = int(total[-1])
-            total = total + (self.days + midnights) * _DAY_NS
-            self.days += int(midnights[-1])
+            total = total + (self.rounds + rounds) * self.round_ns
+            self.rounds += int(rounds[-1])
         return np.where(wrong, np.nan, (total - self.stamps.first_ns) / _NS)
 
 
 def stamp_form(texts: Sequence[str]) -> StampForm | None:
     """The form of which texts are, the first of a column, or None where they are no stamps."""
-    kind = next((kind for kind in _FORMS if texts and StampForm(kind).matches(texts[0])), None)
-    if kind is None or kind == "time":
-        return None if kind is None else StampForm(kind)
+    kinds = (kind for kind in _FORMS if kind != FRACTION)
+    kind = next((kind for kind in kinds if texts and StampForm(kind).matches(texts[0])), None)
+    if kind is None or kind not in ("date", "date and time"):
+        is_open = kind == "time" and texts[0].count(":") == 1 and not re.search("[AaPp][Mm]", texts[0])
+        return None if kind is None else StampForm(kind, _HOURS_OR_MINUTES if is_open else "ymd")
     found = [match for text in texts if (match := re.match(_FORMS[kind], text))]
     if any(len(match["a"]) == 4 for match in found):
         return StampForm(kind, "ymd")
-    if any(int(match["a"]) > 12 for match in found) or "." in texts[0].split()[0]:
+    is_named = any(match["b"].isalpha() for match in found)
+    if is_named or any(int(match["a"]) > 12 for match in found) or "." in texts[0].split()[0]:
         return StampForm(kind, "dmy")
     if any(int(match["b"]) > 12 for match in found) or found[0].groupdict().get("p"):
         return StampForm(kind, "mdy")
@@ -191,12 +215,28 @@ def _whole(texts: Any) -> NDArray[np.int64]:
     return np.asarray(compute.fill_null(digits.cast(arrow.int64()), 0).to_numpy(zero_copy_only=False))
 
 
+def _month(texts: Any) -> NDArray[np.int64]:
+    """Months from their numbers or English names, 0 where there is none."""
+    import pyarrow as arrow
+    import pyarrow.compute as compute
+
+    if not compute.any(compute.match_substring_regex(texts, "[A-Za-z]")).as_py():
+        return _whole(texts)
+    names = compute.utf8_slice_codeunits(compute.utf8_lower(texts), 0, 3)
+    places = compute.index_in(names, value_set=arrow.array(_MONTHS, arrow.string()))
+    return np.asarray(compute.fill_null(places, -1).to_numpy(zero_copy_only=False), dtype=np.int64) + 1
+
+
 def _seconds(parts: dict[str, Any]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
     """Nanoseconds of times of day, their zone taken off, and which are none."""
     import pyarrow.compute as compute
 
+    none = compute.if_else(compute.is_valid(parts["F"]), "", "")
+    of_hours = "H" in parts
+    parts = dict.fromkeys("HMSpz", none) | parts
     hour, minute, second = (_whole(parts[key]) for key in "HMS")
-    wrong = (minute > 59) | (second > 60)
+    # Minutes without hours may go on beyond 59.
+    wrong = ((minute > 59) & of_hours) | (second > 60)
     half = np.asarray(compute.utf8_lower(compute.fill_null(parts["p"], "")).to_numpy(zero_copy_only=False))
     hour = np.where(half == "pm", hour % 12 + 12, np.where(half == "am", hour % 12, hour))
     fraction = _whole(compute.utf8_rpad(compute.fill_null(parts["F"], ""), 9, "0"))

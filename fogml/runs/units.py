@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 from typing import Any
 
 _SIGNS = str.maketrans(
-    {"˚": "°", "º": "°", "∘": "°", "μ": "µ", "⁻": "-", "¹": "1", "−": "-", "·": "*", "．": "."}
+    {"˚": "°", "º": "°", "∘": "°", "μ": "µ", "⁻": "-", "¹": "1", "−": "-", "″": '"', "·": "*", "．": "."}
 )
 # By lower case, without blanks, the degree sign written "deg".
 _SPELLINGS = {
@@ -23,8 +23,11 @@ _SPELLINGS = {
     "deg/h": ("dph", "deg*h-1", "degh-1", "deg*h^-1", "degh^-1"),
     "deg/s": ("dps", "deg*s-1", "degs-1", "deg*s^-1", "degs^-1"),
     "rad/s": ("rps", "rad*s-1", "rads-1", "rad*s^-1", "rads^-1"),
+    "deg/min": (),
     "mdeg/s": ("mdps",),
     "mrad/s": ("mrps",),
+    "arcsec/s": ('"/s', "arcsec/sec", "as/s"),
+    "arcsec/h": ('"/h', "arcsec/hr", "arcsec/hour", "as/h"),
     "degC": ("c", "celsius", "degcelsius", "centigrade"),
     "degF": ("f", "fahrenheit", "degfahrenheit"),
     "K": ("kelvin", "degk", "degkelvin"),
@@ -61,6 +64,7 @@ def canonical_unit(unit: str) -> str:
     if plain in _SPELLINGS:
         return plain
     word = re.sub(r"\s+", "", re.sub(r"\bper\b", "/", plain.lower()))
+    word = word.rstrip(".")
     upper, slash, lower = word.partition("/")
     halves = f"{_HALVES.get(upper, upper)}{slash}{_HALVES.get(lower, lower)}"
     return _CANONICAL.get(word, _CANONICAL.get(halves, unit.strip())) if word != "g" else unit.strip()

@@ -16,7 +16,7 @@ from fogml.errors import InputError
 from fogml.json_files import FAR_OFF
 from fogml.outputs import whole_file, whole_files
 from fogml.runs.columns import column_spec, header
-from fogml.runs.facts import SIDE_SUFFIXES, Facts, read_side_file, side_file, side_file_text
+from fogml.runs.facts import SIDE_SUFFIXES, Facts, side_file, side_file_text, stated_facts
 from fogml.runs.raw_table import FACTS_KEY
 from fogml.runs.run import Run
 from fogml.signals import large
@@ -235,7 +235,7 @@ def check_side_file(path: str | Path, facts: Facts) -> Path | None:
     if beside is None:
         return None if facts == Facts() else path.with_suffix(SIDE_SUFFIXES[0])
     try:
-        there = read_side_file(path)
+        there = stated_facts(beside)
     except InputError:
         raise InputError(
             f"{path.name}: beside it would stand {beside.name}, which is there already and states no facts "

@@ -56,6 +56,12 @@ def test_a_sweep_writes_its_winner_as_a_configuration_of_train(invoke_json, swee
     assert "fogml train" in page
 
 
+def test_all_that_a_sweep_lacks_is_named_at_once(invoke, tmp_path):
+    config = tmp_path / "sweep.yaml"
+    config.write_text("trials: 3\n")
+    assert "nothing is given for 'space', 'runs'" in invoke("sweep", config, status=2).stderr
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [

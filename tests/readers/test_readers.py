@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import contextlib
+import json
 from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from fogml.errors import InputError
 from fogml.readers import READERS, reader_of
 from fogml.runs import raw_table, reader_process
+from fogml.runs.profiles import import_recording
 from fogml.runs.reading import file_format, read_blocks, read_run, read_table
 from tests.readers import files
 from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
@@ -137,6 +140,60 @@ def test_objects_in_a_numpy_archive_are_never_unpickled(tmp_path):
     with pytest.raises(InputError, match=r"log\.npz"):
         read_run(path)
     assert not (tmp_path / "ran").exists()
+
+
+def test_wide_messages_are_cut_aloud_and_read_by_name(tmp_path):
+    writer = pytest.importorskip("mcap.writer")
+    path, profile = tmp_path / "log.mcap", tmp_path / "log.yaml"
+    with path.open("wb") as file:
+        book = writer.Writer(file)
+        book.start()
+        channel = book.register_channel("/imu", "json", book.register_schema("Imu", "jsonschema", b"{}"))
+        for i, t in enumerate(TIME):
+            cells = [{"a": float(GYRO[i]), "b": k} for k in range(16)]
+            whole, part = divmod(t, 1)
+            stamp = {"sec": files.START_S + int(whole), "nsec": round(part * 1e9)}
+            angular = {"x": 0.5 * i, "y": 0.0, "z": 0.0}
+            message = {"timestamp": stamp, "angular_velocity": angular, "c": [cells, cells, cells, cells]}
+            late_ns = int((files.START_S + t + 0.01 * (i % 3)) * 1e9)
+            book.add_message(channel, late_ns, json.dumps(message).encode(), late_ns)
+        book.finish()
+    # A profile of the log's own name states no facts of it.
+    profile.write_text(
+        "schema: fogml.import/1\ndescription: the last cell\ncolumns:\n"
+        "  time: {source: /imu/time, unit: s}\n  gyro: {source: /imu/c.3.15.a, unit: deg/h}\n"
+    )
+    run = read_run(path, axis="x")
+    # The messages' own times, not those of recording.
+    np.testing.assert_allclose(run.time - run.time[0], TIME, atol=1e-6)
+    np.testing.assert_allclose(run.gyro, np.degrees(0.5 * np.arange(COUNT)) * 3600.0)
+    (told,) = (f.message for f in run.findings if f.code == "fields_left_out")
+    assert (
+        "'/imu' holds 132 numbers a message, of which the first 100" in told and "source: /imu/NAME" in told
+    )
+    (last,) = import_recording(path, profile)
+    np.testing.assert_allclose(last.gyro, GYRO)
+
+
+def test_the_struct_of_a_matlab_file_and_the_group_of_an_hdf5_file(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    inner = {"time_s": TIME, "gyro_dph": GYRO, "note": "bench 4", "deeper": {"T_in_C": WARM}}
+    savemat(tmp_path / "log.mat", {"setup": {"rate": 4.0}, "log": inner})
+    np.testing.assert_array_equal(read_run(tmp_path / "log.mat").gyro, GYRO)
+    units = {"t": "s", "omega": "dps", "temp": "°C"}
+    savemat(tmp_path / "deep.mat", {"rig": {"log": {"t": TIME, "omega": GYRO, "temp": WARM, "units": units}}})
+    np.testing.assert_allclose(read_run(tmp_path / "deep.mat").gyro, 3600.0 * GYRO)
+    savemat(tmp_path / "two.mat", {"a": inner, "b": inner})
+    with pytest.raises(InputError, match=r"'?a'?, '?b'? each hold a time and a gyro; save"):
+        read_run(tmp_path / "two.mat")
+    savemat(tmp_path / "none.mat", {"a": {"x": TIME}, "b": {"y": GYRO}})
+    with pytest.raises(InputError, match=r"it holds .*a/x.*b/y.*import none\.mat --draft"):
+        read_run(tmp_path / "none.mat")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        group = file.create_group("rig/log")
+        for name, unit, values in (("time", "s", TIME), ("gyro", "deg/h", GYRO)):
+            group.create_dataset(name, data=values).attrs["units"] = unit
+    np.testing.assert_array_equal(read_run(tmp_path / "log.h5").gyro, GYRO)
 
 
 def test_readers_have_names_of_their_own():

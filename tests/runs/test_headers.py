@@ -77,6 +77,22 @@ FILES = {
         SHORT, [row.replace(";", ",", 1) for row in semicolons(stamped(thousandths))]
     ),
     "date and time": lines("Date,Time,Gyro [deg/h],T_in [°C]", TWO),
+    "units of other columns": lines(
+        "Time,Gyro,T in,Pressure,State", ["s,deg/h,°C,hPa,text", *(f"{row},1013,up" for row in PLAIN)]
+    ),
+    "form of the times": lines("Time,Gyro,T in", ["HH:MM:SS.fff,dph,degC", *stamped(lambda m: f"{m:%T.%f}")]),
+    "line ends in cells": lines('"Time\n[s]","Gyro\n[deg/h]","T_in\n[°C]"', above=["Station 4"]),
+    "decimal commas and commas in names": lines(
+        "Time, s;Gyro, °/h;T_in, °C", [row.replace(",", ";").replace(".", ",") for row in PLAIN]
+    ),
+    "names in a title": lines(above=["time,gyro,operator", "12:00,FOG-0417,Li"]),
+    "other names": lines("Elapsed (Sec.),Omega (deg per hour),T_in (º C)"),
+    "means below": lines(below=["Mean,1.0,20.5", "Std,0.1,0.2"]),
+    "minus signs": lines(rows=[f"{row},\u22121" for row in PLAIN], header=HEADER + ",T_out [degC]"),
+    "months by name": lines(rows=stamped(lambda m: f"{m:%d-%b-%Y %T.%f}")),
+    "ISO without marks": lines(rows=stamped(lambda m: f"{m:%Y%m%dT%H%M%S.%f}")),
+    "milliseconds behind a comma among commas": lines("Time,Gyro [dph],T_in [C]", stamped(thousandths)),
+    "minutes and seconds over the hour": lines(rows=stamped(lambda m: f"{m:%M:%S.%f}")),
 }  # fmt: skip
 
 
@@ -92,7 +108,7 @@ def test_gives_the_plain_run(tmp_path, kind):
     path.write_bytes(FILES[kind].encode())
     check(run := read_run(path))
     said = {finding.code for finding in run.findings}
-    assert ("footer" in said) == (kind == "footer")
+    assert ("footer" in said) == (kind in ("footer", "means below"))
     blocks = list(read_blocks(path, block_rows=7))
     np.testing.assert_allclose(np.concatenate([block.time for block in blocks]), TIME, atol=1e-9)
 
@@ -107,6 +123,60 @@ def test_encodings(tmp_path, encoding, end):
     check(read_run(path))
     path.write_bytes(text.replace("20.5", "twenty").replace("\n", end).encode(encoding))
     with pytest.raises(InputError, match=r"log\.csv, line 7, column 'T_in': 'twenty'"):
+        read_run(path)
+
+
+@pytest.mark.parametrize(
+    ("separator", "numbers", "right", "is_told"),
+    [
+        (";", ["950", "1.000", "-1.050"], [950.0, 1000.0, -1050.0], True),
+        ("\t", ["950", "1,000", "1,050"], [950.0, 1000.0, 1050.0], True),
+        (",", ['"950"', '"1,000"', '"1,050"'], [950.0, 1000.0, 1050.0], True),
+        (",", ['"20,000"', '"20,001"', '"20,002"'], [20000.0, 20001.0, 20002.0], True),
+        # A semicolon and a point don't go together, and three decimals are common.
+        (";", ["20.000", "20.001", "20.002"], [20.0, 20.001, 20.002], True),
+        (";", ["0.000", "20.001", "20.002"], [0.0, 20.001, 20.002], False),
+        (";", ["20,000", "20,001", "20,002"], [20.0, 20.001, 20.002], False),
+        (";", ["20", "20.5", "20.125"], [20.0, 20.5, 20.125], False),
+    ],
+)
+def test_a_mark_before_three_digits(tmp_path, separator, numbers, right, is_told):
+    path = tmp_path / "log.csv"
+    rows = [f"{i}{separator}{number}" for i, number in enumerate(numbers)]
+    path.write_text("\n".join([f"time [s]{separator}gyro [deg/h]", *rows, ""]))
+    run = read_run(path)
+    np.testing.assert_array_equal(run.gyro, right)
+    told = [finding.message for finding in run.findings if finding.code == "marks_of_thousands"]
+    assert len(told) == is_told
+    assert not told or "are read as" in told[0]
+
+
+def test_hours_or_minutes(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text(lines(rows=[f"00:{i:02d},{row.partition(',')[2]}" for i, row in enumerate(PLAIN)]))
+    with pytest.raises(InputError, match="hours and minutes, or minutes and seconds; write them"):
+        read_run(path)
+    # Beside a date they are hours and minutes.
+    path.write_text(
+        lines(rows=stamped(lambda m: f"2026-03-02 08:{round(2 * (m.second - 50) % 60):02d}")[::2])
+    )
+    np.testing.assert_allclose(np.diff(read_run(path).time), 120.0)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (lines("time gyro T", ["1.5 2.5 20"]), "blanks between its fields.*import log.txt --draft"),
+        (
+            lines(rows=[PLAIN[1].replace(".", ",")]),
+            "6 fields where the header has 3.*is the comma a decimal mark",
+        ),
+    ],
+)
+def test_the_way_on(tmp_path, text, said):
+    path = tmp_path / "log.txt"
+    path.write_text(text)
+    with pytest.raises(InputError, match=said):
         read_run(path)
 
 

@@ -25,6 +25,11 @@ GERMAN = "Prüfstand 4;;;\nDatum;Zeit;Drehrate;Temperatur\n" + "".join(
     f"05.01.2026;08:00:{i:02d},500;{i},25;2{i % 10},5\n" for i in range(COUNT)
 )
 BARE = "".join(f"{i * 0.1:.1f} {i} {300 + i / 10:.1f}\n" for i in range(COUNT))
+QUOTED = "Time (s),Note,Omega (dph),Wärme [°C]\n" + "".join(
+    f'{i},"a, b","{1000 + i:,}.25",{25 + i / 8}\n' for i in range(COUNT)
+)
+QUOTED += "End of test\n"
+RETURNS = "t;state;val\r" + "".join(f"{i};{i % 3};{950 + i:,}\r".replace(",", ".") for i in range(COUNT))
 UNITS = "Logger 3\nt,omega,die\n[ms],[deg/s],[°C]\n" + "".join(
     f"{t},{i}.5,{25}\n" for i, t in enumerate(TIME)
 )
@@ -46,9 +51,16 @@ UNITS = "Logger 3\nt,omega,die\n[ms],[deg/s],[°C]\n" + "".join(
             1,
         ),
         (BARE, np.arange(COUNT), ["header: false", "separator: whitespace", "unit: count"], 1),
+        (
+            QUOTED,
+            1000.25 + np.arange(COUNT),
+            ["reject: {not_numbers: true, wrong_field_count: true}", 'T: {source: "Wärme [°C]", unit: degC}'],
+            1,
+        ),
+        (RETURNS, np.arange(COUNT) + 950.0, ["gyro: {source: val, unit: count", 'decimal: ","'], 1),
         (UNITS, 3600.0 * (np.arange(COUNT) + 0.5), ["source: t, unit: ms}\n", "unit: deg/s}\n"], 1),
     ],
-    ids=["motion tracker", "german bench", "no header", "row of units"],
+    ids=["motion tracker", "german bench", "no header", "quotes and footer", "returns", "row of units"],
 )
 def test_text(tmp_path, text, gyro, told, runs):
     path, profile = tmp_path / "log.txt", tmp_path / "p.yaml"

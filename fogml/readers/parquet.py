@@ -1,0 +1,119 @@
+"""The reader of Parquet files: one array per column, read forward in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from fogml.readers.stored import MOST_NAMES, Refused, text_of
+
+_BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
+_BATCH_ROWS = 1 << 16
+_LONGEST_MARK = 100
+
+
+class Parquet:
+    """A Parquet file: one array per column."""
+
+    def __init__(self, path: str, keys: list[str]) -> None:
+        from pyarrow.parquet import ParquetFile
+
+        # Without a buffer, streaming would hold a column's whole row group, however large.
+        self.file = ParquetFile(
+            path,
+            pre_buffer=False,
+            memory_map=False,
+            buffer_size=_BUFFER_BYTES,
+            page_checksum_verification=True,
+        )
+        schema = self.file.schema_arrow
+        self.arrays = [ParquetColumn(self.file, i) for i in range(len(schema.names))]
+        metadata = {text_of(key): text_of(value) for key, value in (schema.metadata or {}).items()}
+        self.told = {
+            "arrays": [array.told for array in self.arrays],
+            "facts": {key: metadata[key] for key in keys if key in metadata},
+            "origin_s": next((array.first_ns / 1e9 for array in self.arrays if array.is_stamp), None),
+        }
+
+    def close(self) -> None:
+        self.arrays.clear()
+        self.file.close()
+
+
+def nanoseconds(stamps: Any) -> Any:
+    """Arrow's stamps as nanoseconds since 1970."""
+    import pyarrow as arrow
+
+    return stamps.cast(arrow.timestamp("ns", stamps.type.tz)).cast(arrow.int64())
+
+
+class ParquetColumn:
+    """A column, read forward in batches: a slice that begins where the last one ended costs its own rows."""
+
+    ndim = 1
+
+    def __init__(self, file: Any, index: int) -> None:
+        import pyarrow.types as types
+
+        names, held = file.schema_arrow.names, file.schema_arrow.types[index]
+        self.file, self.name = file, names[index]
+        self.same = names[:index].count(self.name)
+        self.shape = (file.metadata.num_rows,)
+        kinds = (types.is_floating, types.is_integer, types.is_boolean, types.is_decimal, types.is_null)
+        self.is_stamp = types.is_timestamp(held)
+        kind = "f" if self.is_stamp or any(is_kind(held) for is_kind in kinds) else "O"
+        unit = "s" if self.is_stamp else None
+        self.told = {"name": self.name[:1000], "unit": unit, "fault": None, "kind": kind}
+        self.told |= {"type": str(held)[:60], "shape": list(self.shape)}
+        self.at, self.ahead, self.batches = 0, None, iter(())
+        self.first_ns = 0
+        if self.is_stamp and self.shape[0]:
+            first = next(self.parts(0, 1))
+            self.first_ns = (nanoseconds(first).to_pylist() or [0])[0] or 0
+            self.at = self.shape[0]
+
+    def parts(self, start: int, stop: int) -> Iterator[Any]:
+        """The rows from `start` to `stop`, as Arrow holds them, in pieces."""
+        if start == 0 or start < self.at:
+            rows = min(max(stop - start, 1), _BATCH_ROWS)
+            batches = self.file.iter_batches(batch_size=rows, columns=[self.name], use_threads=False)
+            self.at, self.ahead, self.batches = 0, None, (batch.column(self.same) for batch in batches)
+        while self.at < stop:
+            part = self.ahead if self.ahead is not None else next(self.batches, None)
+            if part is None:
+                raise Refused(f"row {self.at + 1} of column {self.name} is missing")
+            self.ahead = None
+            if len(part) > stop - self.at:
+                part, self.ahead = part[: stop - self.at], part[stop - self.at :]
+            skipped = min(max(start - self.at, 0), len(part))
+            self.at += len(part)
+            yield part[skipped:]
+
+    def __getitem__(self, part: tuple[slice]) -> np.ndarray[Any, Any]:
+        start, stop = part[0].start, part[0].stop
+        found, at = np.empty(stop - start), 0
+        for piece in self.parts(start, stop):
+            if self.is_stamp:
+                since = nanoseconds(piece).fill_null(self.first_ns).to_numpy(zero_copy_only=False)
+                held = np.where(piece.is_null().to_numpy(zero_copy_only=False), np.nan, since - self.first_ns)
+                found[at : at + len(piece)] = held / 1e9
+            else:
+                # Integers beyond 2^53, such as nanoseconds since 1970, are rounded to the nearest number.
+                found[at : at + len(piece)] = piece.cast("float64", safe=False).to_numpy(zero_copy_only=False)
+            at += len(piece)
+        return found
+
+    def marks(self) -> tuple[list[str], np.ndarray[Any, Any]]:
+        """The different texts of a column of marks, and the place of each row's among them."""
+        found: dict[str, int] = {}
+        codes = np.empty(self.shape[0])
+        at = 0
+        for piece in self.parts(0, self.shape[0]):
+            for value in piece.to_pylist():
+                codes[at] = found.setdefault(text_of(value)[:_LONGEST_MARK], len(found))
+                at += 1
+            if len(found) > MOST_NAMES:
+                raise Refused(f"more than {MOST_NAMES} different marks")
+        return list(found), codes
