@@ -23,6 +23,7 @@ from fogml.outputs import whole_file
 HERE = Path(__file__).parent
 PARTS = {
     "formats": "every format, and headers as laboratories write them",
+    "first_page": "from an own file to a judged page",
     "memory": "what reading long logs takes",
     "clocks": "clocks, dropouts and what the numbers give away",
     "noise": "noise terms of filtered and polled gyros",

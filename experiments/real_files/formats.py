@@ -22,6 +22,9 @@ from tests.runs.test_headers import FILES, GYRO, TIME
 WRITERS: dict[str, tuple[str, Callable[[Path], Any]]] = {
     "npz": ("log.npz", files.npz),
     "workbook": ("log.xlsx", files.xlsx),
+    "struct": ("log.mat", files.mat_struct),
+    "parquet": ("log.parquet", files.parquet),
+    "hdf5": ("log.h5", files.hdf5),
     "tdms": ("log.tdms", files.tdms),
     "mdf": ("log.mf4", files.mdf),
     "miniseed": ("log.mseed", files.miniseed),

@@ -5,8 +5,9 @@ Each format is a class with `arrays`, `told` (what the parent hears of them) and
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from fogml.readers.columns import MOST_COLUMNS
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
 _MOST_TEXT = 1 << 20
+_LONG_BYTES = 1 << 20
 _DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512
@@ -138,10 +140,14 @@ class Mat:
 
     @staticmethod
     def loaded(path: str) -> dict[str, Any]:
-        from scipy.io import loadmat
+        """Variables of a version 5 file: one at a time is held, its long arrays go into temporary files."""
+        from scipy.io import loadmat, whosmat
 
-        found = loadmat(path, simplify_cells=True, mat_dtype=False, chars_as_strings=True)
-        return {name: value for name, value in found.items() if not name.startswith("__")}
+        found = {}
+        for name in dict.fromkeys(name for name, *_ in whosmat(path)):
+            held = loadmat(path, simplify_cells=True, chars_as_strings=True, variable_names=[name])
+            found[name] = put_away(held.pop(name))
+        return found
 
     def fault_of(self, array: Any) -> str | None:
         """As `Hdf5.fault_of`; what is in memory has none."""
@@ -176,6 +182,19 @@ class Mat:
         self.arrays.clear()
         if self.opened:
             self.opened.close()
+
+
+def put_away(value: Any) -> Any:
+    """A variable whose long arrays of numbers lie in temporary files."""
+    if isinstance(value, dict):
+        return {name: put_away(item) for name, item in value.items()}
+    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub" or value.nbytes < _LONG_BYTES:
+        return value
+    with tempfile.TemporaryFile(prefix="fogml-") as file:
+        # Column by column, as they are read.
+        order: Literal["F", "C"] = "F" if value.flags.f_contiguous else "C"
+        value.ravel(order).tofile(file)
+        return np.memmap(file, value.dtype, "r", shape=value.shape, order=order)
 
 
 class MatrixColumn:

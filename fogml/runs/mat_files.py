@@ -44,8 +44,8 @@ def mat_blocks(
 ) -> Iterator[RawTable]:
     """The table of a MATLAB file in blocks of `rows` rows; all at once for None.
 
-    Only time, gyro and `columns` are read where these are given. Version 5 is held whole by the
-    process that reads it.
+    Only time, gyro and `columns` are read where these are given. The process that reads
+    it holds a variable of version 5 whole while it is unpacked.
 
     Raises
     ------

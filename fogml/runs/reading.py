@@ -109,7 +109,9 @@ def read_runs(
     with unchanged(*run_sources(path)):
         one = OneAxis(axis)
         kind = file_format(path)
-        if not repair and _is_long(path, kind, limits):
+        size_mb = _size_mb(path, kind)
+        limits.check_repair(path, size_mb if repair else 0.0)
+        if not repair and size_mb > limits.long_mb:
             long = _joined(path, read_blocks(path, axis=axis, limits=limits), name)
             return [long.with_findings(check_run(long))]
         table = one.table(_read_table(path, kind, repair, limits))
@@ -129,10 +131,9 @@ def read_blocks(
 ) -> Iterator[Run]:
     """Read a run in blocks of at most `block_rows` rows, in bounded memory.
 
-    Blocks share name and facts. Order of time is checked across their borders. MATLAB files of
-    version 5 are held whole while they are read; so is a file to repair, and one whose first block
-    shows columns of another rate or times of arrival, which only the whole tells.
-
+    Blocks share name and facts. Order of time is checked across their borders. A variable of a MATLAB
+    file of version 5 is held whole while it is unpacked; so is a file to repair, and one whose first
+    block shows columns of another rate or times of arrival, which only the whole tells.
 
     Parameters
     ----------
@@ -189,14 +190,14 @@ def read_blocks(
             raise too_short(path.name, assembler.samples)
 
 
-def _is_long(path: Path, kind: str, limits: ReadingLimits) -> bool:
-    """Whether a file is read into temporary ones, block by block, and not into memory."""
+def _size_mb(path: Path, kind: str) -> float:
+    """What a file holds, unpacked where it tells [MB]."""
     size = float(path.stat().st_size)
     if kind == "parquet":
         from fogml.runs.parquet_files import parquet_values
 
         size = max(size, 8.0 * parquet_values(path))
-    return size > 1e6 * limits.long_mb
+    return size / 1e6
 
 
 def _joined(path: Path, blocks: Iterable[Run], name: str | None) -> Run:

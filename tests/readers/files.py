@@ -34,6 +34,30 @@ def xlsx(path: Path) -> None:
     book.save(path)
 
 
+def mat_struct(path: Path) -> None:
+    """A MATLAB struct of any name, with its units beside."""
+    savemat = pytest.importorskip("scipy.io").savemat
+    units = {"t": "s", "omega": "deg/h", "temp": "°C"}
+    savemat(path, {"rig": {"t": TIME, "omega": GYRO, "temp": WARM, "units": units}, "setup": {"rate": 4.0}})
+
+
+def parquet(path: Path) -> None:
+    """Timestamps of pandas."""
+    pandas = pytest.importorskip("pandas")
+    stamps = pandas.Timestamp(START_S, unit="s") + pandas.to_timedelta(TIME, unit="s")
+    frame = pandas.DataFrame({"timestamp": stamps, "gyro_dph": GYRO, "temp_C": WARM})
+    frame.to_parquet(path, index=False)
+
+
+def hdf5(path: Path) -> None:
+    """Datasets in a group of any name."""
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(path, "w") as file:
+        group = file.create_group("rig/log")
+        for name, unit, values in (("time", "s", TIME), ("gyro", "deg/h", GYRO), ("T", "degC", WARM)):
+            group.create_dataset(name, data=values).attrs["units"] = unit
+
+
 def tdms(path: Path) -> None:
     nptdms = pytest.importorskip("nptdms")
     clock = {"wf_start_time": np.datetime64(START_S, "s"), "wf_start_offset": 0.0}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from fogml.readers import READERS, reader_of
 from fogml.runs import raw_table, reader_process
 from fogml.runs.profiles import import_recording
 from fogml.runs.reading import file_format, read_blocks, read_run, read_table
+from fogml.runs.reading_limits import DEFAULT_LIMITS
 from tests.readers import files
 from tests.readers.files import AXES, COUNT, GYRO, TIME, WARM
 
@@ -176,23 +178,18 @@ def test_wide_messages_are_cut_aloud_and_read_by_name(tmp_path):
 
 
 def test_the_struct_of_a_matlab_file_and_the_group_of_an_hdf5_file(tmp_path):
-    h5py = pytest.importorskip("h5py")
     inner = {"time_s": TIME, "gyro_dph": GYRO, "note": "bench 4", "deeper": {"T_in_C": WARM}}
     savemat(tmp_path / "log.mat", {"setup": {"rate": 4.0}, "log": inner})
     np.testing.assert_array_equal(read_run(tmp_path / "log.mat").gyro, GYRO)
-    units = {"t": "s", "omega": "dps", "temp": "°C"}
-    savemat(tmp_path / "deep.mat", {"rig": {"log": {"t": TIME, "omega": GYRO, "temp": WARM, "units": units}}})
-    np.testing.assert_allclose(read_run(tmp_path / "deep.mat").gyro, 3600.0 * GYRO)
+    files.mat_struct(tmp_path / "deep.mat")
+    np.testing.assert_array_equal(read_run(tmp_path / "deep.mat").gyro, GYRO)
     savemat(tmp_path / "two.mat", {"a": inner, "b": inner})
     with pytest.raises(InputError, match=r"'?a'?, '?b'? each hold a time and a gyro; save"):
         read_run(tmp_path / "two.mat")
     savemat(tmp_path / "none.mat", {"a": {"x": TIME}, "b": {"y": GYRO}})
     with pytest.raises(InputError, match=r"it holds .*a/x.*b/y.*import none\.mat --draft"):
         read_run(tmp_path / "none.mat")
-    with h5py.File(tmp_path / "log.h5", "w") as file:
-        group = file.create_group("rig/log")
-        for name, unit, values in (("time", "s", TIME), ("gyro", "deg/h", GYRO)):
-            group.create_dataset(name, data=values).attrs["units"] = unit
+    files.hdf5(tmp_path / "log.h5")
     np.testing.assert_array_equal(read_run(tmp_path / "log.h5").gyro, GYRO)
 
 
@@ -280,3 +277,26 @@ def test_a_block_of_many_columns_has_fewer_rows(tmp_path, monkeypatch):
     np.savez(path, **{"time [s]": TIME, "gyro [deg/h]": GYRO, "T [degC]": WARM, "more": GYRO})
     assert [len(block) for block in read_blocks(path, block_rows=30)] == [25, 25, 25, 25, 20]
     assert [len(block) for block in read_blocks(path, block_rows=30, columns=["T"])] == [30] * 4
+
+
+def test_a_long_variable_of_matlab_is_put_away(tmp_path, monkeypatch):
+    from fogml.readers import stored
+
+    monkeypatch.setattr(stored, "_LONG_BYTES", 100)
+    for layout in (np.ascontiguousarray, np.asfortranarray):
+        matrix = layout(np.c_[TIME, GYRO])
+        (tmp_path / "log.mat").unlink(missing_ok=True)
+        savemat(tmp_path / "log.mat", {"log": {"time_s": TIME, "both": matrix}, "gyro_dph": GYRO, "n": "x"})
+        held = stored.Mat.loaded(str(tmp_path / "log.mat"))
+        assert isinstance(held["log"]["both"], np.memmap) and held["n"] == "x"
+        np.testing.assert_array_equal(held["log"]["both"], matrix)
+        np.testing.assert_array_equal(held["gyro_dph"], GYRO)
+
+
+def test_repair_refuses_what_is_too_long_to_be_held(tmp_path):
+    files.npz(tmp_path / "log.npz")
+    limits = replace(DEFAULT_LIMITS, repair_mb=0.001)
+    with pytest.raises(
+        InputError, match=r"log\.npz: 0 MB, and --repair holds a file in memory, up to 0 MB; cut"
+    ):
+        read_run(tmp_path / "log.npz", repair=True, limits=limits)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from scipy.io import savemat
 from fogml.cli.main import app
 from fogml.errors import InputError
 from fogml.runs.profile_draft import draft_profile
-from fogml.runs.profiles import import_recording
+from fogml.runs.profiles import import_recording, load_profile
 from fogml.runs.reading import read_run
 from tests.readers import files
 
@@ -106,3 +108,17 @@ def test_a_file_without_numbers(tmp_path, text):
     (tmp_path / "log.txt").write_text(text)
     with pytest.raises(InputError, match=r"log\.txt: no rows of numbers"):
         draft_profile(tmp_path / "log.txt")
+
+
+def test_the_profiles_of_the_guide_are_valid(tmp_path):
+    guide = Path(__file__).parents[2] / "docs" / "import-profiles.md"
+    blocks = re.findall(r"```(?:text|yaml)\n(.*?)```", guide.read_text(encoding="utf-8"), re.DOTALL)
+    profiles = [block for block in blocks if re.search("^columns:", block, re.MULTILINE)]
+    whole = [block for block in profiles if block.startswith("schema:")]
+    joined = next(block for block in blocks if block.startswith("join:"))
+    for block in [*profiles, whole[0] + joined]:
+        head = "" if block.startswith("schema:") else "schema: fogml.import/1\ndescription: of the guide\n"
+        path = tmp_path / "profile.yaml"
+        path.write_text(head + block, encoding="utf-8")
+        assert load_profile(path).columns["gyro"].unit
+    assert len(profiles) == 4
