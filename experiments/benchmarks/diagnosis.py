@@ -90,9 +90,11 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
         for name, answer in methods.items():
             out = blind.answers(name) / case
             out.mkdir(parents=True)
-            reason = _answered(answer, files, out, spent[name])
+            seconds, reason = answered(answer, files, out)
             if reason:
                 failures[name].append(reason)
+            else:
+                spent[name].append(seconds)
     values = score(blind, list(methods))
     rows = []
     for name in methods:
@@ -101,8 +103,8 @@ def subset(folder: Path, quick: bool) -> dict[str, Any]:
     return {"cases": count, "seed": CASE_SEED, "rows": rows, "skipped": skipped}
 
 
-def _answered(answer: Callable[[Any, Path], Any], files: Any, out: Path, spent: list[float]) -> str | None:
-    """Let a method answer a case and note its time; why it failed, if it did."""
+def answered(answer: Callable[[Any, Path], Any], files: Any, out: Path) -> tuple[float, str | None]:
+    """Let a method answer a case; its time [s], and why it failed, if it did."""
     from fogml.blind.folders import OUTCOME, OUTCOME_SCHEMA
 
     begin = time.perf_counter()
@@ -115,10 +117,8 @@ def _answered(answer: Callable[[Any, Path], Any], files: Any, out: Path, spent: 
     outcome = {"schema": OUTCOME_SCHEMA, "case": files.name, "done": reason is None, "seconds": seconds}
     if reason is not None:
         outcome |= {"reason": "error", "message": reason}
-    else:
-        spent.append(seconds)
     (out / OUTCOME).write_text(json.dumps(outcome) + "\n", encoding="utf-8")
-    return reason
+    return seconds, reason
 
 
 def measure(quick: bool, repeats: int, folder: Path) -> dict[str, Any]:

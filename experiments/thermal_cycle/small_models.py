@@ -29,19 +29,19 @@ MOST_BYTES = 500
 
 @dataclass(frozen=True)
 class Small:
-    """How a small model is made: its learner, its features, and rows at most; cubics take every sample."""
+    """How a small model is made: its learner of a seed, features, rows at most; cubics take every sample."""
 
-    make: Callable[[], Any]
+    make: Callable[[int], Any]
     features: str = "T, dT"
     rows: int | None = ROWS
 
 
 SMALL = {
-    "PX4's cubic": Small(lambda: RisingCubic(24.0), "T", None),
-    "ArduPilot's cubic": Small(lambda: RisingCubic(10.0, 0.5), "T", None),
-    "GRU": Small(lambda: GRULearner(4, epochs=120)),
-    "TCN": Small(lambda: TCNLearner(3, epochs=120)),
-    "KAN": Small(KANLearner),
+    "PX4's cubic": Small(lambda seed: RisingCubic(24.0), "T", None),
+    "ArduPilot's cubic": Small(lambda seed: RisingCubic(10.0, 0.5), "T", None),
+    "GRU": Small(lambda seed: GRULearner(4, epochs=120, seed=seed)),
+    "TCN": Small(lambda seed: TCNLearner(3, epochs=120, seed=seed)),
+    "KAN": Small(lambda seed: KANLearner(seed=seed)),
 }
 """Name of each to how it is made: four units, three layers of three channels, three nodes."""
 
@@ -51,8 +51,8 @@ class SmallModel(DriftModel):
 
     form: ClassVar[str] = "small"
 
-    def __init__(self, name: str) -> None:
-        self.name = name
+    def __init__(self, name: str, seed: int = 0) -> None:
+        self.name, self.seed = name, seed
 
     @property
     def kind(self) -> str:  # type: ignore[override]
@@ -68,7 +68,7 @@ class SmallModel(DriftModel):
         rows = [run_rows(run, self.features_) for run in group]
         learn_box(self.features_, [part.atoms for part in rows])
         table = table_of_rows(rows, self.features_.compose, how.rows)
-        self.learner_ = how.make()
+        self.learner_ = how.make(self.seed)
         every = np.arange(len(table))
         self.learner_.fit(table, every)
         if how.rows is None:

@@ -35,8 +35,18 @@ def _predicting(regressor: Any) -> Iterator[NDArray[Any]]:
     watched = object.__new__(Watched)
     watched.__dict__.update(vars(regressor))
     watched.predict(np.zeros((1, regressor.n_features_in_)))
-    for name in sorted(read & vars(regressor).keys() - regressor.get_params(deep=False).keys()):
-        yield from _arrays(vars(regressor)[name])
+    settings = regressor.get_params(deep=False).keys()
+    for name in sorted(read & vars(regressor).keys()):
+        value = vars(regressor)[name]
+        # Settings predict nothing, but what a pipeline is made of is fitted in its place.
+        yield from _arrays(value) if name not in settings else _fitted_steps(value)
+
+
+def _fitted_steps(value: Any) -> Iterator[NDArray[Any]]:
+    """The arrays of the estimators in a list of named ones."""
+    for step in value if isinstance(value, list) else []:
+        if isinstance(step, tuple) and isinstance(step[-1], BaseEstimator):
+            yield from _arrays(step[-1])
 
 
 def _arrays(value: Any) -> Iterator[NDArray[Any]]:

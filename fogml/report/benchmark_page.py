@@ -98,11 +98,11 @@ def drift_table(values: Mapping[str, Any]) -> Table | None:
             Row(
                 (
                     name,
-                    _estimate(told["ratio"]),
+                    value_text(told["ratio"]),
                     number(told["worst"]),
-                    _share(told["harmful"]),
-                    _estimate(told["coverage"]),
-                    _estimate(told["width"]),
+                    share_text(told["harmful"]),
+                    value_text(told["coverage"]),
+                    value_text(told["width"]),
                     MISSING if told["bytes"] is None else f"{told['bytes']:.0f}",
                     str(told["failed"]),
                 )
@@ -131,7 +131,7 @@ def drift_groups(values: Mapping[str, Any]) -> Table | None:
     rows = []
     for name in names:
         figures = values["drift"][name]["figures"]
-        rows.append(Row((name, *(_estimate(figures[group]["ratio"]) for group in groups))))
+        rows.append(Row((name, *(value_text(figures[group]["ratio"]) for group in groups))))
     counts = [values["drift"][names[0]]["figures"][group]["cases"] for group in groups]
     heads = tuple((f"{group} ({count})", "", "figure pair") for group, count in zip(groups, counts))
     return Table((("Entry", "", "text"), *heads), tuple(rows), "Rms / nothing by data; cases in brackets.")
@@ -146,14 +146,15 @@ def diagnosis_table(values: Mapping[str, Any]) -> Table | None:
     for key, (words, _) in FIGURES.items():
         parts = [one["figures"][ALL][key] for one in entries.values()]
         share = key in ("found", "false", "unknown", "quiet")
-        rows.append(Row((words, *((_share if share else _estimate)(part) for part in parts))))
+        rows.append(Row((words, *((share_text if share else value_text)(part) for part in parts))))
     rows.append(Row(("cases that failed", *(str(one["figures"][ALL]["failed"]) for one in entries.values()))))
     count = plural(len(values["cases"]["diagnosis"]), "case")
     heads = tuple((name, "", "figure pair") for name in entries)
     return Table((("Figure", "", "text"), *heads), tuple(rows), f"Diagnoses, {count}, synthetic.")
 
 
-def _estimate(told: Mapping[str, Any]) -> str:
+def value_text(told: Mapping[str, Any]) -> str:
+    """A figure with its interval."""
     if told["value"] is None:
         return MISSING
     if told["low"] is None:
@@ -161,7 +162,8 @@ def _estimate(told: Mapping[str, Any]) -> str:
     return f"{number(told['value'], 2)} ({number(told['low'], 2)} … {number(told['high'], 2)})"
 
 
-def _share(told: Mapping[str, Any]) -> str:
+def share_text(told: Mapping[str, Any]) -> str:
+    """Hits of cases, with the share's interval."""
     if told["value"] is None:
         return MISSING
     hits = round(told["value"] * told["n"])

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from sklearn.compose import TransformedTargetRegressor
 from sklearn.ensemble import HistGradientBoostingRegressor, RandomForestRegressor
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import LinearRegression
 from sklearn.neural_network import MLPRegressor
+from sklearn.pipeline import make_pipeline
+from sklearn.preprocessing import StandardScaler
 from sklearn.svm import SVR
 
 from fogml.models.regressors import parameter_count, weight_bytes
@@ -44,3 +47,10 @@ def test_boosting_is_as_large_as_its_trees() -> None:
     assert nodes <= parameter_count(large) < nodes + 20
     size = large._predictors[0][0].nodes.itemsize
     assert weight_bytes(large) - weight_bytes(small) == size * (nodes - len(small._predictors[0][0].nodes))
+
+
+def test_a_pipeline_is_as_large_as_what_it_is_made_of() -> None:
+    inside = make_pipeline(StandardScaler(), LinearRegression())
+    wrapped = TransformedTargetRegressor(inside, transformer=StandardScaler()).fit(X, Y)
+    assert parameter_count(wrapped) == parameter_count(LinearRegression().fit(X, Y)) == 3 + 1
+    assert weight_bytes(wrapped) == 8 * (3 + 1)

@@ -1,0 +1,1 @@
+"""Ways to diagnose beside each other, on the same blind cases."""
