@@ -222,9 +222,12 @@ class LoggerEffect(Effect):
 
 
 class ThermalEffect(Effect):
-    """Changes what the plant does; in a replay its signature is what sensors don't show."""
+    """Changes what the plant does; in a replay its signature is what sensors don't show, if anything."""
 
     stage: ClassVar[Stage] = "thermal"
+
+    def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
+        return np.zeros(len(inputs))
 
     def change_chamber(
         self, chamber: FloatArray, inputs: Inputs, amplitude: float, **shape: float

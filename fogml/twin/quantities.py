@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -13,7 +13,8 @@ from fogml.intervals import Z90
 
 Grade = Literal["tactical", "navigation"]
 GRADES: tuple[Grade, ...] = ("tactical", "navigation")
-# A grade's range is read as the central 90 % of a log-normal or normal law.
+Range = tuple[float, float]
+"""Low and high; the usual one of a grade is read as the central 90 % of a log-normal or normal law."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,10 @@ class Quantity:
 
     name: str
     unit: str
-    tactical: tuple[float, float]
-    navigation: tuple[float, float]
+    tactical: Range
+    navigation: Range
     meaning: str = ""
-    limits: tuple[float, float] = (-math.inf, math.inf)
+    limits: Range = (-math.inf, math.inf)
     signed: bool = False
     default: float | None = None
     whole: bool = False
@@ -99,6 +100,28 @@ class Quantity:
                 f"it lies between {low:g} and {with_unit(high, self.unit)}"
             )
         return float(value)
+
+
+def unsigned(
+    unit: str, tactical: Range, navigation: Range, meaning: str, most: float, **more: Any
+) -> Quantity:
+    """The amplitude of an effect that has a size alone, from 0 to `most`."""
+    return Quantity("amplitude", unit, tactical, navigation, meaning, (0.0, most), **more)
+
+
+def signed(unit: str, tactical: Range, navigation: Range, meaning: str, most: float, **more: Any) -> Quantity:
+    """The amplitude of an effect of either sign, up to `most` in size."""
+    return Quantity("amplitude", unit, tactical, navigation, meaning, (-most, most), signed=True, **more)
+
+
+def shared(name: str, unit: str, usual: Range, meaning: str, limits: Range, **more: Any) -> Quantity:
+    """A quantity whose usual range is that of either grade."""
+    return Quantity(name, unit, usual, usual, meaning, limits, **more)
+
+
+def phase(name: str, meaning: str) -> Quantity:
+    """An angle [deg] of which none is more usual than others; 0 unless stated."""
+    return shared(name, "deg", (0.0, 360.0), meaning, (-720.0, 720.0), default=0.0)
 
 
 def with_unit(value: float, unit: str) -> str:

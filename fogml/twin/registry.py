@@ -1,7 +1,7 @@
 """The catalogue's index: built-in effects, those of outside packages, and any registered by hand.
 
-A module of ``fogml.twin.effects`` holds the effect that it is named after, as a class named in
-CamelCase; it is found by being there. Another package adds its effects by the entry point group
+A module of ``fogml.twin.effects`` holds the effects of one subject, each a class that is named as its id, in
+CamelCase; they are found by being there. Another package adds its effects by the entry point group
 ``fogml.effects``, each naming a class or an object.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 import difflib
 import pkgutil
 import re
+from collections.abc import Iterator
 from importlib import import_module
 from importlib.metadata import entry_points
 from inspect import isabstract
@@ -98,8 +99,8 @@ def _discover() -> None:
         return
     found = dict(_catalogue)
     try:
-        for module in _modules():
-            _add(_built_in(module), f"fogml.twin.effects.{module}")
+        for declared in _built_in():
+            _add(declared, declared.__module__)
         for point in entry_points(group=GROUP):
             origin = f"entry point '{point.name}' of {point.dist.name if point.dist else 'a package'}"
             try:
@@ -114,22 +115,15 @@ def _discover() -> None:
     _discovered = True
 
 
-def _modules() -> list[str]:
+def _built_in() -> Iterator[type[Effect]]:
+    """The classes of effects in the modules of the catalogue."""
     package = import_module("fogml.twin.effects")
-    return [
-        module.name for module in pkgutil.iter_modules(package.__path__) if not module.name.startswith("_")
-    ]
-
-
-def _built_in(module: str) -> type[Effect]:
-    found: type[Effect] | None = getattr(
-        import_module(f"fogml.twin.effects.{module}"), class_name(module), None
-    )
-    if found is None or found.id != module:
-        raise InputError(
-            f"fogml/twin/effects/{module}.py must hold class {class_name(module)} with id '{module}'"
-        )
-    return found
+    for found in pkgutil.iter_modules(package.__path__):
+        module = import_module(f"{package.__name__}.{found.name}")
+        for declared in vars(module).values():
+            own = isinstance(declared, type) and declared.__module__ == module.__name__
+            if own and issubclass(declared, Effect):
+                yield declared
 
 
 def _add(declared: Any, origin: str) -> None:

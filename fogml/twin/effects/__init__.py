@@ -1,1 +1,1 @@
-"""The catalogue: one module per effect."""
+"""The catalogue: each file holds the effects of one subject."""
