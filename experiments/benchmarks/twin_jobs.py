@@ -97,10 +97,10 @@ _EARTH = 15.041067 * math.sin(math.radians(39.9))
 
 def _shared_part(quick: bool, folder: Path) -> Work:
     from fogml.twin.simulate import simulate
-    from fogml.twin.timeline import timeline
+    from fogml.twin.timeline import Timeline
 
     programme, twin = _programme(), _shared()
-    clock = timeline(programme, 20.0 if quick else 1.0)
+    clock = Timeline(programme, 20.0 if quick else 1.0)
 
     def ours() -> FloatArray:
         return simulate(programme, twin, sample_s=clock.sample_s, columns=_COLUMNS).run.gyro
@@ -118,7 +118,7 @@ def _shared_part(quick: bool, folder: Path) -> Work:
 
 def _every_effect(samples: int, quick_samples: int, quick: bool) -> Work:
     from fogml.twin.simulate import simulate
-    from fogml.twin.timeline import timeline
+    from fogml.twin.timeline import Timeline
 
     programme, count = _programme(), quick_samples if quick else samples
     sample_s = programme.total_s / count
@@ -132,7 +132,7 @@ def _every_effect(samples: int, quick_samples: int, quick: bool) -> Work:
         import time
 
         begin = time.perf_counter()
-        _loop(shared, timeline(programme, programme.total_s / looped), looped)
+        _loop(shared, Timeline(programme, programme.total_s / looped), looped)
         return Timed((time.perf_counter() - begin) * count / looped, count)
 
     def check(a: int, b: int) -> str:

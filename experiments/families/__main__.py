@@ -24,10 +24,10 @@ from scipy.special import expit
 from experiments.gap_blind.__main__ import answered_marks, same_twin, twin_lines
 from experiments.results import write_results
 from fogml.blind.folders import DIAGNOSIS, BlindFolder, read_json
-from fogml.blind.realities import SAME_TWIN
+from fogml.blind.plan import SAME_TWIN
 from fogml.blind.scoring.by_reality import by_reality
 from fogml.blind.scoring.marks import Mark
-from fogml.report.blind_words import figure_text, wanted_text
+from fogml.report.blind_tables import figure_text, wanted_text
 from fogml.report.words import MISSING, plural
 
 HERE = Path(__file__).parent

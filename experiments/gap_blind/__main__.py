@@ -18,7 +18,7 @@ from typing import Any
 
 from fogml.blind.folders import DIAGNOSIS, OUTCOME, BlindFolder
 from fogml.blind.methods import BASELINES
-from fogml.blind.realities import SAME_TWIN
+from fogml.blind.plan import SAME_TWIN
 from fogml.blind.score import gather, marks_of
 from fogml.blind.scoring.by_reality import ALL, by_form, by_reality
 from fogml.blind.scoring.marks import Mark
@@ -30,8 +30,8 @@ from fogml.cli.blind import MakeSettings, RunSettings
 from fogml.cli.blind_job import make_and_tell, run_and_tell
 from fogml.cli.terminal import Terminal
 from fogml.outputs import whole_file
-from fogml.report.blind_words import figure_text, value_text, wanted_text
-from fogml.report.error_rates import ERROR_RATES, error_rates
+from fogml.report.blind_tables import figure_text, value_text, wanted_text
+from fogml.report.gap_tiles import ERROR_RATES, error_rates
 from fogml.report.words import MISSING, plural
 from fogml.yaml_text import read_yaml
 

@@ -25,10 +25,10 @@ import numpy as np
 from experiments.results import write_results
 from fogml import __version__
 from fogml.blind.case import recorded_run
-from fogml.blind.first.catalogue import REALITY
 from fogml.blind.first.effects.coil import WarmupStretched
 from fogml.blind.first.effects.electrical import PolarisationChirped
 from fogml.blind.first.effects.memory import HysteresisPreisach
+from fogml.blind.first.reality import REALITY
 from fogml.blind.frame.form import Form
 from fogml.blind.frame.strength import Acting
 from fogml.blind.plan import Plan

@@ -13,7 +13,7 @@ from fogml.lab.forms import multipoint_form
 from fogml.models.names import make_model
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.averages import block_averages
-from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 

@@ -6,16 +6,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from fogml.benchmark.rounds import TrackFolder
-from fogml.blind.folders import OUTCOME
+from fogml.blind.folders import OUTCOME, check_sums
 from fogml.blind.score import marks_of
 from fogml.blind.scoring.answers import NAMED, read_answer
-from fogml.blind.scoring.by_reality import each_kept, false_names, mass_on_true, within_one
+from fogml.blind.scoring.by_reality import each_kept, mass_on_true, within_one
 from fogml.blind.scoring.marks import Mark
 from fogml.blind.scoring.statistics import Estimate, mean, median, proportion
-from fogml.blind.sums import check_sums
+from fogml.blind.scoring.table import case_ratio, false_names, pooled
 from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 
@@ -33,7 +31,7 @@ def _mass(marks: Sequence[Mark]) -> Estimate:
 
 FIGURES: dict[str, tuple[str, Callable[[Sequence[Mark]], Estimate]]] = {
     "found": ("known causes that are named, by class", each_kept),
-    "false": ("named causes that are false", false_names),
+    "false": ("named causes that are false", pooled(false_names)),
     "unknown": (
         "cases with an unknown cause: told as unknown, no wrong name",
         lambda marks: proportion([_told_unknown(m) for m in marks if m.truth.unknown]),
@@ -43,10 +41,7 @@ FIGURES: dict[str, tuple[str, Callable[[Sequence[Mark]], Estimate]]] = {
         lambda marks: proportion([not m.wrong_name for m in marks if not m.truth.effects]),
     ),
     "mass_on_true": ("mean probability on the true cause, one cause (as DX 2025)", _mass),
-    "closed": (
-        "closed over what the true causes close (median)",
-        lambda marks: median([float(np.mean(m.closed_ratios)) for m in marks if m.closed_ratios]),
-    ),
+    "closed": ("closed over what the true causes close (median)", case_ratio),
     "seconds": ("time per case [s] (median)", lambda marks: median([m.seconds for m in marks if m.seconds])),
 }
 """Words and measure of each figure."""

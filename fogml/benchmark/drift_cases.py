@@ -12,7 +12,7 @@ import numpy as np
 from fogml.benchmark.rounds import RoundDesign
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.make import make_cases
-from fogml.blind.realities import MIX
+from fogml.blind.plan import MIX
 from fogml.blind.truth import read_truth
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run

@@ -25,9 +25,9 @@ from fogml.benchmark.rounds import (
 )
 from fogml.blind.folders import BlindFolder
 from fogml.blind.make import make_cases
-from fogml.blind.realities import MIX
+from fogml.blind.plan import MIX
+from fogml.blind.relatives import leave_out_relatives
 from fogml.blind.truth import read_truth
-from fogml.blind.without import leave_out_relatives
 from fogml.errors import InputError
 from fogml.json_files import write_json
 from fogml.outputs import scratch_folder, whole_folder

@@ -15,8 +15,7 @@ from fogml.blind.frame.reckoning import AVERAGING_S, Reckoning, recorded_output
 from fogml.blind.frame.record import FloatArray, World
 from fogml.blind.frame.strength import Acting, Scales, TooWeak, recorded
 from fogml.blind.frame.unit import Unit, UnitRun
-from fogml.blind.plan import Plan, Strata
-from fogml.blind.realities import reality
+from fogml.blind.plan import Plan, Strata, reality
 from fogml.blind.truth import Amount, Runs, Segment, TrueClosed, TrueEffect, Truth, write_truth
 from fogml.outputs import whole_folder
 from fogml.runs.facts import Facts, Heading

@@ -6,10 +6,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
 
-from fogml.blind.folders import BlindFolder
-from fogml.blind.plan import Plan, Strata, plans
-from fogml.blind.realities import FIRST, SAME_TWIN
-from fogml.blind.sums import write_sums
+from fogml.blind.folders import BlindFolder, write_sums
+from fogml.blind.plan import FIRST, SAME_TWIN, Plan, Strata, plans
 from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 from fogml.processes import in_processes

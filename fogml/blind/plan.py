@@ -4,12 +4,45 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from importlib import import_module
 
 import numpy as np
 
-from fogml.blind.realities import FIRST, SAME_TWIN, chosen, reality
+from fogml.blind.frame.reality import Reality
 from fogml.blind.truth import KINDS, Kind
 from fogml.errors import InputError
+
+FIRST = "first"
+"""What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
+MIX = "mix"
+"""All of them in turn, case by case."""
+SAME_TWIN = "same-twin"
+"""No reality: a shipped twin's own runs, to be diagnosed against it."""
+REALITIES = (FIRST, "second", "third")
+"""Their names, each that of a package beside this module."""
+
+
+def reality(name: str) -> Reality:
+    """The reality of a name of `REALITIES`."""
+    found: Reality = import_module(f"fogml.blind.{name}.reality").REALITY
+    return found
+
+
+def chosen(name: str) -> tuple[str, ...]:
+    """Names of the realities that a choice means.
+
+    Raises
+    ------
+    InputError
+        If there is no such choice.
+    """
+    if name == MIX:
+        return REALITIES
+    if name not in (*REALITIES, SAME_TWIN):
+        choices = ", ".join((*REALITIES, MIX, SAME_TWIN))
+        raise InputError(f"there is no reality '{name}'; choose one of {choices}")
+    return (name,)
+
 
 PER_BLOCK: dict[Kind, int] = {
     "nothing": 3,

@@ -1,22 +1,26 @@
-"""Which effects of the library can't be told from a withheld one in the runs of a case.
+"""How like the library's effects are to the true ones of a case: relatives to leave out, distances of form.
 
-An effect is a relative where its signature, best-fitted over its shape parameters, has ``|cosine| >
-0.95`` with the withheld effect's true contribution, both whitened by the true noise and with what
-the nominal constants can make up for taken out.
+Realities know no library, so these are steps of their own; no form is taken or left for what is measured. An
+effect is a relative where its signature, best-fitted over its shape parameters, has ``|cosine| > 0.95`` with
+the withheld effect's true contribution, both whitened by the true noise and with what the nominal constants
+can make up for taken out.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache, cached_property
+from functools import cache, cached_property, partial
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
 
-from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.folders import BlindFolder, case_files, read_json, write_sums
 from fogml.blind.signatures import Atom, Stack, atoms, free_shape
-from fogml.blind.truth import Truth, read_contributions
+from fogml.blind.truth import Truth, read_contributions, read_truth, write_truth
+from fogml.outputs import whole_file
+from fogml.processes import in_processes
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 
@@ -141,3 +145,86 @@ def relatives_of(folder: BlindFolder, truth: Truth) -> Callable[[str], bool] | N
         return likeness().cosine(id) > ALIKE
 
     return relative
+
+
+OPTIONS = "options.json"
+RELATIVES = "relatives"
+
+
+def leave_out_relatives(
+    folder: BlindFolder, workers: int = 1, progress: Callable[[int, int], None] | None = None
+) -> int:
+    """Add relatives of left-out effects to every case's ``without``; returns how many cases were changed.
+
+    Cases that were seen before are left as they are.
+    """
+    names = [name for name in folder.names() if _is_open(folder, name)]
+    changed = 0
+    for done, more in enumerate(in_processes(partial(_leave_out, folder), names, workers), 1):
+        changed += bool(more)
+        if progress:
+            progress(done, len(names))
+    return changed
+
+
+def _is_open(folder: BlindFolder, name: str) -> bool:
+    """Whether something is left out of a case, and its relatives not yet."""
+    options = read_json(folder.cases / name / OPTIONS)
+    return bool(options.get("without")) and RELATIVES not in options
+
+
+def _leave_out(folder: BlindFolder, name: str) -> list[str]:
+    from fogml.twin.registry import effects
+
+    truth = Truth.model_validate(read_json(folder.truth / f"{name}.json"))
+    relative = relatives_of(folder, truth)
+    known = {e.id for e in truth.known}
+    found = [
+        id
+        for id, declared in effects().items()
+        if declared.candidate
+        and relative is not None
+        and id not in truth.left_out
+        and id not in known
+        and relative(id)
+    ]
+    path = folder.cases / name / OPTIONS
+    options = read_json(path)
+    options |= {"without": [*options["without"], *found], RELATIVES: found}
+    with whole_file(path) as beside:
+        beside.write_text(json.dumps(options) + "\n", encoding="utf-8")
+    return found
+
+
+def measure_forms(
+    folder: BlindFolder, workers: int = 1, progress: Callable[[int, int], None] | None = None
+) -> int:
+    """Write the cosine of every effect of the library into its truth; returns how many cases were measured.
+
+    Cases that were measured before are left as they are. The truths are hashed anew.
+    """
+    paths = [folder.truth / f"{name}.json" for name in folder.names()]
+    open_ = [path for path in paths if _unmeasured(read_truth(path))]
+    for done, _ in enumerate(in_processes(partial(_measure, folder), open_, workers), 1):
+        if progress:
+            progress(done, len(open_))
+    if open_:
+        write_sums(folder.truth)
+    return len(open_)
+
+
+def _unmeasured(truth: Truth) -> bool:
+    return any(effect.id is not None and effect.cosine is None for effect in truth.effects)
+
+
+def _measure(folder: BlindFolder, path: Path) -> None:
+    truth = read_truth(path)
+    given = read_contributions(path.with_suffix(".npz"))
+    runs = case_files(folder.cases / truth.case).fit
+    contributions = [[given[run.name, place] for run in runs] for place in range(len(truth.effects))]
+    likeness = Likeness(runs, contributions, truth.noise_model, truth.nominal)
+    effects = tuple(
+        effect if effect.id is None else effect.model_copy(update={"cosine": likeness.cosine(effect.id, of)})
+        for of, effect in enumerate(truth.effects)
+    )
+    write_truth(folder.truth, truth.model_copy(update={"effects": effects}), given)

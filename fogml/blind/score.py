@@ -8,7 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from fogml.blind.folders import BlindFolder
+from fogml.blind.folders import SUMS, BlindFolder, check_sums
 from fogml.blind.relatives import relatives_of
 from fogml.blind.run import Progress
 from fogml.blind.scoring.answers import read_answer
@@ -17,7 +17,6 @@ from fogml.blind.scoring.marks_file import Marks, part_of
 from fogml.blind.scoring.table import BY_KEY
 from fogml.blind.scoring.values import score_values
 from fogml.blind.seeds import check_use
-from fogml.blind.sums import SUMS, check_sums
 from fogml.blind.truth import Truth, read_truth
 from fogml.errors import InputError
 from fogml.processes import in_processes

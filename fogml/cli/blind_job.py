@@ -45,7 +45,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
             d_prime=settings.bounds,
         )
     if not settings.relatives_stay:
-        from fogml.blind.without import leave_out_relatives
+        from fogml.blind.relatives import leave_out_relatives
 
         with terminal.work("leaving out relatives") as work:
             leave_out_relatives(
@@ -53,7 +53,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
                 settings.workers,
                 lambda done, total: work.reached(done, total, f"relatives of {done} of {total}"),
             )
-    from fogml.blind.form_distance import measure_forms
+    from fogml.blind.relatives import measure_forms
 
     with terminal.work("measuring forms") as work:
         measure_forms(
@@ -73,8 +73,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
 def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
     """Answer cases by each method, and say how many failed."""
     from fogml.blind.methods import BASELINES, ORACLE
-    from fogml.blind.oracle_run import run_oracle
-    from fogml.blind.run import RunPlan, run_cases
+    from fogml.blind.run import RunPlan, run_cases, run_oracle
 
     methods = [m for name in settings.methods for m in (BASELINES if name == _BASELINES else (name,))]
     if len(methods) > 1 and settings.name:
@@ -115,7 +114,7 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
     """Score a suite, write ``score.json``, its page and its marks; whether every gate is met."""
     from fogml.blind.score import gate, gather
     from fogml.blind.scoring.values import score_values
-    from fogml.report.blind_words import headline
+    from fogml.report.blind_tables import headline
 
     folder = settings.folder()
     methods = settings.methods or list(folder.methods())
@@ -139,9 +138,9 @@ def score_and_write(settings: ScoreSettings, terminal: Terminal) -> bool:
 
 def merge_and_write(settings: MergeSettings, terminal: Terminal) -> None:
     """Score the parts of a suite as one, write ``score.json``, its page and its marks."""
-    from fogml.blind.scoring.merging import merged
+    from fogml.blind.scoring.marks_file import merged
     from fogml.blind.scoring.values import score_values
-    from fogml.report.blind_words import headline
+    from fogml.report.blind_tables import headline
 
     if not settings.out:
         raise InputError("nothing is given for 'out'; name a folder for the score: --out DIR")
@@ -171,8 +170,7 @@ def _tell(out: Path, values: dict[str, Any], judged: str, terminal: Terminal) ->
 
 
 def _print(values: dict[str, Any], method: str, terminal: Terminal) -> None:
-    from fogml.report.blind_realities import by_reality_table
-    from fogml.report.blind_words import figure_text, wanted_text
+    from fogml.report.blind_tables import by_reality_table, figure_text, wanted_text
 
     wanted = by_reality_table(values["methods"][method]["by_reality"])
     terminal.table(

@@ -19,7 +19,7 @@ def draw_reports(folder: BlindFolder, worst: list[dict[str, Any]], seed: int, te
     from fogml.blind.run import RunPlan, run_cases
 
     names = tuple(case["case"] for case in worst if case["verdict"] != "failed")
-    method = "fogml.report.blind_answer:diagnosis_with_page"
+    method = "fogml.report.gap_page:diagnosis_with_page"
     reports = folder.path / _REPORTS
     for name in names:
         held, answer = (place / name / "gap.json" for place in (reports, folder.answers()))

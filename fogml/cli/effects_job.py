@@ -28,7 +28,7 @@ def show_effects(settings: EffectsSettings, terminal: Terminal) -> None:
 def _catalogue(out: str | None, terminal: Terminal) -> None:
     found = effects()
     if out is not None:
-        from fogml.report.catalogue_page import catalogue_page
+        from fogml.report.effect_card import catalogue_page
         from fogml.twin.card import card_values
         from fogml.twin.pictures import allan_curve, pictures, rate_curves
 
@@ -114,7 +114,7 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
 
 
 def _print_pictures(id: str, terminal: Terminal) -> None:
-    from fogml.report.braille import braille
+    from fogml.report.static_svg import braille
     from fogml.twin.pictures import pictures
 
     declared = effect(id)

@@ -33,8 +33,8 @@ def batch_of(units: Sequence[Mapping[str, Any]], home: Path) -> dict[str, Any] |
 
 def write_batch(batch: Mapping[str, Any], folder: Path, name: str) -> None:
     """Write batch.json, batch.html and batch.xlsx into a folder."""
-    from fogml.report.acceptance_spreadsheet import batch_spreadsheet
-    from fogml.report.batch_page import batch_page
+    from fogml.report.acceptance_page import batch_page
+    from fogml.report.spreadsheets import batch_spreadsheet
 
     write_json(folder / "batch.json", batch)
     (folder / "batch.html").write_text(batch_page(batch, name), encoding="utf-8")

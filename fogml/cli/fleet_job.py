@@ -28,7 +28,7 @@ _SHOWN = 40
 def fleet_and_write(settings: FleetSettings, terminal: Terminal) -> bool:
     """Do every unit's job, write the fleet's results, print them; whether all are done and meet limits."""
     from fogml.report.fleet_page import fleet_page
-    from fogml.report.fleet_spreadsheet import fleet_spreadsheet
+    from fogml.report.spreadsheets import fleet_spreadsheet
 
     if settings.manifest is None:
         raise InputError("no manifest is given; name a CSV or YAML file of units")

@@ -76,7 +76,7 @@ def write_report(
         return acceptance_page(values)
 
     def sheets(values: dict[str, Any], path: Path) -> None:
-        from fogml.report.acceptance_spreadsheet import acceptance_spreadsheet
+        from fogml.report.spreadsheets import acceptance_spreadsheet
 
         acceptance_spreadsheet(values, path)
 

@@ -24,12 +24,12 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
         return batch_json(read_reports(settings.reports), home)
 
     def page(values: dict[str, Any]) -> str:
-        from fogml.report.batch_page import batch_page
+        from fogml.report.acceptance_page import batch_page
 
         return batch_page(values, settings.title)
 
     def sheets(values: dict[str, Any], path: Path) -> None:
-        from fogml.report.acceptance_spreadsheet import batch_spreadsheet
+        from fogml.report.spreadsheets import batch_spreadsheet
 
         batch_spreadsheet(values, path)
 
@@ -41,8 +41,7 @@ def batch_and_write(settings: BatchSettings, terminal: Terminal) -> bool:
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.acceptance_page import limit_words
-    from fogml.report.batch_page import verdict_sentences
+    from fogml.report.acceptance_page import limit_words, verdict_sentences
 
     rows = [
         [

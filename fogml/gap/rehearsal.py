@@ -23,7 +23,7 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.noise import NoiseConstants
-from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.registry import effect
 from fogml.twin.set_up import Sensors
 from fogml.twin.simulate import DEFAULT_FACTS

@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from fogml.benchmark.diagnosis_score import FIGURES
 from fogml.benchmark.drift_score import ALL
 from fogml.report import style
-from fogml.report.axes import log_axis
 from fogml.report.page import Drawing, render
+from fogml.report.style import log_axis
 from fogml.report.tables import Column, Row, Table
 from fogml.report.words import MISSING, number, percent, plural
 

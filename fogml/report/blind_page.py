@@ -5,8 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fogml.report.blind_realities import by_form_table, by_reality_table, reality_words
-from fogml.report.blind_words import figure_text, headline, kind_words, value_text, wanted_text
+from fogml.report.blind_tables import (
+    by_form_table,
+    by_reality_table,
+    figure_text,
+    headline,
+    kind_words,
+    reality_words,
+    value_text,
+    wanted_text,
+)
 from fogml.report.figures_blind import confusion_plot, open_set_plot, reliability_plot, strata_plot
 from fogml.report.page import render
 from fogml.report.tables import Row, Table

@@ -11,10 +11,10 @@ from markupsafe import Markup
 
 from fogml.intervals import Z90
 from fogml.report import style
-from fogml.report.axes import time_unit
 from fogml.report.page import render
 from fogml.report.reduce import drawn
 from fogml.report.static_svg import Curve, line_figure
+from fogml.report.style import time_unit
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import (
     advice_words,

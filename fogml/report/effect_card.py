@@ -1,4 +1,4 @@
-"""The page of one effect: equation, ranges, look-alikes, and its signature on standard programmes."""
+"""The page of one effect, with its signature on standard programmes, and that of the whole catalogue."""
 
 from __future__ import annotations
 
@@ -180,3 +180,66 @@ def _range(quantity: Mapping[str, Any], grade: str) -> str:
     low, high = quantity[grade]
     sign = "± " if quantity["signed"] else ""
     return sign + (number(low) if low == high else f"{number(low)} … {number(high)}")
+
+
+STAGE_WORDS = {
+    "thermal": "Thermal plant",
+    "rig": "Rig: the rate that is there",
+    "bias": "Bias",
+    "scale_factor": "Scale factor",
+    "loop": "Closed loop",
+    "readout": "Read-out",
+    "sensor": "Temperature sensors",
+    "logger": "Logger",
+    "noise": "Random errors",
+}
+
+OVER_RATE = ("loop", "readout")
+"""Stages whose effects are shown over the rate too, as those are whose scale factor goes with it."""
+Drawn = tuple[Mapping[str, Any], Picture, Sequence[RateCurve], AllanCurve | None]
+"""Card of schema ``fogml.effect/1`` of an effect, its picture, its curves over the rate, and a noise's Allan
+deviation."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """An effect as the catalogue shows it."""
+
+    card: Mapping[str, Any]
+    quantities: Table
+    figure: Markup
+    programme: str
+    words: str
+    curves: list[Markup]
+    allan: Markup
+    about: list[tuple[str, str]]
+
+
+def catalogue_page(cards: Sequence[Drawn]) -> str:
+    """The self-contained HTML page of all effects.
+
+    Parameters
+    ----------
+    cards
+        What is shown of each effect, in the order of the catalogue.
+    """
+    stages: dict[str, list[Entry]] = {stage: [] for stage in STAGE_WORDS}
+    for card, picture, curves, allan in cards:
+        drawn = panel(card, picture)
+        over_rate = card["stage"] in OVER_RATE or (
+            card["stage"] == "scale_factor" and "rate" in card["needs"]
+        )
+        entry = Entry(
+            card=card,
+            quantities=quantities_table(card),
+            figure=drawn.signature if drawn.shows else Markup(""),
+            programme=picture.programme,
+            words=drawn.words,
+            curves=[rate_figure(curve) for curve in curves if over_rate],
+            allan=allan_figure(allan),
+            about=about(card),
+        )
+        stages[card["stage"]].append(entry)
+    shown = [(stage, STAGE_WORDS[stage], entries) for stage, entries in stages.items() if entries]
+    warm = f"{RATE_DEGC:g} degC"
+    return render("catalogue.html", title="Catalogue of effects", count=len(cards), stages=shown, warm=warm)

@@ -8,9 +8,9 @@ import plotly.graph_objects as go
 
 from fogml.gap.where_result import Share, TemperatureExcess, TimescaleExcess
 from fogml.report import style
-from fogml.report.axes import log_axis
 from fogml.report.page import Drawing
 from fogml.report.shading import regime_word
+from fogml.report.style import log_axis
 from fogml.report.words import duration, listed, number, percent
 
 _STAGE_WORDS = {

@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.report import style
-from fogml.report.axes import log_axis, time_unit
 from fogml.report.page import Drawing
 from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.report.shading import in_order, regime_word, segments_of, shade
+from fogml.report.style import log_axis, time_unit
 from fogml.report.words import averages, number, percent
 from fogml.validation.results import AveragedSeries, RunJudgement
 

@@ -11,10 +11,10 @@ from plotly.subplots import make_subplots
 
 from fogml.intervals import Z90
 from fogml.report import style
-from fogml.report.axes import log_axis
 from fogml.report.figures_fleet import serial_axis
 from fogml.report.monitor_words import FIGURE_WORDS, onset_words, unit_label
 from fogml.report.page import Drawing
+from fogml.report.style import log_axis
 from fogml.report.words import plural
 
 _UNITS = {

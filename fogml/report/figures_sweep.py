@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.report import style
-from fogml.report.axes import log_axis
 from fogml.report.page import Drawing
+from fogml.report.style import log_axis
 from fogml.report.words import number, plural
 
 _COSTS = {"bytes": "weights [byte]", "operations": "operations per sample"}

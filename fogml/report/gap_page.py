@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
+from fogml.blind.folders import CaseFiles
+from fogml.blind.methods import diagnosis
 from fogml.gap.result import Diagnosis, RunSeries
-from fogml.report import (
-    figures_gap,
-    figures_gap_evidence,
-    figures_gap_where,
-    gap_tables,
-    gap_tables_ahead,
-)
-from fogml.report.error_rates import error_sentences
-from fogml.report.gap_tiles import headline_tiles, warnings
+from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables, gap_tables_ahead
+from fogml.report.gap_tiles import error_sentences, headline_tiles, warnings
 from fogml.report.gap_words import (
     headline,
     held_out_words,
@@ -234,3 +230,9 @@ def _notes(found: Diagnosis) -> list[str]:
         if s.note:
             by_note.setdefault(s.note, []).append(s.run)
     return [f"{listed(list(dict.fromkeys(runs)))}: {note}" for note, runs in by_note.items()]
+
+
+def diagnosis_with_page(case: CaseFiles, out: Path) -> None:
+    """Answer a case again, which gives the same numbers, and draw its report ``gap.html``."""
+    found = diagnosis(case, out)
+    (out / "gap.html").write_text(gap_page(found), encoding="utf-8")

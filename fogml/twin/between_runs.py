@@ -12,8 +12,8 @@ from fogml.errors import InputError
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.twin.inputs import REST
+from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import PlantState, ThermalNetwork
-from fogml.twin.plant.power import PowerWindows
 
 _ROWS = 600
 """Samples of a storage, the closer the sooner after the run before: every state fades by its own time."""

@@ -12,6 +12,7 @@ in the order of the catalogue. Noise is added to that, then comes the logger.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,9 @@ from fogml.twin.effect import (
 from fogml.twin.inputs import Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.nominal import bias_deg_h, scale_factor_ppm, temperature_slopes
+from fogml.twin.plant.heat import PowerWindows
+from fogml.twin.plant.network import AIR, PlantState
+from fogml.twin.timeline import TimelineBlock
 from fogml.twin.twin import EffectSetting, Twin
 
 Signature = Callable[[Effect, EffectSetting, Inputs], FloatArray]
@@ -211,3 +215,35 @@ def _falsified(
 def fresh(inputs: Inputs) -> Inputs:
     """The same samples with no memory of others and nothing worked out yet."""
     return replace(inputs, memory=Memory(), cache={})
+
+
+class Branch:
+    """Plant and chain of one twin, with what they remember."""
+
+    def __init__(self, twin: Twin) -> None:
+        self.twin = twin
+        self.network = twin.network
+        self.state = PlantState()
+        self.chamber_memory, self.memory = Memory(), Memory()
+
+    def go_on_from(self, before: Branch) -> None:
+        """Take over the states that another run of the same unit left."""
+        left = before.state, before.chamber_memory, before.memory
+        self.state, self.chamber_memory, self.memory = deepcopy(left)
+
+    def nodes(
+        self, block: TimelineBlock, drives: dict[str, FloatArray], clock_s: float, windows: PowerWindows
+    ) -> dict[str, FloatArray]:
+        """Temperature of every node at all samples of the block, on or off."""
+        chamber, time = block.set_point, clock_s + block.time
+        for declared, setting in self.twin.thermal:
+            inputs = Inputs(time, {AIR: chamber}, block.table_rate, drives=drives, memory=self.chamber_memory)
+            chamber = declared.change_chamber(chamber, inputs, setting.amplitude, **setting.shape)
+        return self.network.temperatures(
+            time,
+            chamber,
+            powered=windows,
+            fan=block.fan,
+            table_rate=block.table_rate,
+            state=self.state,
+        )

@@ -16,7 +16,7 @@ D. M. Shupe, Applied Optics 19 (1980) 654. N. J. Frigo, SPIE 412 (1983) 268, for
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
@@ -92,71 +92,56 @@ def winding_order(winding: Winding, layers: int = 32) -> NDArray[np.int64]:
     return np.concatenate([number[first][::-1], number[~first]])
 
 
-def layer_weights(winding: Winding, layers: int = 32, coil: Coil = REFERENCE_COIL) -> FloatArray:
+def layer_weights(coil: Coil = REFERENCE_COIL) -> FloatArray:
     """Rate error [deg/h] per degC/min of each layer, innermost first, shape (layers,); adds to 0.
 
     All layers hold the same length of fibre.
     """
-    edges = np.linspace(0.0, coil.length, layers + 1)
+    edges = np.linspace(0.0, coil.length, coil.layers + 1)
     # Integral of 2 z - L over each stretch of fibre.
     moments = np.diff(edges * edges) - coil.length * np.diff(edges)
     factor = coil.index * coil.phase_slope / (coil.length * coil.diameter) * _PER_MINUTE / DEG_H
-    weights = np.empty(layers)
-    weights[winding_order(winding, layers)] = factor * moments
+    weights = np.empty(coil.layers)
+    weights[winding_order(coil.winding, coil.layers)] = factor * moments
     return weights
 
 
-def radial_sensitivity(winding: Winding, layers: int = 32, coil: Coil = REFERENCE_COIL) -> float:
+def radial_sensitivity(coil: Coil = REFERENCE_COIL) -> float:
     """Rate error per degC/min of T_out - T_in [deg/h], for temperatures linear across the layers."""
-    return float(layer_weights(winding, layers, coil) @ np.linspace(0.0, 1.0, layers))
+    return float(layer_weights(coil) @ np.linspace(0.0, 1.0, coil.layers))
 
 
 @dataclass(frozen=True)
 class LayeredCoil:
     """A coil as layers that conduct heat radially from its outer and inner face.
 
-    Attributes
-    ----------
-    winding
-        How the fibre is wound.
-    layers
-        Number of layers; the first and the last one have the faces' temperatures.
-    pitch
-        Distance of neighbouring layers [m].
-    diffusivity
-        Of fibre and adhesive across the layers [m**2/s], 1e-7 to 3e-7.
-    coil
-        Its optics.
+    The first and the last layer have the faces' temperatures.
+
+    Raises
+    ------
+    InputError
+        If layers and winding don't fit together, or are fewer than 3.
     """
 
-    winding: Winding = "quadrupole"
-    layers: int = 32
-    pitch: float = 0.25e-3
-    diffusivity: float = 2e-7
-    coil: Coil = field(default_factory=Coil)
+    coil: Coil = REFERENCE_COIL
 
     def __post_init__(self) -> None:
-        winding_order(self.winding, self.layers)
-        if self.layers < 3 or not (self.pitch > 0.0 and self.diffusivity > 0.0):
-            raise InputError("a layered coil has at least 3 layers, a pitch and a diffusivity above 0")
-
-    @classmethod
-    def of(cls, coil: Coil) -> LayeredCoil:
-        """A unit's coil, wound as its facts say."""
-        return cls(coil.winding, coil.layers, coil.pitch, coil.diffusivity, coil)
+        winding_order(self.coil.winding, self.coil.layers)
+        if self.coil.layers < 3:
+            raise InputError("a layered coil has at least 3 layers")
 
     @property
     def settling_s(self) -> float:
         """Time constant of the slowest change of the profile h**2 / (pi**2 kappa) [s]."""
-        height = self.pitch * (self.layers - 1)
-        return height * height / (np.pi**2 * self.diffusivity)
+        height = self.coil.pitch * (self.coil.layers - 1)
+        return height * height / (np.pi**2 * self.coil.diffusivity)
 
     @cached_property
     def network(self) -> ThermalNetwork:
         """The layers between the faces ``T_in`` and ``T_out`` as a heat network."""
-        inner = [f"layer_{number}" for number in range(2, self.layers)]
+        inner = [f"layer_{number}" for number in range(2, self.coil.layers)]
         chain = ["T_in", *inner, "T_out"]
-        conductance = self.diffusivity / self.pitch**2
+        conductance = self.coil.diffusivity / self.coil.pitch**2
         return ThermalNetwork(dict.fromkeys(inner, 1.0), dict.fromkeys(pairwise(chain), conductance))
 
     def temperatures(
@@ -184,15 +169,4 @@ class LayeredCoil:
 
         Its rate per minute is the error: the layers' temperatures with the winding's weights.
         """
-        weights = layer_weights(self.winding, self.layers, self.coil)
-        return np.asarray(self.temperatures(time, inner, outer, state) @ weights)
-
-    def drift(self, time: FloatArray, inner: FloatArray, outer: FloatArray) -> FloatArray:
-        """Rate error of the winding [deg/h], shape (n,); parameters as in `temperatures`.
-
-        The mean over each step, 0 at the first sample.
-        """
-        weighted = self.travelled(time, inner, outer)
-        drift = np.zeros(len(time))
-        drift[1:] = 60.0 * np.diff(weighted) / np.diff(time)
-        return drift
+        return np.asarray(self.temperatures(time, inner, outer, state) @ layer_weights(self.coil))

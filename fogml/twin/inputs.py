@@ -15,9 +15,8 @@ from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.sample_means import mean_cosine, with_whole_turns
 from fogml.twin.attitude import Attitude, attitude, earth_rate, turned
-from fogml.twin.light import Light
 from fogml.twin.memory import Memory
-from fogml.twin.optics import REFERENCE_COIL, Coil
+from fogml.twin.optics import REFERENCE_COIL, Coil, Light
 
 REST = {
     "power": 0.0,

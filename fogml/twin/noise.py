@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import zlib
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 
 import numpy as np
@@ -57,27 +56,6 @@ class NoiseConstants:
     def as_dict(self) -> dict[str, float]:
         """The coefficients by name."""
         return asdict(self)
-
-    def with_effects(self, amplitudes: Mapping[str, float]) -> NoiseConstants:
-        """The coefficients with those of independent sources, by the ids of `TERM_EFFECTS`, on top."""
-        total = self.as_dict()
-        for id, name in TERM_EFFECTS.items():
-            if name == "R":
-                total[name] += amplitudes.get(id, 0.0)
-            else:
-                total[name] = math.hypot(total[name], amplitudes.get(id, 0.0))
-        return NoiseConstants(**total)
-
-    def allan_variance(self, taus_s: FloatArray) -> FloatArray:
-        """Expected Allan variance [(deg/h)^2] at averaging times [s], shape (m,)."""
-        hours = taus_s / 3600.0
-        return np.asarray(
-            3.0 * (self.Q * URAD_S_IN_DEG_H / taus_s) ** 2
-            + self.N**2 / hours
-            + 2.0 * math.log(2.0) / math.pi * self.B**2
-            + self.K**2 * hours / 3.0
-            + (self.R * hours) ** 2 / 2.0
-        )
 
 
 TERM_EFFECTS = {

@@ -11,8 +11,10 @@ H. C. Lefevre, The Fiber-Optic Gyroscope, 2nd ed. (2014), for all of them.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Literal, TypeVar, get_args
+
+import numpy as np
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
@@ -109,20 +111,6 @@ class Coil:
         """Rate error of a closed loop that is one fringe (2 pi) off, lambda c / (L D) [deg/s]."""
         return math.degrees(2.0 * math.pi / self.sagnac_s)
 
-    def reset_rate_hz(self, rate_deg_h: float) -> float:
-        """2 pi resets per second of the closed loop's serrodyne, D Omega / (n lambda), at a rate [deg/h]."""
-        return self.diameter * rate_deg_h * DEG_H / (self.index * self.wavelength)
-
-
-def polarization_period(
-    length: float, wavelength: float = 1550e-9, birefringence_slope: float = 5e-7
-) -> float:
-    """Period in temperature [degC] of the beat of two polarisations over a length of fibre [m].
-
-    lambda / (L |dB/dT|) with the birefringence's slope dB/dT [1/K].
-    """
-    return wavelength / (length * abs(birefringence_slope))
-
 
 def relative_intensity_noise(
     line_width: float, wavelength: float = 1550e-9, spectrum: Spectrum = "gaussian"
@@ -215,3 +203,34 @@ def phase_noise_to_walk(density: _Power, coil: Coil) -> _Power:
 
 REFERENCE_COIL = Coil()
 """The coil of all worked numbers in the catalogue."""
+
+
+@dataclass(frozen=True)
+class Light:
+    """Receiver and course of the light of a unit.
+
+    Attributes
+    ----------
+    receiver
+        Diode, amplifier and line width of the source.
+    power_loss, power_slope
+        Loss off 25 degC [dB/degC] and change [dB/(100 degC)] of the light's power, of which noise, loop gain
+        and cross-talk then all go; None where each of these states its own.
+    """
+
+    receiver: Receiver = field(default_factory=Receiver)
+    power_loss: float | None = None
+    power_slope: float = 0.0
+
+    def level(self, u: FloatArray, *, power_loss: float = 0.0, power_slope: float = 0.0) -> FloatArray:
+        """Power over that at 25 degC at a temperature u off it [degC], shape (n,).
+
+        ::
+
+            P / P_0 = 10**(power_slope u / 1000 - power_loss |u| / 10)
+
+        with the unit's own course where it has one, else with the stated one.
+        """
+        if self.power_loss is not None:
+            power_loss, power_slope = self.power_loss, self.power_slope
+        return np.asarray(np.power(10.0, 1e-3 * power_slope * u - 0.1 * power_loss * np.abs(u)))

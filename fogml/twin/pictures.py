@@ -13,7 +13,7 @@ from fogml.twin.chain import hidden
 from fogml.twin.effect import Effect, LoopEffect, NoiseEffect, ScaleFactorEffect, ThermalEffect
 from fogml.twin.inputs import Inputs
 from fogml.twin.noise import NoiseConstants
-from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.scenes import Scene, scene
 from fogml.twin.simulate import simulate
 from fogml.twin.truth import Truth

@@ -23,8 +23,8 @@ from fogml.twin.effect import Effect
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.plant.estimate import EstimateState, estimate_nodes
+from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import ThermalNetwork
-from fogml.twin.plant.power import PowerWindows
 from fogml.twin.replay import Replayer
 from fogml.twin.twin import EffectSetting, Twin
 

@@ -8,13 +8,11 @@ from functools import cached_property
 
 from fogml.errors import InputError
 from fogml.runs.columns import coil_sensor_number
-from fogml.twin.plant.air import Airflow
-from fogml.twin.plant.ends import CoilEnds, with_ends
-from fogml.twin.plant.line import RadialLine, with_line
+from fogml.twin.plant.coil import CoilEnds, RadialLine, with_ends, with_line
+from fogml.twin.plant.heat import Airflow, SelfHeating
 from fogml.twin.plant.network import ThermalNetwork
-from fogml.twin.plant.power import SelfHeating
 from fogml.twin.plant.standard import ThermalConstants, standard_network
-from fogml.twin.quantities import Quantity
+from fogml.twin.quantities import Quantity, shared
 
 
 @dataclass(frozen=True)
@@ -115,18 +113,11 @@ class Sensors:
 EARTH_HORIZONTAL_UT, EARTH_VERTICAL_UT = 20.0, 40.0
 """Sizes of Earth's magnetic field at middle latitudes [uT]."""
 SURROUNDING_QUANTITIES: tuple[Quantity, ...] = (
-    Quantity("supply", "V", (5.0, 28.0), (5.0, 28.0), "supply voltage", (0.0, 1e3)),
-    Quantity("vibration", "g", (0.0, 0.01), (0.0, 0.01), "rms with the compressor off", (0.0, 100.0)),
-    Quantity("compressor_vibration", "g", (0.0, 0.1), (0.0, 0.1), "rms of its own, while on", (0.0, 100.0)),
-    Quantity("horizontal_field", "uT", (15.0, 30.0), (15.0, 30.0), "magnetic, northward", (0.0, 1e6)),
-    Quantity(
-        "vertical_field",
-        "uT",
-        (30.0, 55.0),
-        (30.0, 55.0),
-        "magnetic, downward in the north and upward in the south",
-        (-1e6, 1e6),
-    ),
+    shared("supply", "V", (5.0, 28.0), "supply voltage", (0.0, 1e3)),
+    shared("vibration", "g", (0.0, 0.01), "rms with the compressor off", (0.0, 100.0)),
+    shared("compressor_vibration", "g", (0.0, 0.1), "rms of its own, while on", (0.0, 100.0)),
+    shared("horizontal_field", "uT", (15.0, 30.0), "magnetic, northward", (0.0, 1e6)),
+    shared("vertical_field", "uT", (30.0, 55.0), "magnetic, down in the north, up in the south", (-1e6, 1e6)),
 )
 
 

@@ -131,28 +131,19 @@ def simulate(
     return Simulation(run, true, world)
 
 
-def simulate_to_file(
-    programme: Programme | str | Mapping[str, Any] | Sequence[Any],
-    twin: Twin | str | Path,
-    path: str | Path,
-    *,
-    sample_s: float = 1.0,
-    seed: int = 0,
-    columns: Sequence[str] | None = None,
-    facts: Facts | None = None,
-    truth_path: str | Path | None = None,
-    progress: Any = None,
+def write_world(
+    world: World, path: str | Path, truth_path: str | Path | None = None, progress: Any = None
 ) -> int:
-    """Run a twin through a programme into a file, block by block in bounded memory.
+    """Write what is recorded of a world that goes by, block by block in bounded memory.
 
     Parameters
     ----------
-    programme, twin, sample_s, seed, columns, facts
-        As for `simulate`, which gives the same numbers.
+    world
+        One that has not begun, of `world_of`.
     path
-        The run, ``.csv`` or ``.parquet``.
+        The run, ``.csv`` or ``.parquet``; the same numbers as those of `simulate`.
     truth_path
-        Where the truth of every node and effect goes, if anywhere; ``.csv`` or ``.parquet``.
+        Where the truth of every node and effect goes, if anywhere; the world is one that was asked for it.
     progress
         Called with the number of samples after each block, if given.
 
@@ -164,16 +155,8 @@ def simulate_to_file(
     Raises
     ------
     InputError
-        As `simulate`, or if a file can't be written.
+        If the unit is never on, or a file can't be written.
     """
-    world = world_of(programme, twin, sample_s, seed, columns, facts, truth=truth_path is not None)
-    return write_world(world, path, truth_path, progress)
-
-
-def write_world(
-    world: World, path: str | Path, truth_path: str | Path | None = None, progress: Any = None
-) -> int:
-    """Let a world go by and write what is recorded of it; parameters and result as `simulate_to_file`."""
     from fogml.runs.writing import BlockWriter
 
     rows = 0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray
-from fogml.twin.plant.power import PowerWindows
+from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.schedule import Schedule, Track
 from fogml.twin.steps import Switched
@@ -30,17 +30,6 @@ ROOM_HUMIDITY = 50.0
 _CLOCK_SLACK = 1e-6
 
 
-def timeline(programme: Programme, sample_s: float) -> Timeline:
-    """A programme on a regular clock.
-
-    Raises
-    ------
-    InputError
-        If the sample interval is not above 0, or longer than the programme.
-    """
-    return Timeline(programme, sample_s)
-
-
 @dataclass(frozen=True, eq=False)
 class Timeline:
     """A programme on a regular clock that begins at 0; the last sample lies before its end.
@@ -51,6 +40,11 @@ class Timeline:
         The programme.
     sample_s
         Sample interval [s].
+
+    Raises
+    ------
+    InputError
+        If the sample interval is not above 0, or longer than the programme.
     """
 
     programme: Programme

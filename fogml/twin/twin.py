@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING, Any
 from fogml.errors import InputError
 from fogml.twin.coil import LayeredCoil
 from fogml.twin.effect import Effect, LoggerEffect, NoiseEffect, SensorEffect, ThermalEffect
-from fogml.twin.light import Light
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
-from fogml.twin.optics import REFERENCE_COIL, Coil, Receiver
-from fogml.twin.plant.ends import END_NODES, CoilEnds, with_ends
+from fogml.twin.optics import REFERENCE_COIL, Coil, Light, Receiver
+from fogml.twin.plant.coil import END_NODES, CoilEnds, with_ends
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.quantities import Grade
 from fogml.twin.registry import catalogue_order, effect
@@ -107,7 +106,7 @@ class Twin:
 
     def __post_init__(self) -> None:
         # Raises where layers and winding don't fit together.
-        LayeredCoil.of(self.coil)
+        LayeredCoil(self.coil)
         settings = {}
         for id, setting in self.settings.items():
             declared = effect(id)

@@ -18,11 +18,9 @@ from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.nominal import PRIOR_SD, NominalConstants
 from fogml.twin.optics import Coil, Receiver
-from fogml.twin.plant.air import Airflow
-from fogml.twin.plant.ends import QUANTITIES as ENDS
-from fogml.twin.plant.ends import CoilEnds
-from fogml.twin.plant.line import RadialLine
-from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.coil import QUANTITIES as ENDS
+from fogml.twin.plant.coil import CoilEnds, RadialLine
+from fogml.twin.plant.heat import Airflow, SelfHeating
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.quantities import Quantity, with_unit

@@ -12,7 +12,7 @@ from fogml.errors import quoted
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.optics import Winding
-from fogml.twin.plant.ends import QUANTITIES as ENDS
+from fogml.twin.plant.coil import QUANTITIES as ENDS
 from fogml.twin.plant.standard import LARGEST_ORDER
 from fogml.twin.plant.standard import QUANTITIES as THERMAL
 from fogml.twin.quantities import Grade, Quantity

@@ -21,15 +21,14 @@ from fogml.twin.between_runs import (
     stored_nodes,
     windows_with_history,
 )
-from fogml.twin.branch import Branch
-from fogml.twin.chain import ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
+from fogml.twin.chain import Branch, ChainOutput, hidden, logged, sensed, sensor_shares, through_chain
 from fogml.twin.inputs import REST, Inputs
 from fogml.twin.memory import Memory
 from fogml.twin.noise import Streams
-from fogml.twin.plant.power import PowerWindows
+from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.programme import Programme
 from fogml.twin.random_errors import RandomErrors
-from fogml.twin.timeline import TimelineBlock, timeline
+from fogml.twin.timeline import Timeline, TimelineBlock
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import twin_dict
 
@@ -96,7 +95,7 @@ class World:
         before: World | None = None,
         storage: Storage | None = None,
     ) -> None:
-        self.timeline = timeline(programme, sample_s)
+        self.timeline = Timeline(programme, sample_s)
         self.twin, self.columns, self.truth = twin, columns, truth
         self._seed = seed
         self._first_facts: Facts = facts if before is None else before._first_facts

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.blind.folders import BlindFolder
-from fogml.blind.sums import write_sums
+from fogml.blind.folders import BlindFolder, write_sums
 from fogml.blind.truth import Amount, Kind, Runs, Segment, TrueClosed, TrueEffect, Truth, write_truth
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run

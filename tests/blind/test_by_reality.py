@@ -9,7 +9,7 @@ import pytest
 from fogml.blind.scoring.by_reality import by_form, by_reality, mass_on_true
 from fogml.blind.scoring.marks import Mark, mark
 from fogml.blind.truth import Kind
-from fogml.report.blind_realities import by_form_table, by_reality_table
+from fogml.report.blind_tables import by_form_table, by_reality_table
 from tests.blind.test_marks import answer, truth
 
 

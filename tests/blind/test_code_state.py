@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fogml.blind.code_state import code_state
+from fogml.blind.methods import code_state
 
 
 def test_the_state_of_the_code_is_that_of_what_answers(tmp_path: Path) -> None:

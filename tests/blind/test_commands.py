@@ -9,11 +9,10 @@ from typing import Any
 import yaml
 from click.testing import CliRunner
 
-from fogml.blind.code_state import code_state
-from fogml.blind.folders import BlindFolder
+from fogml.blind.folders import BlindFolder, check_sums
+from fogml.blind.methods import code_state
 from fogml.blind.scoring.marks_file import MARKS
 from fogml.blind.seeds import FINAL_FROM, uses
-from fogml.blind.sums import check_sums
 from fogml.blind.truth import read_truth
 from fogml.cli.blind_reports import link_reports
 from fogml.cli.main import app

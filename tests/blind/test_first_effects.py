@@ -13,11 +13,10 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import toeplitz
 
 from fogml.blind.case import recorded_run
-from fogml.blind.first.catalogue import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE
 from fogml.blind.first.effects.coil import SlipEvents
 from fogml.blind.first.noise import record_length
+from fogml.blind.first.reality import INVENTED, KNOWN, REALITY, WRONG_STRUCTURE, draw_unit
 from fogml.blind.first.recurrences import bouc_wen, lag, play, recurrence
-from fogml.blind.first.unit import draw_unit
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Form, compatible
 from fogml.blind.frame.reckoning import Reckoning

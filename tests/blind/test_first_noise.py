@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 
 from fogml.blind.first.noise import NoiseConstants, draw_noise, draw_series, flicker, record_length
-from fogml.blind.frame.whitening import Projected, Whitening
+from fogml.blind.frame.noise import Projected, Whitening
 
 SAMPLE_S = 10.0
 

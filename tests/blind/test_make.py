@@ -11,11 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fogml.blind.first.catalogue import INVENTED, REALITY
-from fogml.blind.folders import BlindFolder, case_files
+from fogml.blind.first.reality import INVENTED, REALITY
+from fogml.blind.folders import BlindFolder, case_files, check_sums
 from fogml.blind.make import make_cases
 from fogml.blind.plan import plans
-from fogml.blind.sums import check_sums
 from fogml.blind.truth import read_contributions, read_truth
 from fogml.errors import InputError
 from fogml.runs.reading import read_run

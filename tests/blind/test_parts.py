@@ -11,14 +11,13 @@ from typing import Any
 import pytest
 
 from fogml.blind.scoring.marks import Mark, mark
-from fogml.blind.scoring.marks_file import MARKS, Marks, part_of, read_marks, write_marks
-from fogml.blind.scoring.merging import merged
+from fogml.blind.scoring.marks_file import MARKS, Marks, merged, part_of, read_marks, write_marks
 from fogml.blind.scoring.table import BY_KEY
 from fogml.blind.scoring.values import score_values
 from fogml.blind.truth import Kind, Truth
 from fogml.errors import InputError
 from fogml.report import blind_page
-from fogml.report.blind_words import headline
+from fogml.report.blind_tables import headline
 from tests.blind.test_marks import answer, truth
 
 WHOLE = ("schema", "version", "seed", "cases", "mix", "kinds", "strata", "fit_runs", "turning", "methods")

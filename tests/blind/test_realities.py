@@ -7,12 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from fogml.blind.folders import BlindFolder, case_files
-from fogml.blind.form_distance import measure_forms
+from fogml.blind.folders import BlindFolder, case_files, check_sums
 from fogml.blind.make import make_cases
-from fogml.blind.plan import plans
-from fogml.blind.realities import MIX, REALITIES, SAME_TWIN
-from fogml.blind.sums import check_sums
+from fogml.blind.plan import MIX, REALITIES, SAME_TWIN, plans
+from fogml.blind.relatives import measure_forms
 from fogml.blind.truth import read_truth
 from fogml.errors import InputError
 from fogml.twin.nominal import NominalConstants

@@ -10,11 +10,10 @@ from scipy.linalg import toeplitz
 
 from fogml.blind.first.recurrences import bouc_wen, lag, play
 from fogml.blind.frame.form import Additive, Demands, Distorting, Form
+from fogml.blind.frame.noise import Whitening
 from fogml.blind.frame.operators import faded, late
 from fogml.blind.frame.unit import Unit
-from fogml.blind.frame.whitening import Whitening
-from fogml.blind.realities import REALITIES, reality
-from fogml.blind.second.chamber import air_of, draw_chamber
+from fogml.blind.plan import REALITIES, reality
 from fogml.blind.second.memory import (
     backlash,
     bouc_wen_general,
@@ -22,8 +21,9 @@ from fogml.blind.second.memory import (
     preisach,
     slab_lag,
 )
-from fogml.blind.second.noise import draw_noise
 from fogml.blind.second.plant import Plant, draw_plant
+from fogml.blind.second.reality import draw_noise
+from fogml.blind.second.world import air_of, draw_chamber
 
 RNG_SEED = 4
 LOOP = (np.linspace(-40.0, 60.0, 60), np.full(60, 7.0), np.linspace(0.5, 1.5, 60))

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from fogml.blind.folders import SUMS, check_sums, write_sums
 from fogml.blind.seeds import FINAL_FROM, check_use, record_use, uses
-from fogml.blind.sums import SUMS, check_sums, write_sums
 from fogml.blind.truth import (
     Runs,
     TrueEffect,

@@ -13,8 +13,7 @@ from fogml.json_files import finite_json
 from fogml.lab.batch import batch_json
 from fogml.monitor.monitor_json import monitor_json
 from fogml.monitor.watch import watch
-from fogml.report.acceptance_page import acceptance_page
-from fogml.report.batch_page import batch_page
+from fogml.report.acceptance_page import acceptance_page, batch_page
 from fogml.report.fleet_page import fleet_page
 from fogml.report.monitor_page import monitor_page, unit_page
 from tests.lab.test_batch import SERIAL, report

@@ -15,8 +15,7 @@ from fogml.blind.scoring.values import score_values
 from fogml.report import blind_page
 from fogml.report.axes_page import axes_page
 from fogml.report.benchmark_page import benchmark_page
-from fogml.report.catalogue_page import catalogue_page
-from fogml.report.effect_card import effect_page
+from fogml.report.effect_card import catalogue_page, effect_page
 from fogml.report.plan_page import plan_page
 from fogml.report.sweep_page import sweep_page
 from fogml.twin.card import card_values

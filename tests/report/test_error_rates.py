@@ -9,7 +9,7 @@ import pytest
 
 from experiments import gap_blind
 from fogml.report import gap_page
-from fogml.report.error_rates import ERROR_RATES, error_rates, error_sentences
+from fogml.report.gap_tiles import ERROR_RATES, error_rates, error_sentences
 from fogml.report.words import percent
 from tests.report.diagnoses import every_diagnosis
 from tests.report.pages import Page
@@ -43,6 +43,6 @@ def test_every_page_tells_how_often_such_findings_are_right(verdict: str) -> Non
 
 
 def test_rates_of_cases_that_were_developed_on_are_told_as_such(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fogml.report.error_rates._held", lambda: {**RATES, "final": False})
+    monkeypatch.setattr("fogml.report.gap_tiles._held", lambda: {**RATES, "final": False})
     (first, *_) = error_sentences(every_diagnosis()["explained"])
     assert "development cases" in first and "worked on with these in view" in first

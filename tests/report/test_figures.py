@@ -9,9 +9,7 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from fogml.report.figures_compare import residuals_in_time, rms_bars
-from fogml.report.figures_index import loop_between
-from fogml.report.figures_inspect import temperature_rates
+from fogml.report.compare_page import residuals_in_time, rms_bars
 from fogml.report.figures_judgement import (
     direction_of,
     drift_against_temperature,
@@ -19,6 +17,8 @@ from fogml.report.figures_judgement import (
     rms_by_regime,
 )
 from fogml.report.figures_noise import term_deviation
+from fogml.report.index_page import loop_between
+from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
 from fogml.report.shading import segments_of, shade
 from fogml.report.static_svg import Curve, line_figure

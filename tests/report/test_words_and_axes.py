@@ -10,8 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.report import words
-from fogml.report.axes import log_axis, rounded_up, time_unit
 from fogml.report.static_svg import ticks
+from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
 
 

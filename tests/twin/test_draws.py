@@ -11,7 +11,7 @@ import yaml
 from fogml.errors import InputError
 from fogml.twin.draws import drawn_twin, parameter_values
 from fogml.twin.plant.fit import fit_plant
-from fogml.twin.plant.power import SelfHeating
+from fogml.twin.plant.heat import SelfHeating
 from fogml.twin.plant.standard import ThermalConstants
 from fogml.twin.set_up import Plant
 from fogml.twin.simulate import simulate

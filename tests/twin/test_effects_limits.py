@@ -17,7 +17,7 @@ from fogml.twin.memory import Memory
 from fogml.twin.noise import NoiseConstants
 from fogml.twin.registry import effect
 from fogml.twin.replay import replay
-from fogml.twin.simulate import simulate, simulate_to_file
+from fogml.twin.simulate import simulate, world_of, write_world
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
 
@@ -90,7 +90,7 @@ def test_a_run_in_counts_is_one_everywhere(tmp_path) -> None:
     assert run.gyro_deg_h.mean() == pytest.approx(
         true.mean() - made.truth.contributions["output_counts"].mean(), abs=0.2 / (0.5 * len(run)) + 1e-6
     )
-    simulate_to_file(steps, twin, tmp_path / "run.csv", sample_s=0.5, seed=3)
+    write_world(world_of(steps, twin, 0.5, 3, None, None, truth=False), tmp_path / "run.csv")
     again = read_run(tmp_path / "run.csv")
     assert again.gyro_unit == "count" and np.array_equal(again.gyro, run.gyro)
     quiet = replace(twin, noise=NoiseConstants(), sensors=Twin().sensors)

@@ -13,10 +13,9 @@ from fogml.errors import InputError
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.light import Light
 from fogml.twin.noise import NoiseConstants
-from fogml.twin.optics import Coil, Receiver
-from fogml.twin.plant.ends import CoilEnds, with_ends
+from fogml.twin.optics import Coil, Light, Receiver
+from fogml.twin.plant.coil import CoilEnds, with_ends
 from fogml.twin.plant.network import ThermalNetwork
 from fogml.twin.plant.standard import standard_network
 from fogml.twin.registry import effect

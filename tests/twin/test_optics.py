@@ -14,7 +14,6 @@ from fogml.twin.optics import (
     Receiver,
     Spectrum,
     phase_noise_to_walk,
-    polarization_period,
     relative_intensity_noise,
 )
 
@@ -30,18 +29,6 @@ def test_worked_numbers_of_the_reference_coil() -> None:
     assert 1e6 * coil.proper_frequency_slope == pytest.approx(7.0, abs=0.5)
 
 
-def test_reset_rate() -> None:
-    assert REFERENCE_COIL.reset_rate_hz(7.5) == pytest.approx(1.6, abs=0.05)
-    assert REFERENCE_COIL.reset_rate_hz(36000.0) == pytest.approx(7750.0, abs=5.0)
-
-
-def test_reset_rate_is_the_ramp_that_cancels_the_sagnac_phase() -> None:
-    coil, rate_deg_h = Coil(length=2300.0, diameter=0.07), 1234.0
-    # A serrodyne of slope s gives a phase difference s * transit; one reset takes 2 pi of the ramp.
-    slope = coil.phase_per_deg_h * rate_deg_h / coil.transit_s
-    assert coil.reset_rate_hz(rate_deg_h) == pytest.approx(slope / (2.0 * math.pi), rel=1e-12)
-
-
 def test_sagnac_constant_from_path_difference() -> None:
     coil = Coil(length=500.0, diameter=0.2, wavelength=1310e-9)
     turns = coil.length / (math.pi * coil.diameter)
@@ -49,12 +36,6 @@ def test_sagnac_constant_from_path_difference() -> None:
     seconds = 4.0 * area / 299792458.0**2  # time between the two arrivals for 1 rad/s
     light = 2.0 * math.pi * 299792458.0 / coil.wavelength
     assert coil.sagnac_s == pytest.approx(light * seconds, rel=1e-12)
-
-
-def test_polarisation_period() -> None:
-    assert polarization_period(1.0) == pytest.approx(3.1, abs=0.05)
-    assert polarization_period(0.3) == pytest.approx(10.3, abs=0.05)
-    assert polarization_period(1.0, birefringence_slope=-5e-7) == polarization_period(1.0)
 
 
 @pytest.mark.parametrize(("depth", "walk"), [(0.5, 1.89e-3), (0.75, 8.2e-4), (0.875, 4.9e-4)])

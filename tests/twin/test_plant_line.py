@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from scipy.special import j0, y0
 
 from fogml.errors import InputError
-from fogml.twin.plant.line import RadialLine, with_line
+from fogml.twin.plant.coil import RadialLine, with_line
 from fogml.twin.plant.network import PlantState
 from fogml.twin.plant.standard import ThermalConstants, standard_network
 
@@ -65,7 +65,6 @@ def test_slowest_decay_is_the_zero_of_the_bessel_cross_product() -> None:
     layer = line(64).temperatures(time, face, face)
     rate = np.log(layer[:, 2] / layer[:, 3]) / 10.0
     np.testing.assert_allclose(rate, KAPPA * k**2, rtol=1e-3)
-    assert line(64).diffusion_time_s == pytest.approx(1.0 / (KAPPA * k**2), rel=0.01)
 
 
 def test_in_a_network_the_faces_are_apart_as_conduction_says() -> None:

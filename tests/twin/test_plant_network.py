@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -202,7 +203,7 @@ def test_faults_are_named() -> None:
     with pytest.raises(InputError, match="T_chamber"):
         standard_network().temperatures(np.arange(3.0), {"T_case": np.zeros(3)})
     with pytest.raises(InputError, match="heat capacity of 'T_case' is -1"):
-        standard_network().with_capacity("T_case", -1.0)
+        replace(standard_network(), capacities={"T_case": -1.0})
     with pytest.raises(InputError, match="order is 0"):
         standard_network(order=0)
     with pytest.raises(InputError, match="'plate_share' is 9"):

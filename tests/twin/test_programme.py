@@ -21,7 +21,7 @@ from fogml.twin.programme import (
 from fogml.twin.sentences import parse_action, parse_step
 from fogml.twin.simulate import default_facts
 from fogml.twin.steps import Hold, Ramp, Repeat, Setting, Soak, Turn, TurnTo
-from fogml.twin.timeline import timeline
+from fogml.twin.timeline import Timeline
 
 
 @pytest.mark.parametrize(
@@ -227,9 +227,9 @@ def test_configs_show_the_same_files() -> None:
 def test_joint_staircase_is_that_of_the_patent() -> None:
     programme = load_programme("joint-staircase")
     assert programme.total_hours == pytest.approx(9.9, abs=0.05)
-    block = timeline(programme, 1.0).whole
+    block = Timeline(programme, 1.0).whole
     soaks = {}
-    for number, name in enumerate(timeline(programme, 1.0).step_names):
+    for number, name in enumerate(Timeline(programme, 1.0).step_names):
         part = block.step == number
         if name.startswith("soak"):
             (degrees,) = np.unique(block.set_point[part])
@@ -249,16 +249,16 @@ def test_joint_staircase_is_that_of_the_patent() -> None:
 
 
 def test_cycles_are_those_of_the_papers() -> None:
-    block = timeline(load_programme("multi-point-cycle"), 60.0).whole
+    block = Timeline(load_programme("multi-point-cycle"), 60.0).whole
     assert block.set_point[[0, 65, 185, 285, 404]] == pytest.approx([25.0, -40.0, -40.0, 60.0, 60.0])
     for name, start, stop in (("up", -10.0, 40.0), ("down", 40.0, -10.0)):
-        slow = timeline(load_programme(f"ten-degrees-per-hour-{name}"), 60.0).whole
+        slow = Timeline(load_programme(f"ten-degrees-per-hour-{name}"), 60.0).whole
         assert slow.set_point[[0, 60, 360, 419]] == pytest.approx([start, start, stop, stop])
         assert np.abs(slow.set_rate).max() == pytest.approx(1.0 / 6.0)
 
 
 def test_four_positions_go_clockwise_by_right_angles() -> None:
-    line = timeline(load_programme("four-positions"), 0.5)
+    line = Timeline(load_programme("four-positions"), 0.5)
     dwell = line.whole.table_rate == 0.0
     places = [np.unique(line.whole.angle[dwell & (line.whole.step == i)].round(9))[-1] for i in range(4)]
     ends = [line.whole.angle[line.whole.step == i][-1] for i in range(4)]
@@ -270,7 +270,7 @@ def test_four_positions_go_clockwise_by_right_angles() -> None:
 def test_separating_has_all_that_separates() -> None:
     programme = load_programme("separating")
     assert programme.total_hours == pytest.approx(22.0, abs=0.5)
-    line = timeline(programme, 1.0)
+    line = Timeline(programme, 1.0)
     block = line.whole
     rates = np.unique(block.set_rate.round(6))
     assert {-2.0, -0.5, 0.5, 2.0} <= set(rates)

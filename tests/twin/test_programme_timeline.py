@@ -9,7 +9,7 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.twin.programme import Programme, load_programme, programme_names
-from fogml.twin.timeline import ROOM_HUMIDITY, Timeline, saturation_pressure, timeline
+from fogml.twin.timeline import ROOM_HUMIDITY, Timeline, saturation_pressure
 
 QUANTITIES = (
     "set_point", "set_rate", "table_rate", "angle", "powered", "powered_on_s", "fan", "compressor", "heater",
@@ -18,13 +18,13 @@ QUANTITIES = (
 
 
 def on_clock(steps: list, sample_s: float = 1.0, **keys: object) -> Timeline:
-    return timeline(load_programme({"steps": steps, **keys}), sample_s)
+    return Timeline(load_programme({"steps": steps, **keys}), sample_s)
 
 
 @pytest.mark.parametrize("name", programme_names())
 @pytest.mark.parametrize("sample_s", [0.7, 10.0])
 def test_blocks_give_the_whole(name: str, sample_s: float) -> None:
-    line = timeline(load_programme(name), sample_s)
+    line = Timeline(load_programme(name), sample_s)
     blocks = list(line.blocks(997))
     assert sum(len(block) for block in blocks) == len(line)
     for quantity in ("time", *QUANTITIES):
@@ -35,7 +35,7 @@ def test_blocks_give_the_whole(name: str, sample_s: float) -> None:
 @pytest.mark.parametrize("name", ["joint-staircase", "separating", "four-positions"])
 def test_angle_is_the_integral_of_the_rate_and_the_table_keeps_its_acceleration(name: str) -> None:
     programme = load_programme(name)
-    line = timeline(programme, 0.01)
+    line = Timeline(programme, 0.01)
     block = line.block(0, 1_500_000)
     steps = np.diff(block.table_rate)
     assert np.abs(steps).max() <= programme.table_acceleration * 0.01 * (1 + 1e-9)
@@ -175,13 +175,13 @@ def test_saturation_pressure_is_that_of_steam_tables() -> None:
 
 def test_samples_end_before_the_programme_does() -> None:
     programme = Programme(load_programme(["hold for 1 h"]).steps)
-    assert len(timeline(programme, 1.0)) == 3600
-    assert len(timeline(programme, 0.1)) == 36_000
-    assert len(timeline(programme, 7.0)) == 515
-    assert timeline(programme, 7.0).whole.time[-1] < 3600.0
+    assert len(Timeline(programme, 1.0)) == 3600
+    assert len(Timeline(programme, 0.1)) == 36_000
+    assert len(Timeline(programme, 7.0)) == 515
+    assert Timeline(programme, 7.0).whole.time[-1] < 3600.0
     for bad in (0.0, -1.0, math.nan, 3601.0):
         with pytest.raises(InputError, match="'sample_s'"):
-            timeline(programme, bad)
+            Timeline(programme, bad)
 
 
 def test_an_oscillation_is_a_sine_about_rest_and_comes_back() -> None:

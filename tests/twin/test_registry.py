@@ -15,8 +15,8 @@ import fogml.twin.effects
 from fogml.errors import InputError
 from fogml.twin import registry
 from fogml.twin.effect import BiasEffect
-from fogml.twin.effects.unit import Ageing
 from fogml.twin.effects.shupe import ShupePure
+from fogml.twin.effects.unit import Ageing
 
 OUTSIDE = Path(__file__).parent / "outside_package"
 # The head of the catalogue: what a diagnosis offers unless told otherwise, noise terms aside.

@@ -15,10 +15,11 @@ from fogml.twin.nominal import NominalConstants
 from fogml.twin.registry import effects
 from fogml.twin.replay import replay
 from fogml.twin.set_up import SensorErrors, Sensors
-from fogml.twin.simulate import simulate, simulate_to_file
+from fogml.twin.simulate import simulate, world_of, write_world
 from fogml.twin.truth import read_truth
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin
+from tests.twin.allan import allan_variance
 
 QUICK = [
     {"soak at 25 degC for 20 min": ["power on at minute 2", "turn at 5 deg/s for 60 s from minute 10"]},
@@ -56,7 +57,7 @@ def test_a_file_holds_what_memory_does(tmp_path, monkeypatch, suffix):
     monkeypatch.setattr(simulating, "BLOCK_ROWS", 700)
     twin, path, beside = load_twin("tactical"), tmp_path / f"run{suffix}", tmp_path / f"truth{suffix}"
     seen = []
-    rows = simulate_to_file(QUICK, twin, path, sample_s=2.0, seed=9, truth_path=beside, progress=seen.append)
+    rows = write_world(world_of(QUICK, twin, 2.0, 9, None, None, truth=True), path, beside, seen.append)
     expected = simulate(QUICK, twin, sample_s=2.0, seed=9, truth=True)
     run, true = read_run(path), read_truth(beside)
     assert rows == len(run) == len(expected.run)
@@ -148,8 +149,7 @@ def test_allan_deviation_is_that_of_own_noise_and_random_effects_together():
     twin = twin.with_effect("bias_instability", 0.4).with_effect("quantisation", 3.0)
     found = simulate(["soak at 25 degC for 40 h"], twin, sample_s=2.0, seed=1, columns=(), truth=True)
     taus = np.array([2.0, 16.0, 128.0, 1024.0])
-    total = twin.noise.with_effects({id: setting.amplitude for id, setting in twin.settings.items()})
-    wanted = np.sqrt(total.allan_variance(taus))
+    wanted = np.sqrt(allan_variance(taus, Q=np.hypot(2.0, 3.0), N=np.hypot(0.02, 0.03), B=0.5))
     np.testing.assert_allclose(allan_deviation(found.truth.noise, 2.0, taus).adev, wanted, rtol=0.12)
 
 

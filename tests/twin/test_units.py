@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.twin.draws import draw_units, repeat_unit
 from fogml.twin.effect import BiasEffect
 from fogml.twin.quantities import Quantity
 from fogml.twin.registry import effect, register, unregister
 from fogml.twin.simulate import simulate
 from fogml.twin.twin import Twin
 from fogml.twin.twin_file import load_twin, twin_dict
-from fogml.twin.units import draw_units, repeat_unit
 
 
 class DrawnEachTime(BiasEffect):

@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from scipy.optimize import nnls
 
+from fogml.blind.frame.noise import States
 from fogml.blind.frame.record import FloatArray
-from fogml.blind.frame.whitening import States
 
 BASE = {"N": 0.005, "B": 0.01, "K": 0.005}
 """Middles of the log-normal draws: deg/sqrt(h), deg/h, deg/h/sqrt(h)."""

@@ -1,15 +1,16 @@
-"""The form that an effect takes in a reality: one class, one declaration; and what programmes it needs."""
+"""The form that an effect takes in a reality: one class, one declaration; and what runs it needs to show."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import ModuleType
 from typing import ClassVar
 
 import numpy as np
 
-from fogml.blind.frame.record import FloatArray, World
+from fogml.blind.frame.record import FloatArray, SetUp, World
 
 Shape = dict[str, float]
 
@@ -169,6 +170,13 @@ class Sensing(Form):
         return values
 
 
+def forms_in(*modules: ModuleType, known: bool = True) -> tuple[type[Form], ...]:
+    """Forms that modules declare, in their order: of effects that the catalogue holds, or of others."""
+    declared = [(module.__name__, each) for module in modules for each in vars(module).values()]
+    forms = [each for home, each in declared if isinstance(each, type) and each.__module__ == home]
+    return tuple(form for form in forms if issubclass(form, Form) and form.known == known)
+
+
 def compatible(forms: Sequence[type[Form]]) -> bool:
     """Whether one set of programmes can show all of them."""
     turning = any(f.demands.turns or f.demands.slow_turns for f in forms)
@@ -182,3 +190,59 @@ def compatible(forms: Sequence[type[Form]]) -> bool:
     return len(set(names)) == len(names) and not (
         (skewed and turning) or (flat and upright) or (small and fast)
     )
+
+
+def draw_set_up(
+    rng: np.random.Generator,
+    forms: Sequence[type[Form]],
+    latitudes: tuple[float, float],
+    upright: float,
+) -> SetUp:
+    """Where a unit stands and which way it points.
+
+    Parameters
+    ----------
+    rng
+        Generator that is drawn from.
+    forms
+        Effects that have to show; some need the axis horizontal, some need it up.
+    latitudes
+        Range of the latitude [deg].
+    upright
+        Share of units with the axis up where no effect asks for either.
+    """
+    latitude = float(rng.uniform(*latitudes))
+    if any(f.horizontal for f in forms):
+        return SetUp(latitude, float(rng.choice([90.0, 270.0])))
+    if any(f.demands.slow_turns for f in forms) or rng.random() < upright:
+        return SetUp(latitude, None)
+    return SetUp(latitude, float(rng.uniform(0.0, 360.0)))
+
+
+def draw_demands(
+    rng: np.random.Generator,
+    forms: Sequence[type[Form]],
+    chance: Mapping[str, float],
+    top_rates: tuple[float, float],
+) -> Demands:
+    """What the forms ask of the programmes, and the rest by chance.
+
+    Parameters
+    ----------
+    rng
+        Generator that is drawn from.
+    forms
+        Effects that have to show. Turns would tell `logger_skew`, and come with it only where asked for.
+    chance
+        Probability of a demand that none asks for, by its name; 0 unless stated.
+    top_rates
+        Range of the greatest table rate [deg/s], log-uniform.
+    """
+    kinds = [name for name, value in vars(Demands()).items() if isinstance(value, bool)]
+    by_chance = dict(zip(kinds, rng.random(len(kinds)).tolist()))
+    likely = {**chance, "turns": 0.0} if any(f.name == "logger_skew" for f in forms) else chance
+    drawn = {
+        name: any(getattr(f.demands, name) for f in forms) or by_chance[name] < likely.get(name, 0.0)
+        for name in kinds
+    }
+    return Demands(**drawn, top_rate=float(np.exp(rng.uniform(*np.log(top_rates)))))

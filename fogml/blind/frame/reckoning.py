@@ -8,10 +8,10 @@ import numpy as np
 
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Distorting
+from fogml.blind.frame.noise import Projected
 from fogml.blind.frame.record import FloatArray
 from fogml.blind.frame.strength import Acting, Scales, acting_before, recorded
 from fogml.blind.frame.unit import Unit, UnitRun
-from fogml.blind.frame.whitening import Projected
 
 AVERAGING_S = 100.0
 _SHORTEST_S = 600.0

@@ -8,9 +8,9 @@ import numpy as np
 
 from fogml.blind.frame import nominal
 from fogml.blind.frame.form import Additive, Distorting, Form, Sensing, Shape
+from fogml.blind.frame.noise import Projected
 from fogml.blind.frame.record import FloatArray
 from fogml.blind.frame.unit import Unit, UnitRun
-from fogml.blind.frame.whitening import Projected
 
 _LEAST_OUTSIDE = 0.02
 """Share of an effect's whitened length that must lie outside the nominal constants' span."""

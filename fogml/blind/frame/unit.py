@@ -9,8 +9,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from fogml.blind.frame import nominal
+from fogml.blind.frame.noise import NoiseLaw, Whitening
 from fogml.blind.frame.record import FloatArray, SetUp, World
-from fogml.blind.frame.whitening import NoiseLaw, Whitening
 
 
 class Thermometers(Protocol):

@@ -13,8 +13,17 @@ from typing import Any
 import numpy as np
 
 from fogml.blind.scoring.marks import Mark
-from fogml.blind.scoring.statistics import Estimate, calibration_error, mean, median, proportion
-from fogml.blind.scoring.table import ENOUGH, calibration
+from fogml.blind.scoring.statistics import Estimate, calibration_error, mean, proportion
+from fogml.blind.scoring.table import (
+    ENOUGH,
+    calibration,
+    case_ratio,
+    false_names,
+    met,
+    pooled,
+    seconds,
+    share,
+)
 from fogml.blind.truth import FORM_DISTANCES
 
 ALL = "all"
@@ -81,10 +90,6 @@ def _far(m: Mark) -> bool:
     return cosine is not None and cosine < _FAR and m.d_prime > _VERY_STRONG
 
 
-def _share(hit: Callable[[Mark], bool]) -> Callable[[Sequence[Mark]], Estimate]:
-    return lambda marks: proportion([hit(m) for m in marks])
-
-
 def each_kept(marks: Sequence[Mark]) -> Estimate:
     """The share of missing effects that may be named and are in a named class."""
     hits = []
@@ -92,12 +97,6 @@ def each_kept(marks: Sequence[Mark]) -> Estimate:
         held = {id for item in m.named for id in item.members}
         hits += [effect.id in held for effect in m.truth.known]
     return proportion(hits)
-
-
-def false_names(marks: Sequence[Mark]) -> Estimate:
-    """The share of named effects that are false."""
-    # A failed case is one false name: not to answer must not be the better answer.
-    return proportion([x for m in marks for x in ([True] if m.failure else [not i.right for i in m.named])])
 
 
 def within_one(estimate: Estimate) -> Estimate:
@@ -115,50 +114,50 @@ def _always(m: Mark) -> bool:
 WANTED = (
     Wanted(
         "nothing_named", "nothing missing, something named", _of("nothing"),
-        _share(lambda m: bool(m.named) or bool(m.failure)), high=0.02,
+        share(lambda m: bool(m.named) or bool(m.failure)), high=0.02,
     ),
     Wanted(
         "nothing_no_gap", "nothing missing: answered 'no gap'", _of("nothing"),
-        _share(lambda m: m.verdict == "no_gap"),
+        share(lambda m: m.verdict == "no_gap"),
     ),
     Wanted(
         "one_strong_right", "one effect, d′ 20–60: first name's class right",
-        _of("one", low=20.0, high=60.0), _share(first_right), low=0.95,
+        _of("one", low=20.0, high=60.0), share(first_right), low=0.95,
     ),
     Wanted(
         "one_strong_exact", "one effect, d′ 20–60: exact",
-        _of("one", low=20.0, high=60.0), _share(lambda m: m.exact), low=0.90,
+        _of("one", low=20.0, high=60.0), share(lambda m: m.exact), low=0.90,
     ),
     Wanted(
         "one_weak_right", "one effect, d′ 8–12: first name's class right",
-        _of("one", low=8.0, high=12.0), _share(first_right), low=0.85,
+        _of("one", low=8.0, high=12.0), share(first_right), low=0.85,
     ),
     Wanted(
         "one_weak_exact", "one effect, d′ 8–12: exact",
-        _of("one", low=8.0, high=12.0), _share(lambda m: m.exact), low=0.80,
+        _of("one", low=8.0, high=12.0), share(lambda m: m.exact), low=0.80,
     ),
     Wanted(
         "one_far_right", "one effect, form under cosine 0.9, d′ > 20: first name's class right",
-        _far, _share(first_right), low=0.85,
+        _far, share(first_right), low=0.85,
     ),
     Wanted(
         "pair_exact", "two effects, both d′ > 10: exact",
-        _of("two", low=_STRONG), _share(lambda m: m.exact), low=0.80,
+        _of("two", low=_STRONG), share(lambda m: m.exact), low=0.80,
     ),
     Wanted("each_kept", "each of two or three effects kept", _of("two", "three"), each_kept),
     Wanted(
         "unknown_misnamed", "unknown, d′ > 10: a wrong name",
-        _of(*_UNKNOWN, low=_STRONG), _share(lambda m: m.wrong_name), high=0.08,
+        _of(*_UNKNOWN, low=_STRONG), share(lambda m: m.wrong_name), high=0.08,
     ),
     Wanted(
         "known_kept", "known beside an unknown: kept",
-        _of("unknown_and_known"), _share(lambda m: m.kept), low=0.75,
+        _of("unknown_and_known"), share(lambda m: m.kept), low=0.75,
     ),
     Wanted(
         "beside_unknown_false", "known beside an unknown: a false name",
-        _of("unknown_and_known"), _share(lambda m: m.wrong_name), high=0.10,
+        _of("unknown_and_known"), share(lambda m: m.wrong_name), high=0.10,
     ),
-    Wanted("false_names", "named effects that are false", _always, false_names, high=0.06),
+    Wanted("false_names", "named effects that are false", _always, pooled(false_names), high=0.06),
     Wanted(
         "mass_on_true", "mean probability on the true cause, one cause, d′ > 10 (as DX 2025)",
         _of("one", *_UNKNOWN, low=_STRONG), lambda marks: within_one(mean([mass_on_true(m) for m in marks])),
@@ -166,8 +165,7 @@ WANTED = (
     ),
     Wanted(
         "closed_ratio", "closed over what the true signature closes (median)", _of(*_KNOWN),
-        lambda marks: median([float(np.mean(m.closed_ratios)) for m in marks if m.closed_ratios]),
-        low=0.95, format="number",
+        case_ratio, low=0.95, format="number",
     ),
     Wanted(
         "calibration", "calibration error of what is listed", _always,
@@ -176,18 +174,16 @@ WANTED = (
     Wanted(
         "coverage", "coverage of 90 % intervals, of closed and of amplitudes",
         _of(*_KNOWN, "unknown_and_known"),
-        lambda marks: proportion([x for m in marks for x in (*m.closed_covered, *m.amplitude_covered)]),
-        low=0.87, high=0.93,
+        pooled(lambda m: (*m.closed_covered, *m.amplitude_covered)), low=0.87, high=0.93,
     ),
     Wanted(
         "wrong_thermal", "wrong thermal structure: a right answer", _of("wrong_thermal"),
-        _share(lambda m: m.right_for_wrong_thermal),
+        share(lambda m: m.right_for_wrong_thermal),
     ),
     Wanted(
-        "time", "time per case (median)", _always,
-        lambda marks: median([m.seconds for m in marks if m.seconds is not None]), format="seconds",
+        "time", "time per case (median)", _always, seconds, format="seconds",
     ),
-    Wanted("failed", "cases that failed", _always, _share(lambda m: bool(m.failure))),
+    Wanted("failed", "cases that failed", _always, share(lambda m: bool(m.failure))),
 )  # fmt: skip
 """Every row of the table, in its order."""
 
@@ -230,9 +226,6 @@ def by_form(marks: Sequence[Mark]) -> list[dict[str, Any]]:
 def _row(wanted: Wanted, marks: Sequence[Mark]) -> dict[str, Any]:
     here = [m for m in marks if wanted.counts(m)]
     estimate = wanted.measure(here)
-    value, met = estimate.value, None
-    if value is not None and (wanted.low, wanted.high) != (None, None):
-        met = (wanted.low is None or value >= wanted.low) and (wanted.high is None or value <= wanted.high)
     return {
         "key": wanted.key,
         "words": wanted.words,
@@ -240,6 +233,6 @@ def _row(wanted: Wanted, marks: Sequence[Mark]) -> dict[str, Any]:
         "wanted": {"low": wanted.low, "high": wanted.high},
         **asdict(estimate),
         "cases": len(here),
-        "met": met,
+        "met": met(wanted.low, wanted.high, estimate.value),
         "enough": len(here) >= ENOUGH,
     }

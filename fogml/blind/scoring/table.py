@@ -76,22 +76,26 @@ class Figure:
         """Those, of any d'."""
         return [m for m in marks if m.truth.kind in self.kinds and (m.truth.mix or not self.of_mix)]
 
-    def met(self, value: float | None) -> bool | None:
-        """Whether a value is as wanted; None where nothing is wanted or there is no value."""
-        if value is None or (self.low is None and self.high is None):
-            return None
-        return (self.low is None or value >= self.low) and (self.high is None or value <= self.high)
+
+def met(low: float | None, high: float | None, value: float | None) -> bool | None:
+    """Whether a value is as wanted; None where nothing is wanted or there is no value."""
+    if value is None or (low is None and high is None):
+        return None
+    return (low is None or value >= low) and (high is None or value <= high)
 
 
-def _share(hit: Callable[[Mark], bool]) -> Measure:
+def share(hit: Callable[[Mark], bool]) -> Measure:
+    """The share of cases with something."""
     return lambda marks: proportion([hit(m) for m in marks])
 
 
-def _pooled(hits: Callable[[Mark], Iterable[bool]]) -> Measure:
+def pooled(hits: Callable[[Mark], Iterable[bool]]) -> Measure:
+    """The share of hits over all cases together."""
     return lambda marks: proportion([hit for m in marks for hit in hits(m)])
 
 
-def _false_names(m: Mark) -> Iterable[bool]:
+def false_names(m: Mark) -> Iterable[bool]:
+    """Whether each named effect is false."""
     # A failed case is one false name: not to answer must not be the better answer.
     return [True] if m.failure else [not item.right for item in m.named]
 
@@ -110,7 +114,8 @@ def calibration(
     return reliability([item.probability for item in items], [item.right for item in items])
 
 
-def _case_ratio(marks: Sequence[Mark]) -> Estimate:
+def case_ratio(marks: Sequence[Mark]) -> Estimate:
+    """What is closed over what the true effects close, in the median case."""
     return median([float(np.mean(m.closed_ratios)) for m in marks if m.closed_ratios])
 
 
@@ -122,51 +127,52 @@ def _class_size(marks: Sequence[Mark]) -> Estimate:
     return mean([float(len(item.members)) for m in marks for item in m.named])
 
 
-def _seconds(marks: Sequence[Mark]) -> Estimate:
+def seconds(marks: Sequence[Mark]) -> Estimate:
+    """Time per case [s]."""
     return median([m.seconds for m in marks if m.seconds is not None])
 
 
 FIGURES: tuple[Figure, ...] = (
     Figure(
         "nothing_named", "nothing missing: an effect named",
-        _share(lambda m: m.wrong_name), ("nothing",), high=0.02, prototype="3 %",
+        share(lambda m: m.wrong_name), ("nothing",), high=0.02, prototype="3 %",
     ),
     Figure(
         "one_top", "one effect, d′ > 10: the first item's class holds it",
-        _share(lambda m: m.top), _ONE, low=0.98, above=_STRONG, prototype="95 %",
+        share(lambda m: m.top), _ONE, low=0.98, above=_STRONG, prototype="95 %",
     ),
     Figure(
         "one_exact", "one effect, d′ > 10: class exact",
-        _share(lambda m: m.exact), _ONE, low=0.95, above=_STRONG, prototype="92 %",
+        share(lambda m: m.exact), _ONE, low=0.95, above=_STRONG, prototype="92 %",
     ),
     Figure(
         "one_top_strict", "one effect, d′ > 10: the first item is it",
-        _share(lambda m: m.top_strict), _ONE, above=_STRONG,
+        share(lambda m: m.top_strict), _ONE, above=_STRONG,
     ),
     Figure(
         "two_exact", "two effects: class exact",
-        _share(lambda m: m.exact), _TWO, low=0.92, prototype="86 %",
+        share(lambda m: m.exact), _TWO, low=0.92, prototype="86 %",
     ),
-    Figure("three_exact", "three effects: class exact", _share(lambda m: m.exact), _THREE),
+    Figure("three_exact", "three effects: class exact", share(lambda m: m.exact), _THREE),
     Figure(
         "false_discovery", "named effects that are false (FDR)",
-        _pooled(_false_names), KINDS, high=0.05, prototype="11.5 %", of_mix=True,
+        pooled(false_names), KINDS, high=0.05, prototype="11.5 %", of_mix=True,
     ),
     Figure(
         "unknown_wrong_name", "unknown, d′ > 10: a wrong name",
-        _share(lambda m: m.wrong_name), _UNKNOWN, high=0.05, above=_STRONG, prototype="~11 %",
+        share(lambda m: m.wrong_name), _UNKNOWN, high=0.05, above=_STRONG, prototype="~11 %",
     ),
     Figure(
         "mixed_known_kept", "unknown + known: known kept",
-        _share(lambda m: m.kept), _MIXED, low=0.9, prototype="65 %",
+        share(lambda m: m.kept), _MIXED, low=0.9, prototype="65 %",
     ),
     Figure(
         "mixed_false_name", "unknown + known: false name",
-        _share(lambda m: m.wrong_name), _MIXED, high=0.08, prototype="20 %",
+        share(lambda m: m.wrong_name), _MIXED, high=0.08, prototype="20 %",
     ),
     Figure(
         "wrong_thermal_right", "wrong thermal structure: a right answer",
-        _share(lambda m: m.right_for_wrong_thermal), ("wrong_thermal",),
+        share(lambda m: m.right_for_wrong_thermal), ("wrong_thermal",),
     ),
     Figure(
         "auroc", "open set on unknown.probability: AUROC",
@@ -193,19 +199,19 @@ FIGURES: tuple[Figure, ...] = (
     ),
     Figure(
         "suspected_right", "suspected and not named: right",
-        _pooled(lambda m: (item.right for item in m.suspected)), KINDS, of_mix=True,
+        pooled(lambda m: (item.right for item in m.suspected)), KINDS, of_mix=True,
     ),
     Figure(
         "closed_ratio", "closed / what the true effect, fitted, closes (median)",
-        _case_ratio, _KNOWN, low=0.97, format="number", prototype="0.96", of_mix=True,
+        case_ratio, _KNOWN, low=0.97, format="number", prototype="0.96", of_mix=True,
     ),
     Figure(
         "coverage_closed", "coverage of the 90 % interval of closed",
-        _pooled(lambda m: m.closed_covered), _KNOWN, low=0.87, high=0.93, prototype="81 %", of_mix=True,
+        pooled(lambda m: m.closed_covered), _KNOWN, low=0.87, high=0.93, prototype="81 %", of_mix=True,
     ),
     Figure(
         "coverage_amplitude", "coverage of the 90 % interval of amplitudes",
-        _pooled(lambda m: m.amplitude_covered), (*_KNOWN, *_MIXED), low=0.87, high=0.93, prototype="81 %",
+        pooled(lambda m: m.amplitude_covered), (*_KNOWN, *_MIXED), low=0.87, high=0.93, prototype="81 %",
         of_mix=True,
     ),
     Figure(
@@ -213,13 +219,13 @@ FIGURES: tuple[Figure, ...] = (
         _mean_overlap, (*_KNOWN, *_UNKNOWN, *_MIXED), low=0.7, above=_STRONG, format="number", of_mix=True,
     ),
     Figure("class_size", "mean class size", _class_size, KINDS, high=1.5, format="number", of_mix=True),
-    Figure("seconds", "time per case (median)", _seconds, KINDS, format="seconds", of_mix=True),
+    Figure("seconds", "time per case (median)", seconds, KINDS, format="seconds", of_mix=True),
     Figure(
         "seconds_at_1_hz", "time per case sampled at 1 Hz (median)",
-        lambda marks: _seconds([m for m in marks if m.truth.sample_s <= 1.0]), KINDS, high=10.0,
+        lambda marks: seconds([m for m in marks if m.truth.sample_s <= 1.0]), KINDS, high=10.0,
         format="seconds", of_mix=True,
     ),
-    Figure("failed", "cases that failed", _share(lambda m: bool(m.failure)), KINDS, of_mix=True),
+    Figure("failed", "cases that failed", share(lambda m: bool(m.failure)), KINDS, of_mix=True),
 )  # fmt: skip
 """Every row of the table, in its order."""
 BY_KEY = {figure.key: figure for figure in FIGURES}
@@ -240,7 +246,7 @@ def rows(marks: Sequence[Mark]) -> list[dict[str, Any]]:
                 "prototype": figure.prototype,
                 **asdict(estimate),
                 "cases": len(chosen),
-                "met": figure.met(estimate.value),
+                "met": met(figure.low, figure.high, estimate.value),
                 "enough": len(chosen) >= ENOUGH,
                 "by_stratum": _split(figure, marks, STRATUM_NAMES, lambda m: m.truth.stratum),
                 "by_kind": _split(figure, _evenly(figure, marks), figure.kinds, lambda m: m.truth.kind),

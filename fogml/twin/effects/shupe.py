@@ -193,7 +193,7 @@ class ShupeWinding(BiasEffect):
     def signature(self, inputs: Inputs, **shape: float) -> FloatArray:
         """Response over that of theory [deg/h], shape (n,)."""
         state = inputs.memory.kept(f"{self.id} layers", PlantState)
-        travelled = LayeredCoil.of(inputs.coil).travelled(
+        travelled = LayeredCoil(inputs.coil).travelled(
             inputs.time, inputs.temperature("T_in"), inputs.temperature("T_out"), state
         )
         wound, coil = inputs.rate_per_minute(self.id, travelled), inputs.coil
@@ -212,7 +212,7 @@ class AxialGradient(BiasEffect):
         b = S_ax d(T_top - T_bottom)/dt
 
     The axial form of Shupe's integral: a winding that is symmetric layer by layer is not turn by turn. S_ax
-    in deg/h per degC/min. Top and bottom are nodes of the plant (`fogml.twin.plant.ends`), which the effect
+    in deg/h per degC/min. Top and bottom are nodes of the plant (`fogml.twin.plant.coil`), which the effect
     brings along where the twin states none: the bottom follows the plate, the top the lid. Zero in soaks and
     on the plateau of a long ramp, and zero where top and bottom are alike.
 

@@ -11,8 +11,8 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.memory import Memory
+from fogml.twin.plant.heat import ALWAYS_ON, PowerWindows
 from fogml.twin.plant.network import AIR, PlantState, ThermalNetwork
-from fogml.twin.plant.power import ALWAYS_ON, PowerWindows
 
 _ON_SHARE = 0.2
 

@@ -14,8 +14,8 @@ import numpy as np
 
 from fogml.runs.run import BoolArray, FloatArray, Run
 from fogml.twin.plant.estimate import recorded_power
+from fogml.twin.plant.heat import PowerWindows
 from fogml.twin.plant.network import AIR
-from fogml.twin.plant.power import PowerWindows
 from fogml.twin.plant.standard import QUANTITIES
 from fogml.twin.set_up import Plant
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -11,7 +11,7 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.twin.inputs import LEADS
 from fogml.twin.plant.network import AIR, ThermalNetwork
-from fogml.twin.quantities import Quantity
+from fogml.twin.quantities import Quantity, shared
 
 
 @dataclass(frozen=True)
@@ -46,11 +46,11 @@ class ThermalConstants:
 
 
 def _time(name: str, low: float, high: float, meaning: str) -> Quantity:
-    return Quantity(name, "s", (low, high), (low, high), meaning, (1.0, 1e6))
+    return shared(name, "s", (low, high), meaning, (1.0, 1e6))
 
 
 def _capacity(name: str, low: float, high: float) -> Quantity:
-    return Quantity(name, "J/degC", (low, high), (low, high), "heat capacity", (1e-2, 1e6))
+    return shared(name, "J/degC", (low, high), "heat capacity", (1e-2, 1e6))
 
 
 QUANTITIES: tuple[Quantity, ...] = (
@@ -65,8 +65,8 @@ QUANTITIES: tuple[Quantity, ...] = (
     _capacity("hub_capacity", 60.0, 240.0),
     _capacity("electronics_capacity", 60.0, 240.0),
     _capacity("plate_capacity", 2000.0, 10000.0),
-    Quantity("hub_share", "1", (0.2, 0.8), (0.2, 0.8), "link electronics - hub", (0.0, 0.95)),
-    Quantity("plate_share", "1", (0.0, 0.5), (0.0, 0.5), "link plate - case", (0.0, 0.95)),
+    shared("hub_share", "1", (0.2, 0.8), "link electronics - hub", (0.0, 0.95)),
+    shared("plate_share", "1", (0.0, 0.5), "link plate - case", (0.0, 0.95)),
 )
 """The constants of `ThermalConstants` with their units and engineering ranges."""
 
@@ -115,7 +115,9 @@ def standard_network(
         raise InputError(f"thermal plant: coil_nodes is {coil_nodes}; the two faces need 2")
     network = _full(c, coil_nodes, order)
     if order < 6:
-        network = _without_plate(network)
+        capacities = {name: value for name, value in network.capacities.items() if name != "T_plate"}
+        links = {pair: value for pair, value in network.links.items() if "T_plate" not in pair}
+        network = replace(network, capacities=capacities, links=links)
     # Each smaller order joins one node more to the one that it hangs on.
     joined = (("T_hub", "T_in"), ("T_electronics", "T_case"), ("T_in", "T_out"), ("T_out", "T_case"))
     if order < 3:
@@ -143,9 +145,7 @@ def join(network: ThermalNetwork, node: str, onto: str) -> ThermalNetwork:
             target = onto if source == node else source
             moved[target] = moved.get(target, 0.0) + weight
         readings[name] = moved
-    heating = network.heating
-    if heating.node == node:
-        heating = type(heating)(heating.steady_w, heating.initial_w, heating.time_constant_s, onto)
+    heating = replace(network.heating, node=onto) if network.heating.node == node else network.heating
     return ThermalNetwork(capacities, links, readings, heating, network.airflow)
 
 
@@ -189,12 +189,6 @@ def _full(c: ThermalConstants, coil_nodes: int, order: int) -> ThermalNetwork:
 def coil_names(count: int) -> tuple[str, ...]:
     """Names of the coil's nodes from the outer to the inner face."""
     return ("T_out", *(f"T_coil_{i}" for i in range(2, count)), "T_in")
-
-
-def _without_plate(network: ThermalNetwork) -> ThermalNetwork:
-    capacities = {name: value for name, value in network.capacities.items() if name != "T_plate"}
-    links = {pair: value for pair, value in network.links.items() if "T_plate" not in pair}
-    return ThermalNetwork(capacities, links, network.readings, network.heating, network.airflow)
 
 
 # Every constant has its quantity, so that none goes unchecked.

@@ -39,10 +39,7 @@ class ShupeShells(Additive):
 
     name, form, unit, faces = "shupe_pure", "integral over shells", "deg/h/(degC/min)", True
     fine_sensors = True
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Cubic part of the weights over the thickness."""
-        return {"cubic": rng.uniform(0.0, 0.4)}
+    ranges = {"cubic": (0.0, 0.4)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Outer half's rate less inner half's, weighted; scaled to faces' rates for a straight profile."""
@@ -73,10 +70,7 @@ class RateProduct(Additive):
     """Product of the winding's mean temperature and its rate, bending over at the ends."""
 
     name, form, unit = "temperature_rate_product", "saturating product", "deg/h/degC/(degC/min)"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Middle and bend of the product."""
-        return {"middle": rng.uniform(20.0, 30.0), "bend": rng.uniform(90.0, 200.0)}
+    ranges = {"middle": (20.0, 30.0), "bend": (90.0, 200.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """u / sqrt(1 + (u / bend)**2) dT/dt."""
@@ -88,15 +82,12 @@ class GlassGaussian(Additive):
     """A Gaussian peak of the sensitivity to the rate, and a static step by the error function."""
 
     name, form, unit = "glass_transition", "Gaussian peak and error function", "deg/h/(degC/min)"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Transition, width, static part, shift of the transition per decade of rate."""
-        return {
-            "transition_temperature": rng.uniform(-25.0, 55.0),
-            "width": rng.uniform(3.0, 10.0),
-            "static_ratio": rng.uniform(0.0, 0.2),
-            "shift": rng.uniform(2.0, 4.0),
-        }
+    ranges = {
+        "transition_temperature": (-25.0, 55.0),
+        "width": (3.0, 10.0),
+        "static_ratio": (0.0, 0.2),
+        "shift": (2.0, 4.0),
+    }
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """dT/dt exp(-0.75 x**2) + r (1 + erf(x)) / 2 with x = (T - T_g) / w."""
@@ -134,10 +125,7 @@ class SideWind(Additive):
     fine_sensors = True
     demands = Demands(slow_turns=True)
     records = ("angle",)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Direction of the air."""
-        return {"phase": rng.uniform(0.0, 360.0), "cubic": rng.uniform(0.0, 0.4)}
+    ranges = {"phase": (0.0, 360.0), "cubic": (0.0, 0.4)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """cos(angle - phase) d(T_out - T_in)/dt."""
@@ -166,15 +154,3 @@ class SlipEvents(Additive):
         slips = np.where(count > 0, heights, 0.0) * np.sign(travelled)
         decay = np.full(len(slips), world.sample_s / shape["time_constant"])
         return recurrence(decay, slips, 0.0)
-
-
-FORMS = (
-    WarmupStretched,
-    ShupeShells,
-    MohrCurved,
-    RateProduct,
-    GlassGaussian,
-    Leads,
-    SideWind,
-    SlipEvents,
-)

@@ -14,14 +14,7 @@ class PolarisationChirped(Additive):
 
     name, form, unit = "polarization_nonreciprocity", "beat with a drifting period", "deg/h"
     records = ("T_electronics",)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Period and phase at 25 degC, relative change of the period per degC."""
-        return {
-            "period": float(np.exp(rng.uniform(np.log(2.0), np.log(15.0)))),
-            "phase": rng.uniform(0.0, 360.0),
-            "drift": rng.uniform(-2e-4, 2e-4),
-        }
+    ranges = {"period": (2.0, 15.0), "phase": (0.0, 360.0), "drift": (-2e-4, 2e-4)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """sin(2 pi u (1 + drift u) / period + phase)."""
@@ -115,10 +108,7 @@ class Crosstalk(Additive):
     name, form, unit = "electronic_crosstalk", "bent over temperature", "deg/h/degC"
     records = ("T_electronics", "supply")
     demands = Demands(power_steps=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Part of the supply, bend over temperature."""
-        return {"supply_ratio": rng.uniform(-20.0, 20.0), "bend": rng.uniform(-1e-3, 1e-3)}
+    ranges = {"supply_ratio": (-20.0, 20.0), "bend": (-1e-3, 1e-3)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """u (1 + bend u) + ratio (V - V_0)."""
@@ -133,10 +123,7 @@ class TurnOn(Additive):
     name, form, several_runs = "turn_on_bias", "Student's distribution", True
     drawn_per_run = True
     demands = Demands(power_on=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Degrees of freedom."""
-        return {"freedom": rng.uniform(4.0, 10.0)}
+    ranges = {"freedom": (4.0, 10.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """A constant of this run."""
@@ -148,10 +135,7 @@ class Rectification(Additive):
 
     name, form, unit, records = "vibration_rectification", "power near two", "deg/h/g2", ("vibration",)
     largest = 5.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """The power."""
-        return {"exponent": rng.uniform(1.8, 2.2)}
+    ranges = {"exponent": (1.8, 2.2)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """(g / 0.1)**p * 0.01, which is g**2 at 0.1 g."""
@@ -163,10 +147,6 @@ class DriftBent(Additive):
 
     name, stage, form, unit = "rate_ramp", "noise", "line", "deg/h/h"
 
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """None."""
-        return {}
-
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Hours since the first sample."""
         return world.time / 3600.0
@@ -177,30 +157,10 @@ class WanderingLine(Additive):
 
     name, stage, form, unit = "sinusoidal", "noise", "line of wandering phase", "deg/h"
     drawn_per_run = True
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Frequency and phase."""
-        return {
-            "frequency": float(np.exp(rng.uniform(np.log(1e-3), np.log(2e-2)))),
-            "wander": rng.uniform(0.0, 0.2),
-        }
+    ranges = {"frequency": (1e-3, 2e-2), "wander": (0.0, 0.2)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """sin(2 pi f t + phase + random walk of `wander` rad per sqrt(h))."""
         steps = rng.standard_normal(len(world.time)) * np.sqrt(world.sample_s / 3600.0)
         phase = 2.0 * np.pi * rng.random() + shape["wander"] * np.cumsum(steps)
         return np.sin(2.0 * np.pi * shape["frequency"] * world.time + phase)
-
-
-FORMS = (
-    PolarisationChirped,
-    BiasCurve,
-    MachinePickup,
-    FieldBent,
-    SupplyTriangle,
-    Crosstalk,
-    TurnOn,
-    Rectification,
-    DriftBent,
-    WanderingLine,
-)

@@ -17,10 +17,8 @@ class ModeHops(Additive):
     """The source hops between two modes at random times: a telegraph signal."""
 
     name, known, stage, form = "mode_hops", False, "noise", "random telegraph signal"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Mean dwell [s]."""
-        return {"dwell": rng.uniform(1500.0, 5000.0)}
+    ranges = {"dwell": (1500.0, 5000.0)}
+    """Mean dwell [s]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """-1 or 1."""
@@ -70,10 +68,8 @@ class ColdRatchet(Additive):
     """A clamp that gives way a little further with each new coldest temperature, and stays."""
 
     name, known, form = "cold_ratchet", False, "depends on the coldest temperature so far"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Where it begins to give way [degC]."""
-        return {"onset": rng.uniform(-5.0, 15.0)}
+    ranges = {"onset": (-5.0, 15.0)}
+    """Where it begins to give way [degC]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """How far below the onset it ever was [degC]."""
@@ -85,10 +81,8 @@ class FreezeLatch(Additive):
     """Grease that freezes below one temperature and thaws only far above it: one wide relay."""
 
     name, known, form = "freeze_latch", False, "one wide relay"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Where it freezes and thaws [degC]."""
-        return {"freezes": rng.uniform(-12.0, 5.0), "thaws": rng.uniform(28.0, 42.0)}
+    ranges = {"freezes": (-12.0, 5.0), "thaws": (28.0, 42.0)}
+    """Where it freezes and thaws [degC]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """1 while frozen."""
@@ -102,10 +96,8 @@ class Echo(Additive):
     """Heat that comes back an hour later from a place far away."""
 
     name, known, stage, form = "thermal_echo", False, "thermal", "delayed rate of temperature"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Delay [s]."""
-        return {"delay": rng.uniform(2700.0, 6000.0)}
+    ranges = {"delay": (2700.0, 6000.0)}
+    """Delay [s]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """The case's rate of temperature a delay ago."""
@@ -137,10 +129,8 @@ class NarrowResonance(Additive):
     """A mechanical resonance met at one temperature: a dispersion curve a few degrees wide."""
 
     name, known, form = "narrow_resonance", False, "dispersion curve over temperature"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Where and how wide [degC]."""
-        return {"temperature": rng.uniform(0.0, 45.0), "width": rng.uniform(1.5, 4.0)}
+    ranges = {"temperature": (0.0, 45.0), "width": (1.5, 4.0)}
+    """Where and how wide [degC]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """2 x / (1 + x**2)."""
@@ -152,10 +142,8 @@ class TemperatureStairs(Additive):
     """A correction table in the gyro with steps in temperature: a saw-tooth over it."""
 
     name, known, stage, form = "temperature_stairs", False, "readout", "saw-tooth over temperature"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Step and where it lies [degC]."""
-        return {"step": rng.uniform(8.0, 25.0), "offset": rng.random()}
+    ranges = {"step": (8.0, 25.0), "offset": (0.0, 1.0)}
+    """Step and where it lies [degC]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """2 frac(T / step) - 1."""
@@ -166,10 +154,8 @@ class DryFriction(Additive):
     """Dry friction in the mount: a bias that knows only the sign of the temperature's rate."""
 
     name, known, form = "dry_friction", False, "sign of the rate of temperature"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Rate at which it sets in [degC/min]."""
-        return {"onset": rng.uniform(0.01, 0.04)}
+    ranges = {"onset": (0.01, 0.04)}
+    """Rate at which it sets in [degC/min]."""
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """rate / sqrt(rate**2 + onset**2)."""
@@ -193,18 +179,3 @@ class HotBursts(Additive):
         drive = np.sqrt(-np.expm1(-2.0 * ratio)) * rng.standard_normal(n)
         noise = recurrence(np.full(n, ratio), drive, float(rng.standard_normal()))
         return noise * (world.nodes["T_case"] > shape["from"])
-
-
-FORMS = (
-    ModeHops,
-    IntegratorResets,
-    SweptBeat,
-    ColdRatchet,
-    FreezeLatch,
-    Echo,
-    ReversalCount,
-    NarrowResonance,
-    TemperatureStairs,
-    DryFriction,
-    HotBursts,
-)

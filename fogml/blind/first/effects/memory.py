@@ -24,10 +24,7 @@ class HysteresisBoucWen(Additive):
     """Bouc-Wen's hysteresis with exponent 2."""
 
     name, form = "thermal_hysteresis", "Bouc-Wen"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """The half width that a play operator of the same knee has."""
-        return {"half_width": float(np.exp(rng.uniform(np.log(3.0), np.log(20.0))))}
+    ranges = {"half_width": (3.0, 20.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """-z, where dz/dT = 1 / length in unloading and (1 - z**2) / length in loading."""
@@ -67,14 +64,7 @@ class StressSpectrum(Additive):
     """A log-normal spectrum of Maxwell elements with an activation energy."""
 
     name, form = "stress_relaxation", "spectrum of Maxwell elements"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Middle time constant at 25 degC, spread of its logarithm, activation energy."""
-        return {
-            "time_constant": float(np.exp(rng.uniform(np.log(900.0), np.log(20000.0)))),
-            "spread": rng.uniform(0.4, 1.0),
-            "activation_kj": rng.uniform(42.0, 62.0),
-        }
+    ranges = {"time_constant": (900.0, 20000.0), "spread": (0.4, 1.0), "activation_kj": (42.0, 62.0)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """T less the weighted lags of T."""
@@ -93,10 +83,7 @@ class HiddenPlate(Additive):
 
     name, stage, form = "hidden_thermal_node", "thermal", "plate of two layers"
     records = ("T_chamber",)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Share of the deep layer."""
-        return {"deep_share": rng.uniform(0.0, 0.3)}
+    ranges = {"deep_share": (0.0, 0.3)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Plate less coil."""
@@ -162,14 +149,3 @@ class AgeingPower(Additive):
         a = shape["exponent"]
         log = np.log1p(world.time / shape["time_constant"])
         return np.expm1(a * log) / a if abs(a) > 1e-9 else log
-
-
-FORMS = (
-    HysteresisBoucWen,
-    HysteresisPreisach,
-    ScaleFactorPreisach,
-    StressSpectrum,
-    HiddenPlate,
-    MoistureFick,
-    AgeingPower,
-)

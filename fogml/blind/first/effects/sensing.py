@@ -35,10 +35,7 @@ class CoarseSteps(Sensing):
 
     name, form, unit = "sensor_quantisation", "truncation", "degC"
     greatest: ClassVar[float] = 2.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Where the steps lie."""
-        return {"offset": rng.uniform(0.0, 1.0)}
+    ranges = {"offset": (0.0, 1.0)}
 
     def read(self, values: FloatArray, amplitude: float, shape: Shape) -> FloatArray:
         """Whole steps, in the mean unbiased."""
@@ -52,10 +49,7 @@ class Elsewhere(Sensing):
     name, form, unit, fine_sensors = "sensor_placement", "outer sensors more", "1", True
     records = ("T_case",)
     greatest: ClassVar[float] = 1.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """How much more the outer ones feel it."""
-        return {"outer": rng.uniform(0.9, 1.2)}
+    ranges = {"outer": (0.9, 1.2)}
 
     def felt(
         self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
@@ -66,4 +60,41 @@ class Elsewhere(Sensing):
         return temperature + share * (world.nodes["T_case"] - temperature)
 
 
-FORMS = (LagOfTwoStages, CoarseSteps, Elsewhere)
+class StickySensor(Sensing):
+    """One of several sensor elements repeats its last value for minutes, again and again."""
+
+    name, known, form, faces = "sticky_sensor", False, "values held for minutes", True
+    fine_sensors = True
+    greatest: ClassVar[float] = 1.0
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """How long it holds, how often [s], where the first hold lies."""
+        hold = rng.uniform(250.0, 560.0)
+        return {"hold": hold, "interval": hold * rng.uniform(1.5, 4.0), "phase": rng.random()}
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """Inner sensors show the held value by a share of `amplitude`."""
+        if name in ("T_out", "T2", "T4"):
+            return temperature
+        within = (world.time + shape["phase"] * shape["interval"]) % shape["interval"]
+        fresh = within >= shape["hold"]
+        last = np.maximum.accumulate(np.where(fresh, np.arange(len(fresh)), 0))
+        return np.asarray(temperature + amplitude * (temperature[last] - temperature))
+
+
+class CreepingSensor(Sensing):
+    """Sensors whose glue creeps when hot: their error, one for all, grows with the time spent there."""
+
+    name, known, form = "creeping_sensor", False, "error grows with time in heat"
+    greatest: ClassVar[float] = 20.0
+    ranges = {"onset": (25.0, 40.0)}
+    """Where creep sets in [degC]."""
+
+    def felt(
+        self, name: str, temperature: FloatArray, world: World, amplitude: float, shape: Shape
+    ) -> FloatArray:
+        """`amplitude` degC more per 1000 degC min above the onset."""
+        excess = np.maximum(world.nodes["T_coil"] - shape["onset"], 0.0)
+        return np.asarray(temperature + amplitude * np.cumsum(excess) * world.sample_s / 60e3)

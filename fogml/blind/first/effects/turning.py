@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from fogml.blind.first.recurrences import recurrence
 from fogml.blind.frame.form import Additive, Demands, Distorting, ScaleFactor, Shape
 from fogml.blind.frame.record import EARTH_DEG_H, FloatArray, World
 
@@ -15,10 +16,8 @@ class SourceBent(ScaleFactor):
 
     name, form, unit, records = "source_wavelength", "curved", "ppm/degC", ("T_electronics",)
     demands = Demands(turns=True, power_steps=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Curvature [1/degC]."""
-        return {"bend": rng.uniform(-1.5e-3, 1.5e-3)}
+    ranges = {"bend": (-1.5e-3, 1.5e-3)}
+    """Curvature [1/degC]."""
 
     def error(self, world: World, shape: Shape) -> FloatArray:
         """-u (1 + bend u)."""
@@ -47,10 +46,7 @@ class PowerLaw(ScaleFactor):
     """Scale factor that grows with a power of the rate."""
 
     name, form = "sf_nonlinearity", "power law"
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """The power, from linear to quadratic."""
-        return {"exponent": rng.uniform(1.0, 2.0)}
+    ranges = {"exponent": (1.0, 2.0)}
 
     def error(self, world: World, shape: Shape) -> FloatArray:
         """(|Omega| / 100 deg/s)**p."""
@@ -78,10 +74,7 @@ class DeadZone(Distorting):
     name, stage, form, unit = "deadband", "loop", "exponential knee", "deg/h"
     demands, horizontal = Demands(turns=True, small_rates=True), True
     greatest: ClassVar[float] = 20.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Sharpness of the knee."""
-        return {"knee": rng.uniform(1.0, 2.0)}
+    ranges = {"knee": (1.0, 2.0)}
 
     def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
         """w (1 - exp(-|w / w_d|**(2 n))), with w_d the amplitude and n the knee."""
@@ -93,10 +86,7 @@ class Skew(Distorting):
 
     name, stage, form = "logger_skew", "logger", "growing skew"
     greatest: ClassVar[float] = 300.0
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Growth per hour."""
-        return {"growth": rng.uniform(0.0, 0.3)}
+    ranges = {"growth": (0.0, 0.3)}
 
     def distorted(self, output: FloatArray, world: World, amplitude: float, shape: Shape) -> FloatArray:
         """y(t - d), straight between samples."""
@@ -115,10 +105,7 @@ class Cone(Additive):
 
     name, stage, form, unit = "input_axis_misalignment", "rig", "elliptic cone", "mrad"
     records, demands = ("angle",), Demands(slow_turns=True)
-
-    def draw(self, rng: np.random.Generator) -> Shape:
-        """Direction, second harmonic."""
-        return {"direction": rng.uniform(0.0, 360.0), "ellipse": rng.uniform(0.0, 0.1)}
+    ranges = {"direction": (0.0, 360.0), "ellipse": (0.0, 0.1)}
 
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """Pick-up per mrad, and a second harmonic."""
@@ -145,13 +132,32 @@ class UnevenTable(Additive):
         return np.asarray(3600e-6 * world.table_rate * uneven)
 
 
-FORMS = (
-    SourceBent,
-    ModulatorLoop,
-    PowerLaw,
-    Asymmetry,
-    DeadZone,
-    Skew,
-    Cone,
-    UnevenTable,
-)
+class SettlingTable(Additive):
+    """A table whose servo settles slowly after each change of its rate."""
+
+    name, known, stage, form = "settling_table", False, "rig", "slow settling after edges"
+    demands = Demands(turns=True)
+    ranges = {"time_constant": (40.0, 150.0)}
+    """Time constant [s]."""
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """Relaxing sum of the rate's changes, in ppm of them."""
+        change = np.diff(world.table_rate, prepend=0.0)
+        decay = np.full(len(change), world.sample_s / shape["time_constant"])
+        return 3600e-6 * recurrence(decay, -change, 0.0)
+
+
+class HuntingServo(Additive):
+    """A servo that hunts while the table turns: a slow oscillation, its size by the root of the rate."""
+
+    name, known, stage, form = "hunting_servo", False, "rig", "oscillation while turning"
+    demands = Demands(slow_turns=True)
+
+    def draw(self, rng: np.random.Generator) -> Shape:
+        """Period [s] and phase."""
+        return {"period": rng.uniform(150.0, 900.0), "phase": rng.uniform(0.0, 2.0 * np.pi)}
+
+    def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
+        """sqrt(|rate| / 0.1 deg/s) sin(2 pi t / period)."""
+        size = np.sqrt(np.minimum(np.abs(world.table_rate), 1.0) / 0.1)
+        return size * np.sin(2.0 * np.pi * world.time / shape["period"] + shape["phase"])

@@ -183,19 +183,3 @@ class LineWithOvertone(Additive):
         """sin and a share of sin of twice."""
         turn = 2.0 * np.pi * world.time / shape["period"] + shape["phase"]
         return np.sin(turn) + shape["second"] * np.sin(2.0 * turn)
-
-
-FORMS = (
-    PolarisationBeats,
-    PolarisationFading,
-    SmoothBias,
-    KneeBias,
-    ThermostatPickup,
-    ContactorPickup,
-    FieldRemanent,
-    SupplySaturating,
-    CrosstalkOfBoard,
-    RattleThreshold,
-    DriftThatTires,
-    LineWithOvertone,
-)

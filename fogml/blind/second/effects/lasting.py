@@ -230,20 +230,3 @@ class TurnOnOfTwo(Additive):
         """A constant of this run."""
         state = float(rng.choice([-1.0, 1.0]) + shape["scatter"] * rng.standard_normal())
         return np.full(len(world.time), state)
-
-
-FORMS = (
-    LoopOfGrains,
-    LoopOfSlips,
-    LoopOfBoucWen,
-    ScaleLoopOfGrains,
-    ScaleLoopOfSlips,
-    StressStretched,
-    StressPower,
-    HiddenBase,
-    HiddenSlab,
-    WaterOfTwoStages,
-    AgeingOfDays,
-    AgeingOfHeat,
-    TurnOnOfTwo,
-)

@@ -130,16 +130,3 @@ class MotorPoles(Additive):
             np.zeros_like(world.time),
         )
         return 3600e-6 * world.table_rate * pull
-
-
-FORMS = (
-    SourceOwnHeat,
-    ModulatorBehind,
-    SineResidual,
-    CubicRoot,
-    AsymmetryWithRate,
-    LockIn,
-    BufferSkew,
-    Wobble,
-    MotorPoles,
-)

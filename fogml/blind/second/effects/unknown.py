@@ -210,21 +210,3 @@ class RateFatigue(Additive):
         """Lagged size of the rate, where the table rests."""
         tired = late(np.sqrt(np.abs(world.table_rate)), shape["recovers"], world.sample_s)
         return np.where(world.table_rate == 0.0, tired, 0.0)
-
-
-FORMS = (
-    ThresholdSteps,
-    RandomSteps,
-    SmoothWandering,
-    ExcursionMemory,
-    HotCreep,
-    BranchCurves,
-    ConvectionCell,
-    BreathingLine,
-    Condensation,
-    HeatedTelegraph,
-    NarrowComb,
-    TurnbackSteps,
-    WoundCable,
-    RateFatigue,
-)

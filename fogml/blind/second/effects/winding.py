@@ -186,20 +186,3 @@ class SlipByGradient(Additive):
                 held = value
             out[k] = jump
         return out
-
-
-FORMS = (
-    WarmupTwoMasses,
-    WarmupPower,
-    ShupePattern,
-    ShupeCan,
-    MohrLogistic,
-    MohrOneWay,
-    ProductHidden,
-    ProductBent,
-    TransitionRichards,
-    TransitionPeak,
-    LeadsInBay,
-    SectorWind,
-    SlipByGradient,
-)

@@ -177,19 +177,3 @@ class FeelsTheMount(Sensing):
         share = amplitude * (1.0 if name in _OUTER else shape["inner"])
         beside = world.nodes["T_cover" if name in _OUTER else "T_hub"]
         return temperature + share * (beside - temperature)
-
-
-FORMS = (
-    PolarisationProduct,
-    PolarisationCreeping,
-    BiasOfSpline,
-    BiasResonant,
-    ValvePickup,
-    SourceWithPump,
-    HysteresisOfRate,
-    AsymmetryOfStages,
-    CreepingClock,
-    LagBesideContact,
-    StepsThatStick,
-    FeelsTheMount,
-)

@@ -134,16 +134,3 @@ class TiredSensor(Sensing):
         """Gain growing by `amplitude` in an hour above 30 degC."""
         hot = np.cumsum(world.nodes["T_coil"] > 30.0) * world.sample_s / 3600.0
         return temperature + 0.1 * amplitude * hot * (temperature - 25.0)
-
-
-FORMS = (
-    Bistable,
-    Avalanches,
-    Pulses,
-    FastestRate,
-    DistantHeat,
-    LooseConnector,
-    Staircase,
-    SweepingLine,
-    TiredSensor,
-)

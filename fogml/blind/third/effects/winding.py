@@ -222,23 +222,3 @@ class TurnOnOfLaplace(Additive):
     def response(self, world: World, shape: Shape, rng: np.random.Generator) -> FloatArray:
         """A constant of this run."""
         return np.full(len(world.time), rng.laplace())
-
-
-FORMS = (
-    WarmupHunting,
-    ShupeDelayed,
-    MohrSaturating,
-    ProductOfHub,
-    TransitionArctan,
-    LeadsOneFree,
-    ShadowedSide,
-    StickingLayers,
-    LoopOfDuhem,
-    LoopOneSided,
-    ScaleLoopOfDuhem,
-    StressEyring,
-    StressFractional,
-    HiddenMount,
-    AgeingSettles,
-    TurnOnOfLaplace,
-)

@@ -1,4 +1,4 @@
-"""Drawing a unit and its runs: to show given effects, without any of them yet."""
+"""The first reality: its units with their runs, drawn to show given effects, and all of its forms."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fogml.blind.first.effects import coil, electrical, invented, memory, sensing, turning
 from fogml.blind.first.noise import NoiseConstants, draw_noise, draw_series
 from fogml.blind.first.plant import Plant, draw_plant
 from fogml.blind.first.programme import Programme, draw_programme, static_programme
 from fogml.blind.first.sensors import draw_instruments, sense
 from fogml.blind.first.world import happen
 from fogml.blind.frame import nominal
-from fogml.blind.frame.drawing import draw_demands, draw_set_up
-from fogml.blind.frame.form import Demands, Form
+from fogml.blind.frame.form import Demands, Form, draw_demands, draw_set_up, forms_in
+from fogml.blind.frame.reality import Reality
 from fogml.blind.frame.record import World
 from fogml.blind.frame.unit import Unit, UnitRun
 
@@ -71,3 +72,18 @@ def _shown(others: tuple[str, ...], demands: Demands, world: World) -> tuple[str
     names = [name for name in others if name in world.drives]
     names += ["power"] * demands.power_steps + ["fan"] * demands.fan_stops
     return tuple(dict.fromkeys(names))
+
+
+KNOWN = forms_in(coil, memory, electrical, turning, sensing)
+"""Forms of effects that the catalogue holds; some effects have two.
+
+``mount_tilt`` has none: with Earth rate alone on a table that turns, a tilt that a fixture has stays
+far under the noise of every unit here.
+"""
+INVENTED = forms_in(invented, sensing, turning, known=False)
+"""Effects that no library holds."""
+WRONG_STRUCTURE = memory.DeepPlate
+"""Another thermal order than any twin's."""
+
+
+REALITY = Reality("first", KNOWN, INVENTED, WRONG_STRUCTURE, draw_unit)

@@ -1,4 +1,9 @@
-"""Drawing a unit and its runs, days apart: to show given effects, without any of them yet."""
+"""The second reality: its units with their runs, days apart, drawn to show given effects; all of its forms.
+
+A unit's noise is white, a slope of its own between flat and steep, at times a bump, and a walk. The slope is
+a sum of Ornstein-Uhlenbeck processes, one in each half decade of time constants, whose variances follow a
+power of the time constant and scatter about it: no unit's is 1/f.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +13,37 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from fogml.blind.frame import nominal
-from fogml.blind.frame.drawing import draw_demands, draw_set_up
-from fogml.blind.frame.form import Form
+from fogml.blind.frame.form import Form, draw_demands, draw_set_up, forms_in
+from fogml.blind.frame.noise import StateNoise
+from fogml.blind.frame.reality import Reality
 from fogml.blind.frame.record import World
-from fogml.blind.frame.state_noise import StateNoise
 from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.blind.frame.unit import Unit, UnitRun
-from fogml.blind.second.chamber import draw_chamber
-from fogml.blind.second.noise import draw_noise
+from fogml.blind.second.effects import driven, lasting, sensing, turning, unknown, winding
 from fogml.blind.second.plant import Plant, draw_plant
 from fogml.blind.second.programme import Programme, draw_programme, static_programme
-from fogml.blind.second.world import happen
+from fogml.blind.second.world import draw_chamber, happen
+
+_MIDDLE = {"N": 0.004, "B": 0.008, "K": 0.004}
+_TAUS_S = np.geomspace(10.0, 1e5, 9)
+
+
+def draw_noise(rng: np.random.Generator) -> StateNoise:
+    """A unit's noise, each strength log-normal about a middle by a factor of 2.5."""
+    white, flicker, walk = (
+        middle * float(np.exp(np.log(2.5) * np.clip(rng.standard_normal(), -2.0, 2.0)))
+        for middle in _MIDDLE.values()
+    )
+    # Equal variances in each half decade are 1/f; a power of the time constant tilts that.
+    tilt = rng.uniform(-0.35, 0.35)
+    shares = (_TAUS_S / 1000.0) ** tilt * np.exp(0.4 * rng.standard_normal(len(_TAUS_S)))
+    variances, taus = flicker**2 / np.pi * np.log(np.sqrt(10.0)) * shares, _TAUS_S
+    if rng.random() < 0.35:
+        bump = flicker**2 * rng.uniform(0.3, 1.5)
+        variances = np.append(variances, bump)
+        taus = np.append(taus, np.exp(rng.uniform(np.log(30.0), np.log(900.0))))
+    return StateNoise(white, variances, taus, walk)
+
 
 _ANOTHER_DAY, _FALSE, _FALSE_SHARE = 1.2, 2.0, 0.12
 """Noise of the static run relative to the others': usually, and where that run is not of this set-up."""
@@ -85,3 +110,14 @@ def _remembered(past: tuple[float, ...], world: World) -> tuple[float, ...]:
     low, high = int(winding.argmin()), int(winding.argmax())
     turned = [float(winding[k]) for k in sorted((low, high))]
     return (*past, *turned, float(winding[-1]), 22.0)
+
+
+KNOWN = forms_in(winding, lasting, driven, turning, sensing)
+"""Forms of effects that a gyro's physics knows by name; how near the catalogue's are is not asked.
+
+``mount_tilt`` and ``coil_expansion`` have none: with Earth rate alone on a table that turns, and with sensors
+on the coil, no run of a unit here shows them.
+"""
+INVENTED = forms_in(unknown, sensing, known=False)
+"""Effects that no library holds."""
+REALITY = Reality("second", KNOWN, INVENTED, lasting.AnotherOrder, draw_unit)

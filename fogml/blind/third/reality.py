@@ -1,4 +1,4 @@
-"""Drawing a unit and its runs, one after another within days."""
+"""The third reality: its units with their runs, one after another within days, and all of its forms."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from datetime import UTC, datetime, timedelta
 import numpy as np
 
 from fogml.blind.frame import nominal
-from fogml.blind.frame.form import Demands, Form
+from fogml.blind.frame.form import Demands, Form, forms_in
+from fogml.blind.frame.noise import StateNoise
+from fogml.blind.frame.reality import Reality
 from fogml.blind.frame.record import SetUp
-from fogml.blind.frame.state_noise import StateNoise
 from fogml.blind.frame.thermometers import draw_instruments, quick_enough, sense
 from fogml.blind.frame.unit import Unit, UnitRun
+from fogml.blind.third.effects import driven, unknown, winding
 from fogml.blind.third.plant import Plant, draw_plant
 from fogml.blind.third.programme import Programme, draw_programme, static_programme
 from fogml.blind.third.world import happen
@@ -95,3 +97,10 @@ def draw_unit(
         first_day=first_day if rng.random() < 0.5 else None,
     )
     return quick_enough(unit, instruments)
+
+
+KNOWN = forms_in(winding, driven)
+"""Forms of effects that a gyro's physics knows by name; those of supply, field and rig stand elsewhere."""
+INVENTED = forms_in(unknown, known=False)
+"""Effects that no library holds."""
+REALITY = Reality("third", KNOWN, INVENTED, winding.OtherInside, draw_unit)
