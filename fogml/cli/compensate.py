@@ -13,7 +13,8 @@ class CompensateSettings(Settings):
     """Apply a model to a run of any length, in bounded memory.
 
     The file written holds the run's columns and 'drift [deg/h]', 'gyro_compensated [deg/h]' and
-    'flag': 0 good, 1 outside what the model was trained on, 2 window not full (the static part).
+    'flag': 0 good, 1 outside what the model was trained on, 2 a window not full (there the static part) or a
+    memory not settled (there what the run tells of it).
     """
 
     job: ClassVar[str] = "fogml.cli.compensate_job:compensate_and_write"

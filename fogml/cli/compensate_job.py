@@ -22,7 +22,8 @@ if TYPE_CHECKING:
     from fogml.models.base import DriftModel
 
 FLAGS = ("good", "outside_training", "window_not_full")
-"""What the flags 0, 1 and 2 mean."""
+"""What the flags 0, 1 and 2 mean, in JSON."""
+_WORDS = ("good", "outside training", "window or memory not settled")
 
 
 def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> None:
@@ -48,7 +49,8 @@ def compensate_and_write(settings: CompensateSettings, terminal: Terminal) -> No
         terminal.work(f"compensating {settings.run}", total=total) as work,
     ):
         counts = _compensate(model, chain(begun, blocks), out, settings.any_unit, work)
-    _print(settings, model.kind, counts, terminal)
+    memories = [atom.text for atom in model.features_.atoms if atom.settles] if model.features_ else []
+    _print(settings, model.kind, memories, counts, terminal)
 
 
 def _compensate(
@@ -80,7 +82,13 @@ def _compensate(
     return counts
 
 
-def _print(settings: CompensateSettings, kind: str, counts: NDArray[np.int64], terminal: Terminal) -> None:
+def _print(
+    settings: CompensateSettings,
+    kind: str,
+    memories: list[str],
+    counts: NDArray[np.int64],
+    terminal: Terminal,
+) -> None:
     assert settings.run and settings.out
     rows = int(counts.sum())
     values = {
@@ -95,10 +103,16 @@ def _print(settings: CompensateSettings, kind: str, counts: NDArray[np.int64], t
         f"{values['run']} compensated by {kind}, written to {settings.out}",
         ["flag", "samples", "share"],
         [
-            [f"{flag} {name.replace('_', ' ')}", str(count), f"{count / max(rows, 1):.1%}"]
-            for flag, (name, count) in enumerate(zip(FLAGS, counts, strict=True))
+            [f"{flag} {name}", str(count), f"{count / max(rows, 1):.1%}"]
+            for flag, (name, count) in enumerate(zip(_WORDS, counts, strict=True))
         ],
     )
+    if memories and counts[2]:
+        terminal.say(
+            f"The memories {', '.join(memories)} go by what was before the run until they have settled: a lag "
+            "after three time constants, a play once its input has moved by twice its half width. Until then "
+            "(flag 2) the drift that the run tells is taken off; `fogml train` tells what is left there."
+        )
     terminal.result(values)
 
 

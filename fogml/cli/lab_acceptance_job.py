@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from fogml.cli.lab import AcceptanceSettings
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_runs
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -84,13 +84,13 @@ def write_report(
 
 
 def _print(values: dict[str, Any], terminal: Terminal) -> None:
-    from fogml.report.acceptance_page import VERDICTS, limit_words, named
+    from fogml.report.acceptance_page import VERDICTS, figure_words, limit_words, named
 
     rows = []
     for row in values["rows"]:
         if row["tested"]:
             met = {True: "met", False: "NOT met", None: ""}[row["met"]]
-            figures = [number(row["before"]), number(row["after"])]
+            figures = [figure_words(row, "before"), figure_words(row, "after")]
             rows.append([row["name"], *figures, row["unit"], limit_words(row["limit"]), met])
     terminal.table(
         f"{named(values)}: acceptance", ["quantity", "before", "after", "unit", "limit", "outcome"], rows

@@ -217,7 +217,7 @@ def floor_words(run: RunJudgement, number: Callable[[float], str]) -> str:
 
 def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
     """The figures of the test runs as a table, then limits and notes."""
-    from fogml.report.verdict import own_noise_by, worst_run
+    from fogml.report.verdict import own_noise_by, unsettled, worst_run
     from fogml.report.words import label, unit_of
 
     rows = []
@@ -250,6 +250,8 @@ def print_judgement(judgement: Judgement, terminal: Terminal) -> None:
         _say_stability(run, terminal)
         if run.outside_training:
             terminal.say(f"{run.run}: {run.outside_training:.1%} of the samples outside training")
+        if told := unsettled(run):
+            terminal.say(f"{run.run}: {told}")
     spread = judgement.repeatability
     if spread is not None:
         over = f"over {spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"

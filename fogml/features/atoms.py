@@ -118,7 +118,12 @@ class Atom:
     @property
     def instant(self) -> bool:
         """Whether its value is of its signal's present value alone."""
-        return self.window is None and not isinstance(self.declared, Recursion)
+        return self.window is None and not self.settles
+
+    @property
+    def settles(self) -> bool:
+        """Whether its value goes by what was before a run until it has settled."""
+        return self.window is None and isinstance(self.declared, Recursion)
 
     @property
     def of_input_at_rest(self) -> bool:

@@ -5,24 +5,21 @@ Each figure is the one of `fogml.validation` and of ``fogml lab rate``: nothing 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, listed
 from fogml.json_files import finite_json
+from fogml.lab.acceptance_figures import Figure, figures_of, small_rates
 from fogml.lab.acceptance_limits import Limits
-from fogml.lab.acceptance_rows import QUANTITIES, TERMS
-from fogml.lab.acceptance_soaks import soak_table, soaks_tell
-from fogml.lab.rate_json import rate_json
+from fogml.lab.acceptance_rows import QUANTITIES
+from fogml.lab.acceptance_soaks import soak_table
 from fogml.models.table import usable_rows
-from fogml.runs.noise_of_run import moving_temperatures, noise_report
 from fogml.runs.run import Run
 from fogml.signals.averages import AVERAGING_S
 from fogml.validation.judge import judge_run
-from fogml.validation.repeatability import repeatability_of
 from fogml.validation.results import RunJudgement
 from fogml.validation.run_errors import RunErrors, run_errors
 
@@ -31,16 +28,6 @@ if TYPE_CHECKING:
 
 SCHEMA = "fogml.acceptance/1"
 ACCEPTED, REJECTED, INCOMPLETE, NO_LIMITS = "accepted", "rejected", "incomplete", "no_limits"
-
-
-@dataclass(frozen=True)
-class Figure:
-    """What the runs tell of a quantity: before and after compensation, the run it is from, and a remark."""
-
-    before: float
-    after: float
-    of: str
-    remark: str = ""
 
 
 def acceptance_json(
@@ -90,14 +77,22 @@ def acceptance_json(
         judge_run(one, averaging_s, (0.0, 0.0), one.run.earth_known, turn_on_band, noise) for one in errors
     ]
     after = [_compensated(one) for one in errors]
-    figures = dict(_figures(runs, after, judged, noise))
+    figures = dict(figures_of(runs, after, judged, noise, limits))
     rows = [_row(one, figures.get(one.key), limits, model is not None) for one in QUANTITIES]
     seen = _seen(runs, model)
     verdict, reasons = _verdict(rows, limits, seen)
     earth = all(run.earth_known for run in runs)
     notes = [] if earth else ["Earth rate is not known (latitude, input_axis): the bias holds it."]
     notes += [f"{name}: the model was trained on this run" for name in seen]
-    notes += list(dict.fromkeys(note for one in judged for note in one.notes))
+    notes += _left_out(errors)
+    small = {run.name for run in runs if small_rates(run)}
+    if small:
+        notes.append(
+            f"{listed(sorted(small), 3)}: rates about zero, as a test of the threshold; bias and bias "
+            "stability are of other runs where there are any"
+        )
+    turned = {note for one in errors for note in usable_rows(one.run, one.full)[1]}
+    notes += list(dict.fromkeys(note for one in judged for note in one.notes if note not in turned))
     values: dict[str, Any] = {
         "schema": SCHEMA,
         "serial_number": runs[0].facts.unit,
@@ -108,7 +103,7 @@ def acceptance_json(
         "runs": [_run(run, one) for run, one in zip(runs, judged, strict=True)],
         "model": None if model is None else _model(model),
         "limits": _limits(limits),
-        "soaks": soak_table(judged),
+        "soaks": soak_table([one for one in judged if one.run not in small]),
         "rows": rows,
         "verdict": verdict,
         "reasons": reasons,
@@ -135,84 +130,22 @@ def _errors(run: Run, model: DriftModel | None) -> RunErrors:
     return RunErrors(run, run.error_deg_h, nothing, nothing, np.zeros(len(run), np.int8), full, used, notes)
 
 
+def _left_out(errors: Sequence[RunErrors]) -> list[str]:
+    """What figures of the bias leave out, of all runs in one line."""
+    out = {one.run.name: int((one.full & ~one.used).sum()) for one in errors}
+    held = [name for name, count in out.items() if count]
+    if not held:
+        return []
+    return [
+        f"{listed(held, 3)}: bias and bias stability are of the table at rest; {sum(out.values())} samples "
+        "while it turns or changes its rate are left out"
+    ]
+
+
 def _compensated(errors: RunErrors) -> Run:
     """The run as it is after compensation."""
     columns = {**errors.run.columns, "gyro": errors.run.gyro_deg_h - errors.drift}
     return Run.derived(errors.run.name, columns, errors.run.facts, "deg/h")
-
-
-def _figures(
-    before: Sequence[Run], after: Sequence[Run], judged: Sequence[RunJudgement], noise: Run | None
-) -> Iterator[tuple[str, Figure]]:
-    """Each quantity that the runs tell."""
-    for key in _OF_RUNS:
-        told = [one for one in judged if getattr(one.after, key) is not None]
-        if told:
-            worst = max(told, key=lambda one: abs(getattr(one.after, key)))
-            yield key, Figure(getattr(worst.before, key), getattr(worst.after, key), worst.run)
-    for key, pair in soaks_tell(judged).items():
-        if all(getattr(one.after, key) is None for one in judged):
-            yield key, Figure(*pair, "all runs together")
-    spread = repeatability_of(judged)
-    if spread is not None:
-        over = f"{spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
-        yield "bias_repeatability", Figure(spread.bias.before, spread.bias.after, over)
-        if spread.scale_factor is not None:
-            figure = spread.scale_factor
-            yield "scale_factor_repeatability", Figure(figure.before, figure.after, over)
-    yield from _of_rates(before, after)
-    yield from _of_noise(before, after, noise)
-
-
-_OF_RUNS = (
-    "bias",
-    "bias_stability",
-    "bias_stability_10s",
-    "temperature_sensitivity",
-    "hysteresis",
-    "scale_factor_error",
-    "scale_factor_nonlinearity",
-    "scale_factor_asymmetry",
-    "turn_on_time",
-)
-"""Figures of `fogml.validation.results.Metrics`, the largest of any run."""
-
-
-def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str, Figure]]:
-    """What the tests on a rate table tell."""
-    try:
-        told = [rate_json(runs, source="") for runs in (before, after)]
-    except InputError:
-        return
-    names = ", ".join(run.name for run in before if "rate" in run.columns)
-    sensed = [one["temperature_sensitivity"] for one in told]
-    if all(sensed):
-        before_ppm, after_ppm = (one["ppm_per_degC"] for one in sensed)
-        remark = f"{len(sensed[0]['temperature'])} temperatures"
-        yield "scale_factor_temperature_sensitivity", Figure(before_ppm, after_ppm, names, remark)
-    for key in ("threshold", "resolution"):
-        unseen, seen = (None if one[key] is None else one[key]["below_deg_h"] for one in told)
-        if unseen is not None and seen is not None:
-            over = told[1][key]["above_deg_h"]
-            yield key, Figure(unseen, seen, names, f"above {over:.3g}" if over else "at most")
-
-
-def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) -> Iterator[tuple[str, Figure]]:
-    """Noise terms of a static run: that which is named, else the longest at constant temperature."""
-    pairs = [(noise, noise)] if noise is not None else list(zip(before, after, strict=True))
-    static = [pair for pair in pairs if not pair[0].rate.any() and not moving_temperatures(pair[0])]
-    if not static:
-        return
-    pair = max(static, key=lambda one: one[0].span_s)
-    try:
-        told = [noise_report(run)["terms"] for run in pair]
-    except InputError:
-        return
-    for key, letter in TERMS.items():
-        found, compensated = (one[letter]["value"] for one in told)
-        if found is not None and compensated is not None:
-            low, high = told[0][letter]["ci"]
-            yield key, Figure(found, compensated, pair[0].name, f"90 % of {low:.3g} to {high:.3g}")
 
 
 def _row(quantity: Any, found: Figure | None, limits: Limits, compensated: bool) -> dict[str, Any]:
@@ -227,12 +160,13 @@ def _row(quantity: Any, found: Figure | None, limits: Limits, compensated: bool)
         "tested": found is not None,
         "before": None if found is None else found.before,
         "after": None if found is None or not compensated else found.after,
+        "at_most": found is not None and found.at_most,
         "of": None if found is None else found.of,
         "remark": f"not tested: needs {quantity.needs}" if found is None else found.remark,
         "limit": None if limit is None else limit.as_json(),
         "met": None,
     }
-    if limit is not None and found is not None:
+    if limit is not None and found is not None and (limit.holds(found.after) or not found.at_most):
         row["met"] = bool(limit.holds(found.after))
     return row
 
@@ -247,13 +181,19 @@ def _verdict(rows: Sequence[Mapping[str, Any]], limits: Limits, seen: Sequence[s
         return NO_LIMITS, ["no limits are stated"]
     limited = [row for row in rows if row["limit"] is not None]
     missed = [f"{row['name']} is over its limit" for row in limited if row["met"] is False]
-    lacking = [f"{row['name']} has a limit and was not tested" for row in limited if row["met"] is None]
+    lacking = [_lacking(row) for row in limited if row["met"] is None]
     fitted = [f"{name} is a training run of the model, which says nothing of another run" for name in seen]
     if missed:
         return REJECTED, [*missed, *lacking, *fitted]
     if lacking or fitted:
         return INCOMPLETE, [*lacking, *fitted]
     return ACCEPTED, [f"all {len(limited)} limits are met"]
+
+
+def _lacking(row: Mapping[str, Any]) -> str:
+    if row["tested"]:
+        return f"{row['name']} is only known to be at most a figure that is over its limit"
+    return f"{row['name']} has a limit and was not tested"
 
 
 def _run(run: Run, judged: RunJudgement) -> dict[str, Any]:

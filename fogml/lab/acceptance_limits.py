@@ -27,6 +27,10 @@ class Limit:
         """Whether a value is allowed."""
         return self.low <= value <= self.high
 
+    def excess(self, value: float) -> float:
+        """How far a value is beyond the bounds; 0 within."""
+        return max(self.low - value, value - self.high, 0.0)
+
     def as_json(self) -> dict[str, float | None]:
         """The bounds, null where there is none."""
         return {

@@ -21,14 +21,16 @@ _APPROACH = {"up": "up", "down": "down", "none": "start"}
 def soak_table(judged: Sequence[RunJudgement]) -> list[dict[str, Any]]:
     """One line a soak temperature, ascending: biases up, down and at the start [deg/h], and hysteresis.
 
-    Of each run alone where a run holds both ways; else of all runs together. Soaks of the same temperature
-    and way are averaged.
+    Of each run alone that holds several temperatures, where a run holds both ways; else of all runs
+    together. Soaks of the same temperature and way are averaged.
     """
     groups = [(one.run, list(one.soaks)) for one in judged if one.soaks]
-    if not any({soak.approach for soak in soaks} >= {"up", "down"} for _, soaks in groups):
+    if any({soak.approach for soak in soaks} >= {"up", "down"} for _, soaks in groups):
+        groups = [(run, soaks) for run, soaks in groups if len(_by_temperature(soaks)) > 1]
+    else:
         together = [soak for _, soaks in groups for soak in soaks]
         groups = [("all runs together" if len(groups) > 1 else groups[0][0], together)] if groups else []
-    return [line for run, soaks in groups for line in _lines(run, soaks)]
+    return [_line(run, group) for run, soaks in groups for group in _by_temperature(soaks)]
 
 
 def soaks_tell(judged: Sequence[RunJudgement]) -> dict[str, tuple[float, float]]:
@@ -46,7 +48,7 @@ def soaks_tell(judged: Sequence[RunJudgement]) -> dict[str, tuple[float, float]]
     return found
 
 
-def _lines(run: str, soaks: list[SoakBias]) -> list[dict[str, Any]]:
+def _by_temperature(soaks: list[SoakBias]) -> list[list[SoakBias]]:
     order = sorted(soaks, key=lambda one: one.temperature)
     groups: list[list[SoakBias]] = []
     for soak in order:
@@ -54,7 +56,7 @@ def _lines(run: str, soaks: list[SoakBias]) -> list[dict[str, Any]]:
             groups[-1].append(soak)
         else:
             groups.append([soak])
-    return [_line(run, group) for group in groups]
+    return groups
 
 
 def _line(run: str, group: list[SoakBias]) -> dict[str, Any]:

@@ -76,11 +76,12 @@ def rate_json(
     """
     criteria = Criteria() if criteria is None else criteria
     read = _read(runs, settle_s)
-    main = _main_ladder(read, criteria)
+    greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
+    main = _main_ladder(read, greatest, criteria)
     line, held = (None, None) if main is None else main
     scale = 1.0 if line is None else line.scale_factor
-    greatest = max((float(np.abs(p.rate).max()) for _, p in read.ladders if len(p)), default=0.0)
-    zero, steps = _small(read, greatest, scale, criteria)
+    small = _small(read, greatest, scale, criteria)
+    zero, steps = (_by_size(answers) for answers in small)
     band = bandwidth(read.gains, scale)
     limit = min(read.slews, key=lambda one: one[0], default=(0.0, None))[1]
     followed = greatest if held is None else held.followed
@@ -101,8 +102,17 @@ def rate_json(
         "slew": None if limit is None else asdict(limit),
         "temperature_sensitivity": None
         if sensed is None
-        else {key: v.tolist() if isinstance(v, np.ndarray) else v for key, v in vars(sensed).items()},
+        else {
+            key: v.tolist() if isinstance(v, np.ndarray) else v
+            for key, v in vars(sensed).items()
+            if key != "runs"
+        },
         "count_arcsec": _count(runs),
+        "told_by": {
+            "threshold": list(small[0]),
+            "resolution": list(small[1]),
+            "temperature_sensitivity": [] if sensed is None else list(sensed.runs),
+        },
         "zero_answers": [asdict(one) for one in zero],
         "step_answers": [asdict(one) for one in steps],
         "gains": [asdict(one) for one in read.gains],
@@ -134,16 +144,16 @@ def _read(runs: Sequence[Run], settle_s: float | None) -> _Read:
     return _Read(ladders, gains, slews)
 
 
-def _main_ladder(read: _Read, criteria: Criteria) -> tuple[Line, Range] | None:
-    """Of the run, and the temperature, with the most different large rates; a scale factor that goes with
-    temperature is no nonlinearity."""
+def _main_ladder(read: _Read, greatest: float, criteria: Criteria) -> tuple[Line, Range] | None:
+    """Of the run, and the temperature, with the most different large rates against the greatest of all
+    [deg/h]; a scale factor that goes with temperature is no nonlinearity."""
     best: tuple[Line, Range] | None = None
     most = 0
     for run, whole in read.ladders:
         for plateaus in by_temperature(run, whole):
             found = scale_line(plateaus, criteria)
             rate = merged(plateaus.rate, plateaus.rate_error)
-            levels = len(np.unique(rate[np.abs(rate) >= criteria.small * np.abs(rate).max()]))
+            levels = len(np.unique(rate[np.abs(rate) >= criteria.small * greatest]))
             if found is not None and levels > most:
                 best, most = found, levels
     return best
@@ -151,14 +161,18 @@ def _main_ladder(read: _Read, criteria: Criteria) -> tuple[Line, Range] | None:
 
 def _small(
     read: _Read, greatest: float, scale: float, criteria: Criteria
-) -> tuple[list[Answer], list[Answer]]:
-    """Answers to rates about zero, and to small steps away from it, of all runs."""
-    zero, steps = [], []
-    for _, plateaus in read.ladders:
-        zero += zero_answers(near_zero(plateaus, greatest, criteria), scale, criteria)
-        steps += step_answers(plateaus, greatest, scale, criteria)
-    by_size = [sorted(answers, key=lambda one: one.size) for answers in (zero, steps)]
-    return by_size[0], by_size[1]
+) -> tuple[dict[str, list[Answer]], dict[str, list[Answer]]]:
+    """Answers to rates about zero, and to small steps away from it, by the runs that hold them."""
+    zero, steps = {}, {}
+    for run, plateaus in read.ladders:
+        zero[run.name] = zero_answers(near_zero(plateaus, greatest, criteria), scale, criteria)
+        steps[run.name] = step_answers(plateaus, greatest, scale, criteria)
+    held = [{name: answers for name, answers in of.items() if answers} for of in (zero, steps)]
+    return held[0], held[1]
+
+
+def _by_size(answers: dict[str, list[Answer]]) -> list[Answer]:
+    return sorted((one for of in answers.values() for one in of), key=lambda one: one.size)
 
 
 def _range(held: Range | None) -> dict[str, Any] | None:

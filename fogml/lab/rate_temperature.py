@@ -45,6 +45,8 @@ class Sensitivity:
         Of a parabola; None for fewer than `LEAST_FOR_CURVE` temperatures.
     temperature, scale_factor
         One point a soak: temperature [degC] and output over input; shape (s,).
+    runs
+        Names of the runs that tell it.
     """
 
     ppm_per_degC: float
@@ -52,13 +54,16 @@ class Sensitivity:
     curvature_ppm_per_degC2: float | None
     temperature: FloatArray
     scale_factor: FloatArray
+    runs: tuple[str, ...]
 
 
 def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h: float) -> Sensitivity | None:
-    """From the steps of the table's rate in all runs; None where the temperatures span too little.
+    """From the steps of the table's rate; None where the temperatures span too little.
 
     A step is taken between pieces just beside it, so that a drifting bias drops out, and the two senses of a
-    rate may differ in their scale factors.
+    rate may differ in their scale factors. Of runs that hold temperatures apart by themselves, where there
+    are such: one at a single temperature turns at rates of its own, of which nonlinearity makes another
+    scale factor. Of all together where there are none.
 
     Parameters
     ----------
@@ -69,9 +74,11 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
     most_deg_h
         The greatest rate that the output follows [deg/h].
     """
-    parts = [_steps(run, least_deg_h, most_deg_h) for run in runs if run.temperature_columns]
-    steps = np.concatenate([np.empty((0, 4)), *parts])
-    if len(steps) == 0 or np.ptp(steps[:, 0]) < LEAST_SPAN_DEGC:
+    parts = {run.name: _steps(run, least_deg_h, most_deg_h) for run in runs if run.temperature_columns}
+    parts = {name: part for name, part in parts.items() if len(part)}
+    parts = {name: part for name, part in parts.items() if _apart(part)} or parts
+    steps = np.concatenate([np.empty((0, 4)), *parts.values()])
+    if not _apart(steps):
         return None
     x, y = _soaks(steps)
     columns = 3 if len(x) >= LEAST_FOR_CURVE else 2
@@ -84,7 +91,11 @@ def temperature_sensitivity(runs: Sequence[Run], least_deg_h: float, most_deg_h:
         deviation = float(np.sqrt(left @ left / (len(x) - columns)))
         se = float(1e6 * deviation * np.sqrt(np.linalg.inv(matrix.T @ matrix)[1, 1]) / solved[0])
     curve = 1e6 * float(solved[2] / solved[0]) if columns == 3 else None
-    return Sensitivity(1e6 * float(solved[1] / solved[0]), se, curve, x, y)
+    return Sensitivity(1e6 * float(solved[1] / solved[0]), se, curve, x, y, tuple(parts))
+
+
+def _apart(steps: FloatArray) -> bool:
+    return len(steps) > 0 and bool(np.ptp(steps[:, 0]) >= LEAST_SPAN_DEGC)
 
 
 def _steps(run: Run, least: float, most: float) -> FloatArray:

@@ -1,7 +1,8 @@
 """Tests on a rate table: scale factor, range, threshold, dead zone and resolution (IEEE Std 952).
 
-Every plateau of the table's rate is one point of output over input. The line through them, with a bias
-that drifts steadily, is the scale factor; small rates against that line tell the rest.
+Every plateau of the table's rate is one point of output over input. The line through them is the scale
+factor; small rates against that line tell the rest. A bias that drifts steadily is told by rates that come
+again: of rates that come once, it can't be told from a scale factor that goes with their size.
 """
 
 from __future__ import annotations
@@ -10,9 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fogml.lab.rate_pieces import ROUND_OFF_DEG_H, Plateaus, merged
-from fogml.runs.run import FloatArray
+from fogml.validation.rate_ladder import LEAST_LEVELS, nonlinearity_ppm
 
 LEAST_FOR_DRIFT = 3
 """Plateaus that a straight drift needs: two would leave nothing over."""
@@ -49,14 +51,15 @@ class Criteria:
 
 @dataclass(frozen=True)
 class Line:
-    """Output over rate: scale factor, its standard error, and what the rates leave [ppm of the greatest].
+    """Output over rate: scale factor, its standard error, and what the rates leave [ppm].
 
     Attributes
     ----------
     scale_factor, se
         Output over input.
     nonlinearity_ppm
-        Greatest deviation from the line over the greatest rate; None for fewer than four rates.
+        Greatest deviation of a rate's output from the line over the greatest output; None for fewer than
+        four rates.
     asymmetry_ppm
         Scale factor of the positive rates less that of the negative ones; None where one sense lacks.
     """
@@ -118,8 +121,8 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
         below = size < 0.5 * (sizes[place - 1] + sizes[place])
         if np.ptp(plateaus.rate[below]) == 0.0:
             break
-        solved = _fit(plateaus[below])
-        expected = _design(plateaus) @ solved
+        scale, bias, drift = _fit(plateaus[below])
+        expected = scale * plateaus.rate + bias + drift * plateaus.time
         top = (size >= 0.5 * (sizes[place - 1] + sizes[place])) & within
         missed = np.abs(plateaus.output - expected)[top].max(initial=0.0)
         if missed <= criteria.range_error * sizes[place]:
@@ -133,42 +136,50 @@ def scale_line(plateaus: Plateaus, criteria: Criteria) -> tuple[Line, Range] | N
     return _line(kept, criteria), Range(float(np.abs(kept.rate).max()), exceeded, output)
 
 
-def _design(plateaus: Plateaus) -> FloatArray:
-    since = plateaus.time - plateaus.time.mean() if len(plateaus) else plateaus.time
-    return np.column_stack([plateaus.rate, np.ones(len(plateaus)), since / max(np.ptp(since), 1.0)])
+def _levels(plateaus: Plateaus) -> NDArray[np.intp]:
+    """Number of each plateau's rate among those that differ, shape (k,)."""
+    return np.unique(merged(plateaus.rate, plateaus.rate_error), return_inverse=True)[1]
 
 
-def _fit(plateaus: Plateaus) -> FloatArray:
-    matrix = _design(plateaus)
-    # With few plateaus a drift would fit anything.
-    columns = 3 if len(plateaus) > 4 else 2
-    solved = np.zeros(3)
-    solved[:columns] = np.linalg.lstsq(matrix[:, :columns], plateaus.output, rcond=None)[0]
-    return solved
+def _drift(plateaus: Plateaus, level: NDArray[np.intp]) -> float | None:
+    """Steady drift of the bias by rates that come again [deg/h per s]; None where none does."""
+    count = np.bincount(level)
+    time, output = (
+        values - (np.bincount(level, values) / count)[level] for values in (plateaus.time, plateaus.output)
+    )
+    return float(time @ output / (time @ time)) if (count > 1).any() else None
+
+
+def _fit(plateaus: Plateaus) -> tuple[float, float, float]:
+    """Scale factor, bias [deg/h] at time 0 and its drift [deg/h per s]."""
+    drift = _drift(plateaus, _levels(plateaus)) or 0.0
+    line = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
+    scale, bias = np.linalg.lstsq(line, plateaus.output - drift * plateaus.time, rcond=None)[0].tolist()
+    return scale, bias, drift
 
 
 def _line(plateaus: Plateaus, criteria: Criteria) -> Line:
-    solved, matrix = _fit(plateaus), _design(plateaus)
-    columns = 3 if len(plateaus) > 4 else 2
-    left = plateaus.output - matrix @ solved
-    freedom = max(len(plateaus) - columns, 1)
+    scale, bias, drift = _fit(plateaus)
+    above = plateaus.output - drift * plateaus.time - bias
+    left = above - scale * plateaus.rate
+    level = _levels(plateaus)
+    count = np.bincount(level)
+    matrix = np.column_stack([plateaus.rate, np.ones(len(plateaus))])
+    if len(plateaus) > 4 and (count > 1).any():
+        matrix = np.column_stack([matrix, plateaus.time - plateaus.time.mean()])
+    freedom = max(len(plateaus) - matrix.shape[1], 1)
     # What the plateaus' own noise makes, or what they scatter by, whichever is more.
     deviation = max(float(np.sqrt(left @ left / freedom)), float(np.sqrt(np.mean(plateaus.error**2))))
-    inverse = np.linalg.pinv(matrix[:, :columns].T @ matrix[:, :columns])
+    inverse = np.linalg.pinv(matrix.T @ matrix)
     greatest = float(np.abs(plateaus.rate).max())
-    levels = len(np.unique(merged(plateaus.rate, plateaus.rate_error)))
     asymmetry, least = None, criteria.small * greatest
     senses = [plateaus.rate > least, plateaus.rate < -least]
-    if levels >= 4 and all(sense.any() for sense in senses):
+    if len(count) >= LEAST_LEVELS and all(sense.any() for sense in senses):
         # The gain of |rate| beside that of the rate is half of the difference of the two senses.
-        both = np.column_stack([matrix[:, :columns], np.abs(plateaus.rate)])
-        asymmetry = 2e6 * float(np.linalg.lstsq(both, plateaus.output, rcond=None)[0][-1]) / float(solved[0])
-    return Line(
-        float(solved[0]),
-        deviation * float(np.sqrt(inverse[0, 0])),
-        1e6 * float(np.abs(left).max()) / greatest if levels >= 4 else None,
-        asymmetry,
-    )
+        both = np.column_stack([plateaus.rate, np.ones(len(plateaus)), np.abs(plateaus.rate)])
+        asymmetry = 2e6 * float(np.linalg.lstsq(both, above, rcond=None)[0][-1]) / scale
+    means = [np.bincount(level, values) / count for values in (plateaus.rate, above)]
+    return Line(scale, deviation * float(np.sqrt(inverse[0, 0])), nonlinearity_ppm(*means), asymmetry)
 
 
 def near_zero(plateaus: Plateaus, greatest: float, criteria: Criteria) -> Plateaus:
@@ -190,7 +201,8 @@ def zero_answers(small: Plateaus, scale_factor: float, criteria: Criteria) -> li
     middle = np.abs(rate) <= ROUND_OFF_DEG_H + small.rate_error.max()
     tested = np.unique(sizes[~middle])
     of_size = np.sign(rate)[:, None] * (sizes[:, None] == tested)
-    steady = _design(small)[:, 1:]
+    since = small.time - small.time.mean()
+    steady = np.column_stack([np.ones(len(small)), since / max(np.ptp(since), 1.0)])
     if middle.sum() >= LEAST_FOR_DRIFT:
         bias = np.linalg.lstsq(steady[middle], small.output[middle], rcond=None)[0]
     else:

@@ -47,7 +47,7 @@ def acceptance_page(values: Mapping[str, Any]) -> str:
         soaks=_soaks(values),
         figure=_figure(values),
         runs=_runs(values),
-        files=_files(values),
+        files=files_of(values),
     )
 
 
@@ -67,19 +67,25 @@ def limit_words(limit: Mapping[str, float | None] | None) -> str:
     return f"± {stated(high)}" if low == -high else f"{stated(low)} … {stated(high)}"
 
 
+def figure_words(row: Mapping[str, Any], when: str) -> str:
+    """A row's figure as people write it: one that is only known to be no more than that with its sign."""
+    told = number(row[when])
+    return f"≤ {told}" if row.get("at_most") and row[when] is not None else told
+
+
 def _shown(row: Mapping[str, Any]) -> dict[str, Any]:
     """A row of the main table in words."""
     ieee = row["ieee_952"] + (f" ({row['clause']})" if row["clause"] else "")
     outcome = {True: ("met", "✓ met"), False: ("missed", "✗ not met")}.get(row["met"], ("", ""))
     if row["limit"] is not None and row["met"] is None:
-        outcome = ("care", "! not tested")
+        outcome = ("care", "! open" if row["tested"] else "! not tested")
     return {
         "name": row["name"],
         "standards": " · ".join(part for part in (ieee, row["gjb_2426a"]) if part),
         "unit": _UNITS.get(row["unit"], row["unit"]),
         "tested": row["tested"],
-        "before": number(row["before"]),
-        "after": number(row["after"]),
+        "before": figure_words(row, "before"),
+        "after": figure_words(row, "after"),
         "limit": limit_words(row["limit"]),
         "kind": outcome[0],
         "outcome": outcome[1],
@@ -91,7 +97,8 @@ def _about(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     limits, model = values["limits"], values["model"]
     dates = sorted({run["started"][:10] for run in values["runs"] if run["started"]})
     temperatures = [end for run in values["runs"] for end in run["temperature_degC"] if end is not None]
-    about = [("Tested", listed(dates, 6) if dates else "date not stated")]
+    tested = dates if len(dates) < 3 else [f"{dates[0]} to {dates[-1]}"]
+    about = [("Tested", listed(tested, 2) if dates else "date not stated")]
     if temperatures:
         about.append(("Temperatures", f"{number(min(temperatures))} to {number(max(temperatures))} °C"))
     about.append(("Averages", f"{values['averaging_s']:.4g} s"))
@@ -185,7 +192,7 @@ def _runs(values: Mapping[str, Any]) -> Table:
     return Table(columns, tuple(rows))
 
 
-def _files(values: Mapping[str, Any]) -> list[tuple[str, str]]:
+def files_of(values: Mapping[str, Any]) -> list[tuple[str, str]]:
     """Name and SHA-256 of everything that the report stands on."""
     files = [(run["run"], run["sha256"]) for run in values["runs"]]
     if values["model"] is not None:

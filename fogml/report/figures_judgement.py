@@ -20,7 +20,7 @@ from fogml.validation.results import AveragedSeries, RunJudgement
 
 STEADY_DEG_C_PER_MIN = 0.05
 """Temperature rates within this are steady: neither warming nor cooling."""
-_FLAGS = {1: ("outside training", "diamond-open", style.ORANGE), 2: ("window not full", "x", style.PURPLE)}
+_FLAGS = {1: ("outside training", "diamond-open", style.ORANGE), 2: ("not settled", "x", style.PURPLE)}
 _DIRECTIONS = (
     ("warming", style.WARMING, "triangle-up", 1),
     ("cooling", style.COOLING, "triangle-down", -1),

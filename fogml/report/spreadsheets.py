@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fogml.escaping import cell_text
-from fogml.report.acceptance_page import VERDICTS, limit_words, named
+from fogml.report.acceptance_page import VERDICTS, files_of, limit_words, named
 from fogml.report.spreadsheet import whole_workbook
 
 _HEADS = ("quantity", "name", "IEEE Std 952", "clause", "GJB 2426A", "unit", "before", "after")
@@ -40,9 +40,8 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         for row in values["rows"]:
             limit = row["limit"] or {"from": None, "to": None}
             met = row["met"] if row["tested"] else "not tested"
-            rows.append(
-                (*(row[key] for key in keys), limit["from"], limit["to"], met, row["of"], row["remark"])
-            )
+            remark = f"at most; {row['remark']}" if row.get("at_most") else row["remark"]
+            rows.append((*(row[key] for key in keys), limit["from"], limit["to"], met, row["of"], remark))
         writer.table(sheet, (*_HEADS, *_MORE), rows, 3)
         sheet.set_column(0, 4, 24)
         sheet.set_column(5, 12, 14)
@@ -66,6 +65,14 @@ def acceptance_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:
         ]
         writer.table(sheet, ("run", "started", "length [h]", "T from [degC]", "T to [degC]", "SHA-256"), runs)
         sheet.set_column(0, 5, 20)
+        sheet = writer.sheet("Stands on")
+        limits = values["limits"] or {}
+        stated = [("date of issue", values["date"])]
+        stated += [(key, limits.get(key)) for key in ("customer", "document")]
+        stated += [(f"SHA-256 of {name}", digest) for name, digest in files_of(values)]
+        stated += [("note", note) for note in values["notes"]]
+        writer.table(sheet, ("what", "value"), stated)
+        sheet.set_column(0, 1, 40)
 
 
 def batch_spreadsheet(values: Mapping[str, Any], path: str | Path) -> None:

@@ -31,6 +31,7 @@ from fogml.report.verdict import (
     stated_limits,
     subject,
     unseen,
+    unsettled,
     verdict,
     worst_run,
 )
@@ -144,7 +145,7 @@ def _section(index: int, judged: RunJudgement, judgement: Judgement) -> RunSecti
         by_regime=figures_judgement.rms_by_regime(judged),
         metrics=metrics_table(judged),
         findings=noticed(judged.findings),
-        left_out=_left_out(judged),
+        left_out=" ".join(filter(None, (_left_out(judged), unsettled(judged)))),
     )
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from fogml.report.tables import reference_of
 from fogml.report.words import averages, label, listed, number, percent, plural, stated, unit_of
 from fogml.validation.advice import SEEN, Advice, Asked
 from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
+UNSETTLED_SHARE = 0.01
+"""A smaller share of samples at flag 2 is of windows that fill, and is not told."""
 GRADES = {
     "use": ("met", "✓", "Use it"),
     "use_with_care": ("care", "!", "Use with care"),
@@ -213,4 +217,17 @@ def interval_words(interval: Mapping[str, Any]) -> str:
     return (
         f"± {number(float(interval['half_width_90']))} deg/h for {averages(interval['averaging_s'])}, "
         f"from {plural(int(interval['residuals']), 'residual')} of parts left out of training"
+    )
+
+
+def unsettled(judged: RunJudgement) -> str:
+    """What is left where the model's memories went by what was before the run; empty where that is little."""
+    if judged.not_settled < UNSETTLED_SHARE:
+        return ""
+    flag, after = judged.series.flag, judged.series.after
+    rms = [number(float(np.sqrt(np.mean(after[part] ** 2)))) for part in (flag == 2, flag != 2) if part.any()]
+    there = f"rms after {' deg/h there, '.join(rms)} deg/h elsewhere" if len(rms) == 2 else "everywhere here"
+    return (
+        f"{percent(judged.not_settled)} of the samples judged come before the model's memories have settled "
+        f"(flag 2): what the unit went through before the run still matters. {there[:1].upper()}{there[1:]}."
     )

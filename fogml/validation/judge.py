@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.models.base import OUTSIDE
+from fogml.models.base import NOT_FULL, OUTSIDE
 from fogml.runs.findings import Finding
 from fogml.runs.noise_of_run import noise_report
 from fogml.runs.regimes import regimes
@@ -232,6 +232,7 @@ def judge_run(
         short_averages=metrics.short_averages,
         scale_factor_se=metrics.scale_factor_se(after),
         soaks=metrics.soak_biases(before, after),
+        not_settled=float((errors.flag[used] == NOT_FULL).mean()),
         table_rates=(float(run.rate.min()), float(run.rate.max())) if "rate" in run.columns else None,
     )
 

@@ -87,10 +87,17 @@ def ladder_figures(ladder: RateLadder, steps_of_error: FloatArray) -> LadderFigu
     matrix = _incidence(ladder.sides, len(ladder.rates))[:, others]
     error[others] = np.linalg.lstsq(matrix, steps_of_error, rcond=None)[0]
     output = ladder.rates + error
-    return LadderFigures(_nonlinearity(ladder.rates, output), _asymmetry(ladder, output))
+    return LadderFigures(nonlinearity_ppm(ladder.rates, output), _asymmetry(ladder, output))
 
 
-def _nonlinearity(rates: FloatArray, output: FloatArray) -> float | None:
+def nonlinearity_ppm(rates: FloatArray, output: FloatArray) -> float | None:
+    """Greatest deviation of outputs from the line through them, over the largest [ppm]; None below 4.
+
+    Parameters
+    ----------
+    rates, output
+        Of each level [deg/h], shape (l,); outputs above that at rest.
+    """
     if len(rates) < LEAST_LEVELS:
         return None
     line = np.column_stack((np.ones(len(rates)), rates / np.abs(rates).max()))

@@ -1,8 +1,8 @@
 """Bias and scale factor repeatability over test runs of one unit and axis.
 
 Bias repeatability is the standard deviation of the bias over power cycles, at least 6; scale
-factor repeatability is ``std(K) / mean(K)``. A run counts as one power cycle; whether the unit was
-switched off between them is known only where every run states its power-on.
+factor repeatability is ``std(K) / mean(K)``. Runs that state their power-on are power cycles; where fewer
+than 6 do, every run counts, and whether the unit was switched off between them is not known.
 """
 
 from __future__ import annotations
@@ -17,14 +17,21 @@ LEAST_RUNS = 6
 
 
 def repeatability_of(test: Sequence[RunJudgement]) -> Repeatability | None:
-    """Repeatability over test runs; None for fewer than 6, or for several units or axes."""
-    if len(test) < LEAST_RUNS or len({(run.unit, run.axis) for run in test}) > 1:
+    """Repeatability over test runs; None for fewer than 6, or for several units or axes.
+
+    That of the scale factor is over those of them that hold turns, where 6 do.
+    """
+    cycles = [run for run in test if run.power_on_known]
+    over = cycles if len(cycles) >= LEAST_RUNS else test
+    if len(over) < LEAST_RUNS or len({(run.unit, run.axis) for run in over}) > 1:
         return None
-    bias = BeforeAfter(*(_spread([getattr(run, when).bias for run in test]) for when in ("before", "after")))
-    errors = [[getattr(run, when).scale_factor_error for run in test] for when in ("before", "after")]
-    told = all(value is not None for values in errors for value in values)
-    scale = BeforeAfter(*(_relative_spread(values) for values in errors)) if told else None
-    return Repeatability(len(test), all(run.power_on_known for run in test), bias, scale)
+    bias = BeforeAfter(*(_spread([getattr(run, when).bias for run in over]) for when in ("before", "after")))
+    turned = [run for run in over if run.after.scale_factor_error is not None]
+    scale = None
+    if len(turned) >= LEAST_RUNS:
+        errors = ([getattr(run, when).scale_factor_error for run in turned] for when in ("before", "after"))
+        scale = BeforeAfter(*map(_relative_spread, errors))
+    return Repeatability(len(over), over is cycles, bias, scale)
 
 
 def _spread(values: Sequence[float]) -> float:

@@ -76,6 +76,7 @@ def _run(judged: RunJudgement) -> dict[str, Any]:
         "floor_source": judged.floor_source,
         "left_is_noise": left_is_noise(judged),
         "outside_training": judged.outside_training,
+        "not_settled": judged.not_settled,
         "coverage": coverage(judged),
         "rows_used": judged.rows_used,
         "rows_left_out": judged.rows_left_out,

@@ -105,7 +105,8 @@ class RunJudgement:
     and the raw minimum, as in ``noise.json``, None where the run is too short for them. ``short_averages`` is
     how many averages over 10 s there are, ``scale_factor_se`` the standard error of the scale factor error
     after compensation [ppm], by what the turns scatter about it, ``soaks`` the
-    bias at each soak.
+    bias at each soak, ``not_settled`` the share of the rows used at which a window was not wholly full or a
+    memory still went by what was before the run.
     """
 
     run: str
@@ -131,6 +132,7 @@ class RunJudgement:
     short_averages: int = 0
     scale_factor_se: float | None = None
     soaks: tuple[SoakBias, ...] = ()
+    not_settled: float = 0.0
 
 
 @dataclass(frozen=True)

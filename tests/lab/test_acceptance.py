@@ -4,13 +4,11 @@ from __future__ import annotations
 
 import json
 import re
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import openpyxl
 import pytest
-import yaml
 from click.testing import CliRunner
 
 from fogml.cli.main import app
@@ -23,63 +21,13 @@ from fogml.report.acceptance_page import acceptance_page, limit_words
 from fogml.runs.facts import Facts
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run
-
-EARTH = 15.041067 * np.sin(np.radians(39.9))
-SOAKS = (-40.0, -10.0, 25.0, 60.0, 25.0, -10.0, -40.0)
-STEP_S, SOAK_S, TURN_S = 5.0, 5400.0, 100.0
-
-
-@dataclass(frozen=True)
-class Unit:
-    """What a unit is made of: bias at 25 degC and its slope, loop, scale factor at 25 degC and its slope."""
-
-    bias: float = 0.05
-    slope: float = 0.002
-    loop: float = 0.03
-    scale_ppm: float = 120.0
-    scale_slope_ppm: float = 4.0
-    noise: float = 0.001
-
-    def run(self, name: str = "cycle", seed: int = 0, rates: tuple[float, ...] = (10, -10, 60, -60)) -> Run:
-        """A cycle over the soaks; in each the table turns, one sense after the other."""
-        parts, before = [], SOAKS[0]
-        for number, soak in enumerate(SOAKS):
-            ramp = int(abs(soak - before) * 60.0 / STEP_S)
-            stay = int(SOAK_S / STEP_S)
-            way = float(np.sign(soak - before))
-            rate = np.zeros(stay)
-            for place, value in enumerate(rates):
-                start = int((3000.0 + 2.0 * place * TURN_S) / STEP_S)
-                rate[start : start + int(TURN_S / STEP_S)] = value
-            temperature = np.append(np.linspace(before, soak, ramp, endpoint=False), np.full(stay, soak))
-            parts.append((temperature, np.append(np.zeros(ramp), rate), np.full(ramp + stay, way)))
-            before = soak
-            assert number or ramp == 0
-        temperature, rate, way = (np.concatenate(part) for part in zip(*parts, strict=True))
-        random = np.random.default_rng(seed)
-        off = temperature - 25.0
-        bias = self.bias + self.slope * off + 0.5 * self.loop * way
-        scale = 1.0 + 1e-6 * (self.scale_ppm + self.scale_slope_ppm * off)
-        gyro = 3600.0 * rate * scale + EARTH + bias + self.noise * random.standard_normal(len(off))
-        facts = Facts(unit="FOG-0417", axis="z", latitude=39.9, input_axis="up")
-        time = STEP_S * np.arange(len(off))
-        return Run.from_columns(name, facts, time=time, gyro=gyro, T=temperature, rate=rate)
-
-
-@pytest.fixture(scope="module")
-def cycle() -> Run:
-    return Unit().run()
+from tests.lab.units import EARTH, SOAKS, Unit, row
 
 
 @pytest.fixture(scope="module")
 def report(cycle):
     """The report of the unit as it is."""
     return acceptance_json([cycle])
-
-
-def row(values, key):
-    (found,) = [one for one in values["rows"] if one["quantity"] == key]
-    return found
 
 
 def test_soaks_are_those_of_the_unit(report):
@@ -150,16 +98,6 @@ def test_after_a_model_the_slope_is_gone_and_the_loop_stays(cycle):
     assert any("trained on this run" in note for note in fitted["notes"])
 
 
-@pytest.fixture
-def limits(tmp_path):
-    def write(**stated):
-        path = tmp_path / "limits.yaml"
-        path.write_text(yaml.safe_dump({"customer": "ACME", "document": "SPEC 7", "limits": stated}))
-        return read_limits(path)
-
-    return write
-
-
 def test_verdicts(cycle, limits):
     def verdict(**stated):
         return acceptance_json([cycle], limits=limits(**stated))
@@ -219,6 +157,10 @@ def test_command_writes_page_sheets_and_json(cycle, tmp_path):
     sheet = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Acceptance"]
     found = {line[0]: line[6] for line in sheet.iter_rows(min_row=5, values_only=True)}
     assert found["hysteresis"] == pytest.approx(row(values, "hysteresis")["before"])
+    held = openpyxl.load_workbook(tmp_path / "out" / "acceptance.xlsx")["Stands on"]
+    stated = dict(held.iter_rows(min_row=2, max_col=2, values_only=True))
+    assert stated["SHA-256 of limits.yaml"] == values["limits"]["sha256"]
+    assert stated["SHA-256 of cycle.csv"] == values["runs"][0]["sha256"]
     assert "Rejected" in (tmp_path / "out" / "acceptance.html").read_text()
 
 

@@ -1,0 +1,152 @@
+"""What the runs of a gyro tell of each quantity of its acceptance report, before and after compensation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fogml.errors import InputError, listed
+from fogml.lab.acceptance_limits import Limits
+from fogml.lab.acceptance_rows import TERMS
+from fogml.lab.acceptance_soaks import soaks_tell
+from fogml.lab.rate_json import rate_json
+from fogml.lab.rate_pieces import earth_deg_h, find_plateaus, merged
+from fogml.runs.noise_of_run import moving_temperatures, noise_report
+from fogml.runs.run import Run
+from fogml.runs.turning import least_rate_deg_s, white_noise
+from fogml.validation.repeatability import repeatability_of
+from fogml.validation.results import RunJudgement
+
+_OF_BIAS = ("bias", "bias_stability", "bias_stability_10s")
+"""Figures that rates about zero spoil: what a gyro does not see of them is no instability."""
+_OF_RUNS = (
+    *_OF_BIAS,
+    "temperature_sensitivity",
+    "hysteresis",
+    "scale_factor_error",
+    "scale_factor_nonlinearity",
+    "scale_factor_asymmetry",
+    "turn_on_time",
+)
+"""Figures of `fogml.validation.results.Metrics`: of the run that is furthest beyond the limit, or largest."""
+_MOST_NAMES = 3
+
+
+@dataclass(frozen=True)
+class Figure:
+    """What the runs tell of a quantity: before and after compensation, the run it is from, and a remark.
+
+    `at_most` where they tell only that it is no more than that.
+    """
+
+    before: float
+    after: float
+    of: str
+    remark: str = ""
+    at_most: bool = False
+
+
+def figures_of(
+    before: Sequence[Run],
+    after: Sequence[Run],
+    judged: Sequence[RunJudgement],
+    noise: Run | None,
+    limits: Limits,
+) -> Iterator[tuple[str, Figure]]:
+    """Each quantity that the runs tell.
+
+    Parameters
+    ----------
+    before, after
+        The runs as they are, and as compensation leaves them.
+    judged
+        Their judgements, in the same order.
+    noise
+        A static run for the noise terms; by default one of the runs.
+    limits
+        Of a figure of single runs that is told which violates its limit most.
+    """
+    steady = [one for run, one in zip(before, judged, strict=True) if not small_rates(run)] or judged
+    for key in _OF_RUNS:
+        told = [one for one in (steady if key in _OF_BIAS else judged) if getattr(one.after, key) is not None]
+        if told:
+            limit = limits.by_quantity.get(key)
+            sizes = [abs(getattr(one.after, key)) for one in told]
+            beyond = [0.0 if limit is None else limit.excess(getattr(one.after, key)) for one in told]
+            worst = told[max(range(len(told)), key=lambda place: (beyond[place], sizes[place]))]
+            yield key, Figure(getattr(worst.before, key), getattr(worst.after, key), worst.run)
+    for key, pair in soaks_tell(steady).items():
+        if all(getattr(one.after, key) is None for one in judged):
+            yield key, Figure(*pair, "all runs together")
+    spread = repeatability_of(judged)
+    if spread is not None:
+        over = f"{spread.runs} {'power cycles' if spread.power_cycles else 'runs'}"
+        yield "bias_repeatability", Figure(spread.bias.before, spread.bias.after, over)
+        if spread.scale_factor is not None:
+            figure = spread.scale_factor
+            yield "scale_factor_repeatability", Figure(figure.before, figure.after, over)
+    yield from _of_rates(before, after)
+    yield from _of_noise(before, after, noise)
+
+
+def small_rates(run: Run) -> bool:
+    """Whether the table was told to turn at rates so small that they count as rest: a test of the threshold.
+
+    Of a recorded rate, which has noise, that is not told.
+    """
+    if not run.rate.any() or white_noise(run.rate) > 0.0:
+        return False
+    plateaus = find_plateaus(run)
+    rate = plateaus.rate - earth_deg_h(run)
+    slow = np.abs(rate) < 3600.0 * least_rate_deg_s(run)
+    return len(np.unique(merged(rate, plateaus.rate_error)[slow])) > 1
+
+
+def _of_rates(before: Sequence[Run], after: Sequence[Run]) -> Iterator[tuple[str, Figure]]:
+    """What the tests on a rate table tell."""
+    try:
+        told = [rate_json(runs, source="") for runs in (before, after)]
+    except InputError:
+        return
+    names = {key: listed(runs, _MOST_NAMES) for key, runs in told[1]["told_by"].items()}
+    sensed = [one["temperature_sensitivity"] for one in told]
+    if all(sensed):
+        before_ppm, after_ppm = (one["ppm_per_degC"] for one in sensed)
+        remark = f"{len(sensed[0]['temperature'])} temperatures"
+        yield (
+            "scale_factor_temperature_sensitivity",
+            Figure(before_ppm, after_ppm, names["temperature_sensitivity"], remark),
+        )
+    for key in ("threshold", "resolution"):
+        unseen, seen = (None if one[key] is None else one[key]["below_deg_h"] for one in told)
+        if unseen is not None and seen is not None:
+            over = told[1][key]["above_deg_h"]
+            remark = f"above {over:.3g}" if over else "the smallest that was tested"
+            yield key, Figure(unseen, seen, names[key], remark, at_most=not over)
+
+
+def _of_noise(before: Sequence[Run], after: Sequence[Run], noise: Run | None) -> Iterator[tuple[str, Figure]]:
+    """Noise terms of a static run: that which is named, else the longest at constant temperature.
+
+    A term that the run does not tell from the others stands with the upper end of its interval.
+    """
+    pairs = [(noise, noise)] if noise is not None else list(zip(before, after, strict=True))
+    static = [pair for pair in pairs if not pair[0].rate.any() and not moving_temperatures(pair[0])]
+    if not static:
+        return
+    pair = max(static, key=lambda one: one[0].span_s)
+    try:
+        told = [noise_report(run)["terms"] for run in pair]
+    except InputError:
+        return
+    for key, letter in TERMS.items():
+        terms = [one[letter] for one in told]
+        low, high = terms[0]["ci"]
+        if all(term["value"] is not None for term in terms):
+            remark = f"90 % of {low:.3g} to {high:.3g}"
+            yield key, Figure(terms[0]["value"], terms[1]["value"], pair[0].name, remark)
+        elif all(term["ci"][1] for term in terms):
+            remark = "not told from the other terms; upper end of the 90 % interval"
+            yield key, Figure(high, terms[1]["ci"][1], pair[0].name, remark, at_most=True)

@@ -1,0 +1,111 @@
+"""The acceptance report of several kinds of run together: what each tells, by hand-made tables of rates."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.lab.acceptance import acceptance_json
+from fogml.lab.rate_json import rate_json
+from fogml.report.acceptance_page import acceptance_page
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+from tests.lab.units import EARTH, row
+
+UP = Facts(unit="FOG-0417", axis="z", latitude=39.9, input_axis="up")
+EAST = UP.model_copy(update={"input_axis": "east"})
+
+
+def table_run(name, rates_deg_h, seen_deg_h, stay=200, facts=EAST, seed=0, slope_ppm=0.0, noise=1e-4):
+    """Plateaus of a table, each `stay` seconds, and what the gyro sees of them."""
+    rate, seen = (np.repeat(np.asarray(values, dtype=float), stay) for values in (rates_deg_h, seen_deg_h))
+    time = np.arange(len(rate), dtype=float)
+    gyro = (
+        seen
+        + (facts.earth_rate_deg_h or 0.0)
+        + noise * np.random.default_rng(seed).standard_normal(len(rate))
+    )
+    temperature = np.full(len(rate), 25.0)
+    return Run.from_columns(name, facts, time=time, gyro=gyro, T=temperature, rate=rate / 3600.0)
+
+
+def rising_ladder(asymmetry_ppm=40.0, cubic_ppm=30.0):
+    """A ladder whose rates rise, each once, and by hand its nonlinearity [ppm]."""
+    sizes = np.array([1.0, 5.0, 10.0, 20.0, 50.0, 80.0, 100.0])
+    rates = 3600.0 * np.array([0.0, *(sign * size for size in sizes for sign in (1.0, -1.0)), 0.0])
+    error = rates * 1e-6 * (0.5 * asymmetry_ppm * np.sign(rates) + cubic_ppm * (rates / 3.6e5) ** 2)
+    levels = np.unique(rates)
+    of_level = np.array([error[rates == level][0] for level in levels])
+    left = of_level - np.polyval(np.polyfit(levels, of_level, 1), levels)
+    return table_run("ladder", rates, rates + error), 1e6 * np.abs(left).max() / levels.max()
+
+
+def test_nonlinearity_and_asymmetry_of_rates_that_rise_are_those_of_the_gyro_and_of_lab_rate():
+    ladder, nonlinearity = rising_ladder()
+    values = acceptance_json([ladder])
+    line = rate_json([ladder], source="")["scale_factor"]
+    for told in (row(values, "scale_factor_nonlinearity")["before"], line["nonlinearity_ppm"]):
+        assert told == pytest.approx(nonlinearity, rel=1e-3)
+    for told in (row(values, "scale_factor_asymmetry")["before"], line["asymmetry_ppm"]):
+        assert told == pytest.approx(40.0, rel=1e-3)
+
+
+def test_repeatability_is_of_power_cycles_where_runs_say_so(cycle):
+    rng = np.random.default_rng(2)
+    bias, scale = 0.02 * rng.standard_normal(6), 8.0 * rng.standard_normal(6)
+    turns = 3600.0 * np.array([0.0, 50.0, 0.0, -50.0, 0.0, 0.0])
+    on = UP.model_copy(update={"powered_on": 0.0})
+    starts = [
+        table_run(f"on{k}", turns, turns * (1.0 + 1e-6 * scale[k]) + bias[k], facts=on, seed=k)
+        for k in range(6)
+    ]
+    values = acceptance_json([cycle, *starts])
+    assert row(values, "bias_repeatability")["before"] == pytest.approx(np.std(bias, ddof=1), rel=1e-3)
+    assert row(values, "scale_factor_repeatability")["before"] == pytest.approx(
+        np.std(scale, ddof=1), rel=1e-2
+    )
+    assert row(values, "bias_repeatability")["of"] == "6 power cycles"
+
+
+def test_sensitivity_is_of_the_run_over_temperature_alone(cycle):
+    """A ladder at one temperature has another scale factor by its nonlinearity."""
+    ladder, _ = rising_ladder(cubic_ppm=3000.0)
+    told = row(acceptance_json([cycle, ladder]), "scale_factor_temperature_sensitivity")
+    assert (told["before"], told["of"]) == (pytest.approx(4.0, abs=0.01), "cycle")
+
+
+def test_a_test_of_the_threshold_is_no_instability(cycle):
+    sizes = [0.1, 0.3, 0.6, 1.2]
+    rates = np.array([0.0, *(sign * size for size in sizes for sign in (1.0, 0.0, -1.0, 0.0))])
+    small = table_run("small", rates, np.where(np.abs(rates) < 0.5, 0.0, rates))
+    alone = acceptance_json([cycle])
+    values = acceptance_json([cycle, small])
+    assert (
+        row(values, "threshold")["before"] == pytest.approx(0.6) and row(values, "threshold")["of"] == "small"
+    )
+    for key in ("bias", "bias_stability"):
+        assert row(values, key)["before"] == row(alone, key)["before"]
+    assert any("small: rates about zero" in note for note in values["notes"])
+    assert not any(line["run"] == "small" for line in values["soaks"])
+
+
+def test_a_range_of_limits_is_held_against_every_run(cycle, limits):
+    """The run of the largest error is within, another one is not."""
+    low = Run.derived("low", cycle.columns | {"gyro": cycle.gyro - 3600.0 * cycle.rate * 200e-6}, cycle.facts)
+    values = acceptance_json([cycle, low], limits=limits(scale_factor_error={"from": -20, "to": 200}))
+    told = row(values, "scale_factor_error")
+    assert values["verdict"] == "rejected" and told["of"] == "low" and told["before"] < -20.0
+
+
+def test_a_term_under_the_others_is_at_most_its_upper_end(limits):
+    random = np.random.default_rng(4)
+    gyro = EARTH + 0.1 * random.standard_normal(20_000)
+    columns = {"time": np.arange(20_000.0), "gyro": gyro, "T": np.full(20_000, 25.0)}
+    run = Run.from_columns("static", UP, **columns)
+    told = row(acceptance_json([run]), "bias_instability")
+    assert told["tested"] and told["at_most"] and 0.0 < told["before"] < 0.1
+    bound = told["before"]
+    assert acceptance_json([run], limits=limits(bias_instability=1.1 * bound))["verdict"] == "accepted"
+    open_one = acceptance_json([run], limits=limits(bias_instability=0.9 * bound))
+    assert open_one["verdict"] == "incomplete" and "at most" in open_one["reasons"][0]
+    assert "≤ " in acceptance_page(open_one) and "! open" in acceptance_page(open_one)
