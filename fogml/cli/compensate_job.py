@@ -109,9 +109,9 @@ def _print(
     )
     if memories and counts[2]:
         terminal.say(
-            f"The memories {', '.join(memories)} go by what was before the run until they have settled: a lag "
-            "after three time constants, a play once its input has moved by twice its half width. Until then "
-            "(flag 2) the drift that the run tells is taken off; `fogml train` tells what is left there."
+            f"{', '.join(memories)}: go by what was before the run until they have settled, a lag after "
+            "three time constants, a play once its input has moved by twice its half width. Until then (flag "
+            "2) the drift is taken off as far as the run tells it; `fogml train` tells what is left there."
         )
     terminal.result(values)
 

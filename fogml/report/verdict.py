@@ -14,7 +14,7 @@ from fogml.validation.reach import left_is_noise
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement
 
 UNSETTLED_SHARE = 0.01
-"""A smaller share of samples at flag 2 is of windows that fill, and is not told."""
+"""A smaller share of samples at flag 2 is not told: in a run of some hours it is of windows that fill."""
 GRADES = {
     "use": ("met", "✓", "Use it"),
     "use_with_care": ("care", "!", "Use with care"),
@@ -221,13 +221,17 @@ def interval_words(interval: Mapping[str, Any]) -> str:
 
 
 def unsettled(judged: RunJudgement) -> str:
-    """What is left where the model's memories went by what was before the run; empty where that is little."""
+    """What is left where windows and memories went by what was before the run; empty where that is little."""
     if judged.not_settled < UNSETTLED_SHARE:
         return ""
     flag, after = judged.series.flag, judged.series.after
     rms = [number(float(np.sqrt(np.mean(after[part] ** 2)))) for part in (flag == 2, flag != 2) if part.any()]
-    there = f"rms after {' deg/h there, '.join(rms)} deg/h elsewhere" if len(rms) == 2 else "everywhere here"
+    there = (
+        f"Rms after {' deg/h there, '.join(rms)} deg/h elsewhere"
+        if len(rms) == 2
+        else "So it is everywhere here"
+    )
     return (
-        f"{percent(judged.not_settled)} of the samples judged come before the model's memories have settled "
-        f"(flag 2): what the unit went through before the run still matters. {there[:1].upper()}{there[1:]}."
+        f"{percent(judged.not_settled)} of the samples judged come before the model's windows are full and "
+        f"its memories settled (flag 2): what was before the run still matters. {there}."
     )

@@ -124,3 +124,18 @@ def test_a_run_without_the_temperature_that_the_model_needs(invoke, model, run_f
     run_files[1].write_text(run_files[1].read_text().replace("T [degC]", "T_chamber [degC]"))
     result = invoke("compensate", run_files[1], "--model", model, "-o", tmp_path / "out.csv", status=2)
     assert "'T'" in result.stderr
+
+
+def test_what_a_memory_waits_for_is_told_with_what_is_left_there(invoke, run_files, tmp_path):
+    """A play of half width 15 degC is told once the run has spanned 30 of its 40 degC."""
+    runs, out = (run_files[0], "--test", run_files[1]), tmp_path / "out"
+    told = invoke("train", *runs, "--features", "T, play(T, 15 degC)", "-o", out).stdout
+    assert "windows are full and its memories settled (flag 2)" in " ".join(told.split())
+    (run,) = json.loads((out / "report.json").read_text())["test"]
+    temperature = read_run(run_files[1]).temperature("T")
+    share = float(np.mean(np.maximum.accumulate(temperature) - temperature[0] < 30.0))
+    assert run["not_settled"] == pytest.approx(share, abs=0.01)
+    words = invoke("compensate", run_files[1], "--model", out / "model", "-o", tmp_path / "c.csv").stdout
+    assert "play(T, 15 degC): go by what was before" in " ".join(words.split())
+    alone = invoke("train", *runs, "--features", "T, T^2", "-o", tmp_path / "alone").stdout
+    assert "flag 2" not in alone

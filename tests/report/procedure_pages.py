@@ -8,24 +8,33 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+
+from experiments.results import html_page
 from fogml.benchmark.diagnosis_score import diagnosis_figures
 from fogml.benchmark.drift_score import DriftMark, drift_figures
 from fogml.benchmark.rounds import DESIGN, RULES
 from fogml.blind.scoring.values import score_values
+from fogml.cli.options_page import options_page
 from fogml.report import blind_page
 from fogml.report.axes_page import axes_page
 from fogml.report.benchmark_page import benchmark_page
 from fogml.report.effect_card import catalogue_page, effect_page
+from fogml.report.manual import manual_folder, manual_page
 from fogml.report.plan_page import plan_page
+from fogml.report.static_svg import Curve, line_figure
 from fogml.report.sweep_page import sweep_page
+from fogml.runs.run import Run
 from fogml.twin.card import card_values
 from fogml.twin.pictures import allan_curve, pictures, rate_curves
 from fogml.twin.registry import effects
+from fogml.validation.inspection import inspection_json
+from fogml.validation.report_json import judgement_json
 from tests.blind.test_parts import marks_of
 from tests.lab.test_batch import SERIAL, report
 from tests.report import test_lab_pages as lab
 from tests.report.judgements import judgement
-from tests.report.pages import noise_values
+from tests.report.pages import noise_values, recorded_run
 
 DATA = Path(__file__).parent / "data"
 
@@ -70,6 +79,28 @@ def benchmark(serial: str) -> str:
     )
 
 
+def three_axes(serial: str) -> dict[str, str]:
+    """The index pages of commands on a file of three gyros."""
+    run = recorded_run()
+    run = Run.derived(f"{serial}.csv", run.columns, run.facts.model_copy(update={"unit": serial}))
+    trained = judgement_json(judgement(unit=serial, outside=0.1))
+    models = {"models": dict.fromkeys(("auto", "multipoint-5-3"), trained)}
+    told = {"train": trained, "inspect": inspection_json([run, run]), "compare": models}
+    links = {axis: f"{axis}/report.html" for axis in "xyz"}
+    return {
+        f"axes of {command}": axes_page({"command": command, "axes": dict.fromkeys("xyz", values)}, links)
+        for command, values in told.items()
+    }
+
+
+def experiment(serial: str) -> str:
+    """A page of results with a drawing and a table."""
+    curve = Curve(np.arange(3.0), np.arange(3.0), "#000")
+    drawing = str(line_figure([curve], "T [°C]", "left [deg/h]", serial))
+    table = f"| unit | left [deg/h] |\n|---|---|\n| {serial} | 0.1 |\n"
+    return html_page(f"# Figures of {serial}\n\n![curve](curve.svg)\n\n{table}", {"curve": drawing})
+
+
 def procedure_pages() -> dict[str, str]:
     """Name to HTML of each page."""
     shown = [effects()[id] for id in ("shupe_pure", "loop_gain")]
@@ -88,6 +119,9 @@ def procedure_pages() -> dict[str, str]:
         "north of a recording": lab.recorded(),
         "rate": lab.rates(serial),
         "train with navigation": lab.trained(),
+        **three_axes(serial),
+        "manual": manual_page(manual_folder(), {"options": options_page()}),
+        "experiment": experiment(serial),
         "axes": axes_page(
             {"command": "noise", "axes": {axis: noise_values() | {"run": f"{serial}.csv"} for axis in links}},
             links,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from fogml.report import page
 from fogml.report.words import number
 from tests.report.chromium import CHROMIUM, Browser, Opened
 from tests.report.many_units import batch_biases, pages_of_many
@@ -35,6 +36,7 @@ KINDS = (
         "north of a recording",
     ),
     *("rate", "train with navigation", "axes", "axes accepted"),
+    *("axes of train", "axes of inspect", "axes of compare", "manual", "experiment"),
 )
 LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 
@@ -43,6 +45,14 @@ LAYOUT = (Path(__file__).parent / "layout.js").read_text(encoding="utf-8")
 def pages() -> dict[str, str]:
     """Every kind of page."""
     return every_page() | pages_of_many() | procedure_pages()
+
+
+def test_every_template_is_among_the_pages() -> None:
+    assert set(KINDS) == set(pages())
+    used = {name for _, name in page._environment().cache}
+    folder = Path(page.__file__).parent / "templates"
+    bases = {"base.html", "figure.html", "parts.html"}
+    assert used >= {file.name for file in folder.glob("*.html")} - bases
 
 
 @pytest.fixture(scope="module")
