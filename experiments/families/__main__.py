@@ -4,7 +4,7 @@
 answered by ``fogml blind run``, and writes ``results.md`` and ``results.json``. ``record.md`` holds the
 figures of the diagnosis before this one on some of these cases.
 
-With ``--calibrate`` it prints the trust and the surest odds of `fogml.gap.families.priors.Priors` that what
+With ``--calibrate`` it prints the trust and the surest odds of `fogml.gap.settings.Priors` that what
 is listed asks for: the one map between evidence and probability, fitted by likelihood.
 """
 

@@ -59,7 +59,7 @@ def load_method(text: str) -> Method:
 def diagnosis(case: CaseFiles, out: Path, *, cost_of_false_name: float = 1.0) -> Any:
     """The diagnosis itself, as ``fogml diagnose`` runs it; returns it, for whoever draws its page."""
     from fogml.gap.diagnosis import diagnose
-    from fogml.gap.twin_model import TwinModel
+    from fogml.gap.model import TwinModel
     from fogml.runs.reading import read_run
     from fogml.twin.twin_file import load_twin
 

@@ -10,11 +10,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.gap.families.making_rows import rows_of
-from fogml.gap.families.rows import Rows
-from fogml.gap.model import Candidate
+from fogml.gap.model import Candidate, TwinModel
 from fogml.gap.noise import MOST_ROWS
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.reading import rows_of
+from fogml.gap.rows import Rows
 from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_fit import fit_noise

@@ -14,10 +14,10 @@ from fogml.cli.runs import open_run, open_runs
 from fogml.cli.terminal import Terminal, number
 from fogml.errors import InputError
 from fogml.gap.diagnosis import diagnose
-from fogml.gap.families.units import UnitsDiagnosis
+from fogml.gap.model import TwinModel
 from fogml.gap.replayed_column import ByColumn, by_column, has_column
 from fogml.gap.result import Diagnosis
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.units import UnitsDiagnosis
 from fogml.json_files import write_json
 from fogml.outputs import whole_folder
 from fogml.runs.columns import REPLAYED

@@ -9,9 +9,9 @@ from fogml.cli.diagnose import DiagnoseSettings
 from fogml.cli.terminal import Terminal
 from fogml.errors import InputError
 from fogml.fleet.manifest import folder_names
-from fogml.gap.families.units import UnitsDiagnosis, diagnose_units
+from fogml.gap.model import TwinModel
 from fogml.gap.result import Diagnosis
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.units import UnitsDiagnosis, diagnose_units
 from fogml.json_files import write_json
 from fogml.runs.run import Run
 
@@ -34,7 +34,7 @@ def diagnose_several(
     Raises
     ------
     InputError
-        If a rehearsal is asked for, or as `fogml.gap.families.units.diagnose_units`.
+        If a rehearsal is asked for, or as `fogml.gap.units.diagnose_units`.
     """
     if settings.rehearse:
         raise InputError("--rehearse: of one unit at a time; these runs are of several")

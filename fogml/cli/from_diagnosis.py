@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 from pydantic import Field
 
 from fogml.errors import InputError
-from fogml.gap.compensation_result import Brought, Compensable, Compensation
 from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import Brought, Compensable, Compensation
 from fogml.runs.run import Run
 from fogml.strict import Strict, strictly
 from fogml.strict_json import json_object, read_json
@@ -122,7 +122,7 @@ def with_brought(
     found: Diagnosis, fit: Iterable[Run], held_out: Sequence[Run], noise: Run | None
 ) -> Diagnosis:
     """The diagnosis with what its drift model, fitted to the fit runs, brings on the held-out ones."""
-    from fogml.gap.preparing import keep_back
+    from fogml.gap.inference import keep_back
 
     told = found.compensation
     if told is None:

@@ -1,17 +1,28 @@
-"""The twin that a diagnosis leaves: what was found with its covariance, a fitted plant, what is suspected."""
+"""Covariance of constants and causes together, in the terms of a twin file."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from fogml.gap.twin_model import within_limits
-from fogml.runs.run import Run
+from fogml.gap.causes import Card
+from fogml.gap.how_far import Foretold
+from fogml.gap.inference import Inference
+from fogml.gap.linear_gaussian import Posterior
+from fogml.gap.model import EffectValue, amplitudes_about, within_limits
+from fogml.gap.own_simulator import OwnEffect
+from fogml.gap.posterior import Cause
+from fogml.gap.result_parts import Counterfactual, Course
+from fogml.gap.where import averages
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.noise_expectation import floor_square
 from fogml.twin.draws import parameter_values
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.nominal import NAMES
 from fogml.twin.plant.fit import PlantFit, fit_plant
 from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
@@ -19,6 +30,148 @@ from fogml.twin.uncertainty import Suspected, Uncertainty
 
 if TYPE_CHECKING:
     from fogml.gap.result import Diagnosis
+
+SHAPE_STEP = 0.02
+"""Shapes are moved by this share of their range for the slope of a response."""
+WIDE = 10.0
+"""Prior standard deviation of an amplitude over its usual most, or its value: as good as free."""
+
+
+def joint_uncertainty(found: Inference, values: Sequence[EffectValue]) -> Uncertainty | None:
+    """Covariance of the nominal constants and of amplitudes and shapes about their values.
+
+    Linear about them, given the noise; amplitudes also by what no form is known more exactly than. None of a
+    laboratory's own simulator.
+    """
+    setting, held = found.setting, found.field
+    if tuple(c.name for c in setting.constants) != NAMES:
+        return None
+    names = [f"nominal.{name}" for name in NAMES]
+    scales, columns, extra = list(setting.deviations), [], dict[int, float]()
+    fitted = setting.scene.runs[: setting.scene.fitted]
+    for value in values:
+        declared = setting.scene.candidates[value.id]
+        if isinstance(declared, OwnEffect) or declared.drawn_per_run or declared.family == "line":
+            continue
+        _, most = declared.amplitude.range(setting.scene.grade)  # type: ignore[arg-type]
+        extra[len(names)] = setting.priors.form_error * value.amplitude
+        names.append(f"effects.{value.id}.amplitude")
+        scales.append(WIDE * max(abs(value.amplitude), most))
+        columns.append([r.response(declared, value.shape, None, setting.values) for r in fitted])
+        for q in declared.shape:
+            low, high = q.range(setting.scene.grade)  # type: ignore[arg-type]
+            if high > low:
+                names.append(f"effects.{value.id}.{q.name}")
+                scales.append(0.5 * (high - low))
+                columns.append(_slope(found, declared, value, q.name, SHAPE_STEP * (high - low), q.limits))
+    count = len(NAMES)
+    design = held.fixed
+    if columns:
+        by_run = [np.column_stack(parts) for parts in zip(*columns)]
+        white = held.whitening.stacked(by_run) * np.array(scales[count:])
+        design = np.concatenate([held.fixed, white], axis=1)
+    covariance = Posterior.of(design, held.base.data).covariance
+    kept = [*range(count), *range(held.fixed.shape[1], design.shape[1])]
+    matrix = covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
+    for place, sd in extra.items():
+        matrix[place, place] += sd**2
+    return Uncertainty(tuple(names), matrix)
+
+
+def _slope(
+    found: Inference,
+    declared: Effect,
+    value: EffectValue,
+    name: str,
+    step: float,
+    limits: tuple[float, float],
+) -> list[FloatArray]:
+    """Change of each fit run with a shape parameter [deg/h per its unit], by central differences."""
+    runs = found.setting.scene.runs[: found.setting.scene.fitted]
+    ends = [float(np.clip(value.shape[name] + by, *limits)) for by in (-step, step)]
+
+    def response(at: float) -> list[FloatArray]:
+        shape: Mapping[str, float] = {**value.shape, name: at}
+        return [r.response(declared, shape, None, found.setting.values) for r in runs]
+
+    low, high = (response(at) for at in ends)
+    width = max(ends[1] - ends[0], 1e-12)
+    return [value.amplitude * (b - a) / width for a, b in zip(low, high)]
+
+
+SHOWN_SHARE = 0.05
+"""Share of the noise floor that an effect of its usual size has to make of some run to be shown."""
+NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
+"""Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
+
+
+def counterfactuals(
+    found: Inference, after: Foretold, named: Sequence[Cause], cards: dict[str, Card]
+) -> tuple[Counterfactual, ...]:
+    """Every run with courses of what is named, of what the twin has, and of others at their usual size."""
+    told = []
+    for i, rows in enumerate(found.setting.scene.runs):
+        windows = averages(rows)
+        courses = [c for c in _courses(found, after, named, cards, i) if np.isfinite(c.values).all()]
+        acting = np.sum([c.values for c in courses if c.acts], axis=0) if courses else 0.0
+        # What is replayed in all, less what acts: the twin's own effects are part of its replay.
+        whole = rows.recorded - rows.gap + after.on(i)
+        floor = float(floor_square(found.field.whitening.noise, windows.time, windows.window_s)) ** 0.5
+        kept = tuple(
+            Course(c.effect, c.size, c.unit, c.acts, c.signed, windows.of(c.values))
+            for c in courses
+            if c.acts or float(np.std(windows.of(c.values))) > SHOWN_SHARE * floor
+        )
+        told.append(
+            Counterfactual(
+                run=rows.run.name,
+                held_out=i >= found.setting.scene.fitted,
+                averaging_s=windows.window_s,
+                time_s=windows.time,
+                temperature_degc=windows.of(rows.temperature),
+                recorded=windows.of(rows.recorded),
+                replayed=windows.of(whole - acting),
+                floor=floor,
+                courses=kept,
+            )
+        )
+    return tuple(told)
+
+
+def _courses(
+    found: Inference, after: Foretold, named: Sequence[Cause], cards: dict[str, Card], run: int
+) -> list[Course]:
+    scene, values = found.setting.scene, found.setting.values
+    rows, grade = scene.runs[run], scene.grade
+    on = {declared.id: setting for declared, setting in found.plant.on}
+    by_id = {cause.ids[0]: cause for cause in named}
+    courses = []
+    for id, declared in scene.candidates.items():
+        acts = id in by_id or id in on
+        if not acts and not _linear(declared):
+            continue
+        course: FloatArray = np.zeros(len(rows))
+        size = cards[id].value.amplitude if id in by_id else 0.0
+        if id in by_id:
+            course = course + np.sum([after.of_member(run, m) for m in by_id[id].members], axis=0)
+        if id in on:
+            course = course + on[id].amplitude * rows.response(declared, on[id].shape, None, values)
+            size += on[id].amplitude
+        if not acts:
+            size = declared.amplitude.typical(grade)  # type: ignore[arg-type]
+            shape = declared.default_shape(grade)  # type: ignore[arg-type]
+            course = size * rows.response(declared, shape, None, values)
+        courses.append(Course(id, size, declared.amplitude.unit, acts, declared.amplitude.signed, course))
+    return courses
+
+
+def _linear(declared: Effect) -> bool:
+    """Whether an effect of the catalogue is in proportion to its size and the same on each run."""
+    random = isinstance(declared, NoiseEffect) and not declared.steady
+    return not (
+        random or declared.drawn_per_run or declared.family in NOT_LINEAR or amplitudes_about(declared)
+    )
+
 
 LEAST_SUSPECTED = 0.05
 """A cause is kept as suspected from this probability on."""

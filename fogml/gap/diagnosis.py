@@ -2,6 +2,302 @@
 
 from __future__ import annotations
 
-from fogml.gap.families.answer import diagnose
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.gap.better_twin import counterfactuals, joint_uncertainty
+from fogml.gap.causes import cards_of, energy, fitted_values, found_cause
+from fogml.gap.compensation import compensation_of
+from fogml.gap.how_far import Foretold, HeldOut, cause_shares
+from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
+from fogml.gap.model import AnyModel, TwinModel
+from fogml.gap.noise import Noise
+from fogml.gap.own_simulator import candidates_of
+from fogml.gap.planning.next_run import next_run, rehearse
+from fogml.gap.posterior import Cause, Judgement, at_cost, doubted, judge
+from fogml.gap.reports import (
+    assumed,
+    candidate_evidence,
+    constants_of,
+    headline,
+    looks_like,
+    noise_of,
+    series_of,
+    stage_energies,
+)
+from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
+from fogml.gap.result_parts import Nearest, WhatIf
+from fogml.gap.settings import Priors
+from fogml.gap.where import GapOnRun, where
+from fogml.runs.epochs import with_epoch
+from fogml.runs.run import FloatArray, Run
+from fogml.twin.twin import Twin
 
 __all__ = ["diagnose"]
+
+
+SURELY_NOT_NOTHING = 0.02
+"""Probability that nothing acts under which there is a gap, whatever makes it."""
+LISTED = 0.02
+"""Causes are listed from this probability on."""
+NEAREST = 5
+
+
+def diagnose(
+    model: Twin | AnyModel,
+    fit: Sequence[Run],
+    held_out: Sequence[Run] = (),
+    *,
+    noise: Run | None = None,
+    without: Iterable[str] = (),
+    seed: int = 0,
+    priors: Priors | None = None,
+    plan: bool = True,
+    rehearsed: bool = False,
+    cost_of_false_name: float = 1.0,
+    courses: bool = False,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Where the gap lies, which causes make it, how far it closes; on recordings.
+
+    Parameters
+    ----------
+    model
+        The twin, or any model of a gyro in its place.
+    fit
+        Runs of one unit to fit on.
+    held_out
+        Runs for the final figure; if none, the last quarter of the last fit run.
+    noise
+        A static run of the unit.
+    without
+        Ids of effects that are no candidates.
+    seed
+        Of the draws behind intervals.
+    priors
+        What is taken for granted.
+    plan
+        Whether to look for a programme that would tell more.
+    rehearsed
+        Whether to tell what these runs would name of each candidate.
+    cost_of_false_name
+        Of a false name over that of a missed one: a cause is named from odds of this on.
+    courses
+        Whether to keep what each effect makes of each run, for a page on which their sizes are moved.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    InputError
+        If runs are of different units, a run is used twice, no temperature moves, an effect is
+        unknown, or no run can be used.
+    """
+    tell = progress or (lambda what: None)
+    found = inferred(model, fit, held_out, noise, without, priors, tell)
+    tell("judging on held-out runs")
+    return answered(found, noise, not held_out, seed, cost_of_false_name, plan, rehearsed, courses, tell)
+
+
+def inferred(
+    model: Twin | AnyModel,
+    fit: Sequence[Run],
+    held_out: Sequence[Run],
+    noise: Run | None,
+    without: Iterable[str],
+    priors: Priors | None,
+    tell: Progress,
+) -> Inference:
+    """The posterior of causes behind the runs of one unit, once those are checked."""
+    from threadpoolctl import threadpool_limits
+
+    from fogml.twin.registry import effects
+
+    model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
+    for id in without:
+        if id not in candidates_of(model) and id not in effects():
+            raise InputError(f"--without {id}: there is no such effect; `fogml effects` lists them")
+    check_runs(fit, held_out, noise)
+    # The unit ages from its first run on, whichever it is.
+    fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
+    if not held_out:
+        fit, held_out = keep_back(fit)
+    with threadpool_limits(1):
+        return infer(model, fit, held_out, noise, without, priors or Priors(), tell)
+
+
+def answered(
+    found: Inference,
+    noise: Run | None,
+    part: bool,
+    seed: int,
+    cost_of_false_name: float,
+    plan: bool = False,
+    rehearsed: bool = False,
+    courses: bool = False,
+    tell: Progress = lambda what: None,
+) -> Diagnosis:
+    """What is said of a posterior; `part` where the last stretch of the last run was held out."""
+    from threadpoolctl import threadpool_limits
+
+    with threadpool_limits(1):
+        judged = judge(found)
+        answer = _answer(found, judged, noise, part, seed, cost_of_false_name, courses)
+        if plan:
+            open_ = answer.verdict in ("unknown", "partly_explained")
+            run = next_run(found, judged, answer.found, answer.undetectable, seed, tell, open_)
+            answer = replace(answer, separating_run=run)
+        if rehearsed:
+            tell("rehearsing each candidate")
+            answer = replace(answer, rehearsal=rehearse(found.search, answer.found, cost_of_false_name))
+        return answer
+
+
+def _answer(
+    found: Inference,
+    judged: Judgement,
+    noise: Run | None,
+    part: bool,
+    seed: int,
+    cost: float,
+    courses: bool,
+) -> Diagnosis:
+    scene = found.setting.scene
+    shifted = [at_cost(c.probability, cost) for c in judged.causes]
+    named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
+    recalibrated = Foretold.of(found, (), ())
+    every = Foretold.of(found, judged.best.members, judged.best.members)
+    counted = [m for c in named for m in c.members]
+    # Beside what is unknown, but not beside causes that nobody would add: two that cancel foretell nothing.
+    beside = [m for m in judged.best.members if found.columns.families[m.family].kind != "known"]
+    after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
+    structural = [r.gap - recalibrated.on(i) for i, r in enumerate(scene.runs)]
+    energies = {m: energy(found, every, m) for m in judged.best.members}
+    shares = cause_shares(found, judged, every, recalibrated, seed)
+    share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
+    cards = cards_of(found, judged)
+    items = tuple(
+        found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
+        for c, p in zip(judged.causes, shifted)
+        if p >= LISTED
+    )
+    held_out = [
+        HeldOut(found, i, recalibrated, judged.best.members, seed)
+        for i in range(scene.fitted, len(scene.runs))
+    ]
+    far = tuple(h.how_far(after) for h in held_out)
+    gaps = [
+        GapOnRun(r, structural[i], every.on(i) - _constants_alone(every, i), 0.0)
+        for i, r in enumerate(scene.runs[: scene.fitted])
+    ]
+    evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
+    what_if = _what_if(found, named, held_out)
+    nearest = _nearest(found, what_if, judged)
+    unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
+    verdict = _verdict(named, unknown, judged.nothing)
+    shown = () if verdict == "unknown" else items
+    other_plant = any(found.columns.families[m.family].kind == "plant" for m in judged.best.members)
+    lies = where(
+        gaps,
+        stage_energies(found, energies),
+        Noise(found.field.whitening.noise, found.points.fit, found.points.source),
+    )
+    values = fitted_values(found, judged, named, cards)
+    return Diagnosis(
+        fit=tuple(r.run.name for r in scene.runs[: scene.fitted]),
+        held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
+        noise_run=noise.name if noise else None,
+        held_out_is_part=part,
+        verdict=verdict,
+        found=shown,
+        suspected=() if verdict != "unknown" else tuple(f for f in items if not f.named),
+        unknown=unknown,
+        where=lies,
+        how_far=far,
+        undetectable=tuple(e.effect for e in evidence if e.status in ("undetectable", "in_constants")),
+        separating_run=None,
+        constants=constants_of(found, after),
+        evidence=evidence,
+        noise=noise_of(found, after),
+        effects=values,
+        uncertainty=joint_uncertainty(found, values),
+        counterfactuals=counterfactuals(found, after, named, cards) if courses else (),
+        series=series_of(found, recalibrated, after),
+        unusable=found.unusable,
+        assumed=assumed(found),
+        model=found.model.name,
+        what_if=what_if,
+        nearest=nearest,
+        shares=shares,
+        compensation=compensation_of(found, judged.causes, named),
+        headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments, other_plant),
+    )
+
+
+def _constants_alone(every: Foretold, run: int) -> FloatArray:
+    """What the fixed block makes of a run [deg/h], shape (m,)."""
+    count = every.found.field.fixed.shape[1]
+    return np.asarray(every.design(run)[:, :count] @ every.posterior.mean[:count])
+
+
+def _verdict(named: Sequence[Cause], unknown: Unknown, nothing: float) -> Verdict:
+    if named and unknown.probability >= 0.5:
+        return "partly_explained"
+    if named:
+        return "explained" if all(len(c.ids) == 1 for c in named) else "ambiguous"
+    return "unknown" if unknown.probability >= 0.5 or nothing < SURELY_NOT_NOTHING else "no_gap"
+
+
+def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOut]) -> tuple[WhatIf, ...]:
+    """Every candidate alone, and beside what is named: what the held-out runs keep."""
+    search = found.search
+    beside = [m for c in named for m in c.members]
+    rows = []
+    for others in [[], beside] if beside else [[]]:
+        ids = tuple(dict.fromkeys(found.columns.families[m.family].id for m in others))
+        for f, member in search.best_members(others).items():
+            family = found.columns.families[f]
+            if family.kind != "known" or family.id in ids:
+                continue
+            both = [*others, member]
+            foretold = Foretold.of(found, both, both)
+            share = _closed_share(found, foretold)
+            for run in held_out:
+                told = run.how_far(foretold)
+                rows.append(
+                    WhatIf(family.id, ids, told.run, told.after, told.closed, told.closed_ci90, share)
+                )
+    return tuple(rows)
+
+
+def _closed_share(found: Inference, foretold: Foretold) -> float:
+    """Share of the fit runs' structural gap above the noise, whitened, that is gone with causes."""
+    held = found.field
+    left = held.beside([(m.node, m.size) for m in foretold.members])
+    along = [float(np.sum((b.basis.T @ b.data) ** 2)) for b in (held.base, left)]
+    above = float(held.base.data @ held.base.data) - along[0] - len(held.base.data)
+    return float(np.clip((along[1] - along[0]) / above, 0.0, 1.0)) if above > 0.0 else 0.0
+
+
+def _nearest(found: Inference, what_if: Sequence[WhatIf], judged: Judgement) -> tuple[Nearest, ...]:
+    alone = {w.effect: w.share for w in what_if if not w.beside}
+    families = found.columns.families
+    probability = {
+        f.id: float(sum(w for e, w in zip(judged.explanations, judged.weights) if i in e.key))
+        for i, f in enumerate(families)
+        if f.kind == "known"
+    }
+    gains = found.search.alone()
+    order = sorted((i for i in gains if families[i].kind == "known"), key=lambda i: -gains[i])[:NEAREST]
+    return tuple(
+        Nearest(
+            found.setting.scene.candidates[families[i].id].family.replace("_", " "),
+            families[i].id,
+            alone.get(families[i].id, 0.0),
+            probability[families[i].id],
+        )
+        for i in order
+    )

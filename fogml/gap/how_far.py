@@ -1,57 +1,292 @@
-"""Averages of a run's rows, at the averaging time that figures are told at."""
+"""How far the gap closes on held-out runs with causes as their families foretell them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from itertools import pairwise
-from typing import Protocol
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.gap.inference import Inference
+from fogml.gap.linear_gaussian import Posterior
+from fogml.gap.noise import UNIT_FACTOR, white_noise
+from fogml.gap.posterior import Judgement
+from fogml.gap.result_parts import CauseShare, HowFar
+from fogml.gap.rows import Rows
+from fogml.gap.search import Member
+from fogml.gap.where import averages
+from fogml.intervals import Z90
+from fogml.runs.regimes import Regimes
 from fogml.runs.run import FloatArray
+from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
+from fogml.signals.noise_model import NoiseModel
 
-AVERAGING_S = 100.0
-
-
-class InRows(Protocol):
-    """A run as rows of equal averaging time."""
-
-    def __len__(self) -> int: ...
-
-    @property
-    def row_s(self) -> float:
-        """Averaging time of a row [s]."""
-
-    @property
-    def time(self) -> FloatArray:
-        """Mean time of each row [s], shape (m,)."""
+DRAWS, NOISES = 40, 200
+LEAST_GAP = 0.2
+"""A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
 
 
 @dataclass(frozen=True, eq=False)
-class Averages:
-    """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps."""
+class Foretold:
+    """Constants and causes fitted together, and what they make of every run.
 
-    starts: np.ndarray
-    window_s: float
-    time: FloatArray
+    Attributes
+    ----------
+    found
+        The inference.
+    members
+        Causes that are fitted.
+    posterior
+        Of coefficients: fixed block first, then each member's.
+    counted
+        Which of them take part in what is foretold, shape (q,).
+    """
 
-    def of(self, rows: FloatArray) -> FloatArray:
-        """Averages of a series of rows, shape (m,) to (k,)."""
-        counts = np.diff(self.starts, append=len(rows))
-        return np.asarray((np.add.reduceat(rows, self.starts) / counts)[self.full])
+    found: Inference
+    members: tuple[Member, ...]
+    posterior: Posterior
+    counted: FloatArray
 
-    full: np.ndarray
+    @classmethod
+    def of(cls, found: Inference, members: Sequence[Member], counted: Sequence[Member]) -> Foretold:
+        """Members fitted, and those among them that count."""
+        held = found.field
+        posterior = Posterior.of(held.design([(m.node, m.size) for m in members]), held.base.data)
+        kept = [np.ones(held.fixed.shape[1])]
+        kept += [np.full(held.block(m.node).shape[1], float(m in counted)) for m in members]
+        return cls(found, tuple(members), posterior, np.concatenate(kept))
+
+    def design(self, run: int) -> FloatArray:
+        """Responses of the coefficients on a run of the scene, shape (m, q) [deg/h]."""
+        held = self.found.field
+        parts = [self.found.setting.fixed[run]]
+        for m in self.members:
+            node = self.found.columns.nodes[m.node]
+            parts.append(
+                m.size * held.scale[m.node] * self.found.columns.by_run[run][:, node.start : node.stop]
+            )
+        return np.concatenate(parts, axis=1) * self.counted
+
+    def on(self, run: int) -> FloatArray:
+        """What is foretold [deg/h], shape (m,)."""
+        return np.asarray(self.design(run) @ self.posterior.mean)
+
+    def of_member(self, run: int, member: Member) -> FloatArray:
+        """What one cause makes on a run [deg/h], shape (m,)."""
+        return self.part(run, member, self.posterior.mean)
+
+    def part(self, run: int, member: Member, coefficients: FloatArray) -> FloatArray:
+        """What one cause makes at coefficients of shape (q, ...), shape (m, ...)."""
+        at = self.found.field.fixed.shape[1]
+        for m in self.members:
+            width = self.found.field.block(m.node).shape[1]
+            if m is member:
+                return np.asarray(self.design(run)[:, at : at + width] @ coefficients[at : at + width])
+            at += width
+        raise ValueError("not a member")
+
+    def drawn(self, rng: np.random.Generator) -> FloatArray:
+        """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""
+        values, vectors = np.linalg.eigh(self.posterior.covariance)
+        root = vectors * np.sqrt(np.maximum(values, 0.0))
+        off = np.concatenate([np.zeros((len(values), 1)), rng.standard_normal((len(values), DRAWS))], axis=1)
+        return np.asarray(self.posterior.mean[:, None] + root @ off)
+
+    def draws(self, run: int, rng: np.random.Generator) -> FloatArray:
+        """What coefficients drawn from the posterior foretell, shape (m, draws)."""
+        return np.asarray(self.design(run) @ self.drawn(rng)[:, 1:])
 
 
-def averages(o: InRows, averaging_s: float = AVERAGING_S) -> Averages:
-    """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
-    width = max(1, round(averaging_s / o.row_s))
-    breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1
-    edges = [0, *breaks.tolist(), len(o)]
-    starts = np.concatenate([np.arange(a, b, width) for a, b in pairwise(edges)])
-    counts = np.diff(starts, append=len(o))
-    full = counts == width
-    if not full.any():
-        full = counts > 0
-    time = np.add.reduceat(o.time, starts) / counts
-    return Averages(starts, width * o.row_s, time[full], full)
+class HeldOut:
+    """One held-out run: what is common to all that is asked of it.
+
+    Parameters
+    ----------
+    found
+        The inference.
+    run
+        Number of the run in the scene.
+    recalibrated
+        Constants alone.
+    members
+        Causes of the likeliest set: what they make is no noise.
+    seed
+        Of the draws behind intervals.
+    """
+
+    def __init__(
+        self, found: Inference, run: int, recalibrated: Foretold, members: Sequence[Member], seed: int
+    ) -> None:
+        self.run, self.rows = run, found.setting.scene.runs[run]
+        self._rng = np.random.default_rng([seed, run])
+        self._windows = windows = averages(self.rows)
+        nodes = [found.columns.nodes[m.node] for m in members]
+        made = [found.columns.by_run[run][:, n.start : n.stop] for n in nodes]
+        model, self._noisier = _own_noise(self.rows, found, made)
+        self._before = _square(windows.of(self.rows.gap))
+        self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
+        self._floor = float(floor_square(model, windows.time, windows.window_s))
+        as_much = model.N / found.field.whitening.noise.N
+        drawn = found.points.fit.draw(self._rng, DRAWS)
+        models = [replace(m, N=as_much * m.N) for m in drawn]
+        self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
+        self._noises = self._drawn(model, None)
+        level = self._recalibrated - self._noises.mean() > Z90 * float(np.std(self._noises))
+        # Slow noise moves a run's mean more than its shape, which may show a gap where the level doesn't.
+        about = self._drawn(model, Fitted(np.ones((len(windows.time), 1)), ordinary=True))
+        varied = float(np.var(windows.of(self.rows.gap - recalibrated.on(run))))
+        shape = varied - self._floor > Z90 * float(np.std(about))
+        self._at_floor = not level and not shape
+
+    def _drawn(self, model: NoiseModel, fitted: Fitted | None) -> FloatArray:
+        """Mean squares of noises on the run's windows, their mean the expected one."""
+        windows = self._windows
+        expected = expected_mean_square(model, windows.time, windows.window_s, fitted=fitted)
+        drawn = mean_square_draws(model, windows.time, windows.window_s, NOISES, self._rng, fitted=fitted)
+        return np.asarray(drawn / drawn.mean() * expected)
+
+    def how_far(self, after: Foretold) -> HowFar:
+        """Before, recalibrated, after and floor, and what is closed.
+
+        With nothing but constants, `after` is `recalibrated`. The interval holds errors of coefficients and
+        an uncertain floor.
+        """
+        windows, rec, floor = self._windows, self._recalibrated, self._floor
+        aft = _square(windows.of(self.rows.gap - after.on(self.run)))
+        closed, interval = None, None
+        note = "the recalibrated twin is at the floor within its noise: what is closed can't be told"
+        if not self._at_floor:
+            note = "" if aft <= rec else "the run is foretold worse with what was found than without"
+            gap = rec - floor
+            closed = (rec - aft) / gap
+            moved = np.zeros(DRAWS)
+            if after.members:
+                left = self.rows.gap[:, None] - after.draws(self.run, self._rng)
+                moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
+            room = np.maximum(aft - self._rng.choice(self._noises, (DRAWS, DRAWS)), 0.0)
+            closing = rec - aft + np.minimum(moved[:, None], room)
+            drawn = closing / np.maximum(rec - self._floors[None, :], LEAST_GAP * gap)
+            low, high = np.quantile(drawn, (0.05, 0.95))
+            interval = min(float(low), closed), max(float(high), closed)
+        if self._noisier:
+            note = f"{self._noisier}{'; ' if note else ''}{note}"
+        return HowFar(
+            run=self.rows.run.name,
+            averaging_s=windows.window_s,
+            before=self._before**0.5,
+            recalibrated=rec**0.5,
+            after=aft**0.5,
+            floor=floor**0.5,
+            closed=closed,
+            closed_ci90=interval,
+            note=note,
+        )
+
+
+def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tuple[NoiseModel, str]:
+    """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
+    model = found.field.whitening.noise
+    own, usual = white_noise(rows, found.points.prior, made), model.N
+    # The median of second differences of m rows is told to about 1.4 over the root of m.
+    chance = 3.0 * 1.4 / math.sqrt(len(rows))
+    if abs(math.log(own / usual)) < max(chance, math.log(UNIT_FACTOR)):
+        return model, ""
+    apart = f"{own / usual:.2g} times" if own > usual else f"only {own / usual:.2g} times"
+    said = f"white noise of this run is {apart} that of the others; its floor is its own"
+    return replace(model, N=own), said
+
+
+def _square(values: FloatArray) -> float:
+    return float(np.mean(values**2))
+
+
+UNKNOWN = "unknown"
+"""What a share of anything but a known cause is called."""
+LEAST_PART = 0.03
+"""A run or regime with less of all that is taken away is left out: nothing can be told of it."""
+
+
+def cause_shares(
+    found: Inference, judged: Judgement, every: Foretold, recalibrated: Foretold, seed: int
+) -> tuple[CauseShare, ...]:
+    """Shapley's shares of what the causes of the likeliest set take away on the fit runs, in all, by run, by
+    regime; intervals of 90 % from the posterior of coefficients.
+    """
+    scene = found.setting.scene
+    runs = range(scene.fitted)
+    groups = _groups(found, judged)
+    if not groups:
+        return ()
+    rng = np.random.default_rng([seed, len(groups)])
+    courses = _group_courses(found, every, recalibrated, list(groups.values()), rng)
+    values = [shapley_values(scene.runs[i].gap - recalibrated.on(i), courses[i]) for i in runs]
+    labels = [scene.runs[i].regime for i in runs]
+    whole = np.sum([v.sum(axis=0) for v in values], axis=0)
+    found_shares = _told(groups, whole, None, None)
+    for i in runs:
+        part = values[i].sum(axis=0)
+        if scene.fitted > 1 and part[:, 0].sum() > LEAST_PART * whole[:, 0].sum():
+            found_shares += _told(groups, part, scene.runs[i].run.name, None)
+    for index, name in enumerate(Regimes.names):
+        part = np.sum([v[label == index].sum(axis=0) for v, label in zip(values, labels)], axis=0)
+        if part[:, 0].sum() > LEAST_PART * whole[:, 0].sum():
+            found_shares += _told(groups, part, None, name)
+    return tuple(found_shares)
+
+
+def shapley_values(gap: FloatArray, courses: FloatArray) -> FloatArray:
+    """What each cause takes away of the energy of each row [(deg/h)^2], by Shapley.
+
+    A gap of shape (m,), courses of shape (m, causes, ...); the sum over rows is the cause's value.
+    """
+    left = gap.reshape(len(gap), *(1 for _ in courses.shape[1:]))
+    return np.asarray(courses * (2.0 * left - courses.sum(axis=1, keepdims=True)))
+
+
+def _groups(found: Inference, judged: Judgement) -> dict[str, list[Member]]:
+    """Members of the likeliest set by cause: those of a known one together, all others as one."""
+    groups: dict[str, list[Member]] = {}
+    for m in judged.best.members:
+        family = found.columns.families[m.family]
+        groups.setdefault(family.id if family.kind == "known" else UNKNOWN, []).append(m)
+    return groups
+
+
+def _group_courses(
+    found: Inference,
+    every: Foretold,
+    recalibrated: Foretold,
+    groups: Sequence[Sequence[Member]],
+    rng: np.random.Generator,
+) -> list[FloatArray]:
+    """What each group makes on each fit run beyond the constants: the mean first, then draws.
+
+    Shape (m, groups, 1 + draws) for each run.
+    """
+    scene, held = found.setting.scene, found.field
+    drawn = every.drawn(rng)
+    parts = [
+        np.stack([np.sum([every.part(i, m, drawn) for m in group], axis=0) for group in groups], axis=1)
+        for i in range(scene.fitted)
+    ]
+    flat = held.whitening.stacked([p.reshape(len(p), -1) for p in parts])
+    taken = recalibrated.posterior.covariance @ (held.fixed.T @ flat)
+    return [
+        p - (found.setting.fixed[i] @ taken).reshape(p.shape[0], len(groups), 1 + DRAWS)
+        for i, p in enumerate(parts)
+    ]
+
+
+def _told(
+    groups: Mapping[str, object], values: FloatArray, run: str | None, regime: str | None
+) -> list[CauseShare]:
+    """Shares of values of shape (groups, 1 + draws)."""
+    total = values.sum(axis=0)
+    shares = values / np.where(np.abs(total) > 0.0, total, np.inf)
+    low, high = np.quantile(shares[:, 1:], (0.05, 0.95), axis=1)
+    rows = zip(groups, shares[:, 0], low, high)
+    return [
+        CauseShare(name, run, regime, float(s), (float(min(a, s)), float(max(b, s))))
+        for name, s, a, b in rows
+    ]

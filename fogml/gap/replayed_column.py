@@ -16,9 +16,9 @@ from typing import TypeVar
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.counterfactual_result import Counterfactual
+from fogml.gap.model import TwinModel
 from fogml.gap.result import Diagnosis, RunSeries
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.result_parts import Counterfactual
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.nominal import NAMES, PRIOR_SD, nominal_columns

@@ -11,17 +11,24 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.compensation_result import Compensation
-from fogml.gap.counterfactual_result import Counterfactual
-from fogml.gap.how_far_result import CauseShare, HowFar, Nearest, Onset, Rehearsed, WhatIf
 from fogml.gap.model import EffectValue, NoisePrior
 from fogml.gap.result_json import gap_values
-from fogml.gap.where_result import Where
+from fogml.gap.result_parts import (
+    CauseShare,
+    Compensation,
+    Counterfactual,
+    HowFar,
+    Nearest,
+    Onset,
+    Rehearsed,
+    WhatIf,
+    Where,
+)
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
-    from fogml.gap.twin_model import AnyModel
+    from fogml.gap.model import AnyModel
 
 NAMED = 0.5
 """An effect is named from this probability on."""
@@ -307,7 +314,7 @@ class Diagnosis:
         A twin has its covariance, what is suspected, and a plant fitted to `runs` besides, told in sentences.
         """
         from fogml.gap.better_twin import better_twin
-        from fogml.gap.twin_model import TwinModel
+        from fogml.gap.model import TwinModel
         from fogml.twin.twin_file import save_twin
 
         noise, spread = self.noise.coefficients, self.noise.relative_se

@@ -9,7 +9,7 @@ import numpy as np
 
 if TYPE_CHECKING:
     from fogml.gap.result import Diagnosis, Found
-    from fogml.gap.where_result import Where
+    from fogml.gap.result_parts import Where
 
 SCHEMA = "fogml.gap/1"
 

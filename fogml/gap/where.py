@@ -1,8 +1,4 @@
-"""Where the structural gap lies: by stage, regime, temperature, time scale and segment.
-
-What is significant is judged against the noise model: a mean square of averages of noise has a
-known expectation and scatter.
-"""
+"""Averages of a run's rows, at the averaging time that figures are told at."""
 
 from __future__ import annotations
 
@@ -14,13 +10,59 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.gap.how_far import Averages, InRows, averages
 from fogml.gap.noise import Noise
-from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
+from fogml.gap.result_parts import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_expectation import expected_mean_square
+
+AVERAGING_S = 100.0
+
+
+class InRows(Protocol):
+    """A run as rows of equal averaging time."""
+
+    def __len__(self) -> int: ...
+
+    @property
+    def row_s(self) -> float:
+        """Averaging time of a row [s]."""
+
+    @property
+    def time(self) -> FloatArray:
+        """Mean time of each row [s], shape (m,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Averages:
+    """Rows of a run averaged over windows of `window_s` [s]; windows don't reach over gaps."""
+
+    starts: np.ndarray
+    window_s: float
+    time: FloatArray
+
+    def of(self, rows: FloatArray) -> FloatArray:
+        """Averages of a series of rows, shape (m,) to (k,)."""
+        counts = np.diff(self.starts, append=len(rows))
+        return np.asarray((np.add.reduceat(rows, self.starts) / counts)[self.full])
+
+    full: np.ndarray
+
+
+def averages(o: InRows, averaging_s: float = AVERAGING_S) -> Averages:
+    """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
+    width = max(1, round(averaging_s / o.row_s))
+    breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1
+    edges = [0, *breaks.tolist(), len(o)]
+    starts = np.concatenate([np.arange(a, b, width) for a, b in pairwise(edges)])
+    counts = np.diff(starts, append=len(o))
+    full = counts == width
+    if not full.any():
+        full = counts > 0
+    time = np.add.reduceat(o.time, starts) / counts
+    return Averages(starts, width * o.row_s, time[full], full)
+
 
 SHORTEST_SEGMENT_S = 600.0
 BIN_DEGC = 10.0

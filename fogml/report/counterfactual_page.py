@@ -13,8 +13,8 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.escaping import script_data
-from fogml.gap.counterfactual_result import Counterfactual
 from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import Counterfactual
 from fogml.report import style
 from fogml.report.gap_words import subject_of, title_of, titles, unit_words
 from fogml.report.page import Drawing, render, template_text

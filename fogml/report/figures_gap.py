@@ -10,9 +10,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from fogml.gap.how_far_result import HowFar
 from fogml.gap.result import Diagnosis, RunSeries
-from fogml.gap.where_result import GapSegment, TemperatureExcess
+from fogml.gap.result_parts import GapSegment, HowFar, TemperatureExcess
 from fogml.report import style
 from fogml.report.figures_judgement import STEADY_DEG_C_PER_MIN
 from fogml.report.page import Drawing

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import plotly.graph_objects as go
 
-from fogml.gap.where_result import Share, TemperatureExcess, TimescaleExcess
+from fogml.gap.result_parts import Share, TemperatureExcess, TimescaleExcess
 from fogml.report import style
 from fogml.report.page import Drawing
 from fogml.report.shading import regime_word

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fogml.gap.how_far_result import CauseShare, Rehearsed, WhatIf
 from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import CauseShare, Rehearsed, WhatIf
 from fogml.report.gap_words import interval_words, probability_words, title_of
 from fogml.report.shading import regime_word
 from fogml.report.tables import Row, Table

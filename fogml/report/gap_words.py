@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from fogml.gap.how_far_result import HowFar
 from fogml.gap.result import Diagnosis, Estimate, Found
+from fogml.gap.result_parts import HowFar
 from fogml.report.words import MISSING, averages, listed, number, plural
 from fogml.twin.registry import effects
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from fogml.gap.how_far_result import Rehearsed
+from fogml.gap.result_parts import Rehearsed
 from fogml.report.figures_plan import errors_drawing, programme_drawing
 from fogml.report.gap_tables_ahead import rehearsal_table
 from fogml.report.page import Tile, render

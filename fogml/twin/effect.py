@@ -73,7 +73,7 @@ class Effect(ABC):
         Whether the amplitude is another one each time that the unit is used: then repeats of one
         unit draw it anew.
     family
-        All that it can do in a diagnosis: a name of `fogml.gap.families.catalogue.FAMILIES`; ``signature`` is
+        All that it can do in a diagnosis: a name of `fogml.gap.catalogue.FAMILIES`; ``signature`` is
         its own signature over a grid of its shapes.
     place
         Where it sits: what temperature drives it, and where to look for it.

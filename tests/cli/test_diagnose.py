@@ -18,8 +18,8 @@ from fogml.cli.diagnose_job import _print
 from fogml.cli.main import app
 from fogml.cli.terminal import Terminal
 from fogml.gap.diagnosis import diagnose
-from fogml.gap.families.units import SharedCause, UnitsDiagnosis
 from fogml.gap.result import Estimate
+from fogml.gap.units import SharedCause, UnitsDiagnosis
 from fogml.runs.reading import read_run
 from fogml.runs.run import Run
 from fogml.runs.writing import write_run

@@ -8,7 +8,7 @@ from functools import partial
 import pytest
 import yaml
 
-from fogml.gap.plan import plan_runs
+from fogml.gap.planning.plan import plan_runs
 from fogml.runs.reading import read_run
 from fogml.twin.programme import load_programme
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
+from fogml.gap.model import TwinModel
 from fogml.gap.noise import UNIT_FACTOR, prior_of
-from fogml.gap.twin_model import TwinModel
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener

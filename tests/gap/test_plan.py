@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.families.frame import LONGEST_RUNS
-from fogml.gap.fisher import information, merit, responses, unknowns
-from fogml.gap.plan import plan_runs
-from fogml.gap.plan_json import plan_values
-from fogml.gap.programme_design import Design
-from fogml.gap.programme_family import Family
-from fogml.gap.rehearsal import FINE_S, Rehearsal, Together, stage
+from fogml.gap.frame import LONGEST_RUNS
+from fogml.gap.planning.fisher import information, merit, responses, unknowns
+from fogml.gap.planning.plan import plan_runs
+from fogml.gap.planning.plan_json import plan_values
+from fogml.gap.planning.programme_design import Design
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.replay import Replayer

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fogml.errors import InputError
-from fogml.gap.programme_design import LADDERS, RAMP_RATES, SOAKS_S, Design
-from fogml.gap.programme_family import Family
-from fogml.gap.programme_search import search
+from fogml.gap.planning.programme_design import LADDERS, RAMP_RATES, SOAKS_S, Design
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_search import search
 from fogml.twin.programme import programme_from
 
 designs = st.builds(

@@ -10,10 +10,10 @@ import yaml
 
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
-from fogml.gap.programme_design import Design
-from fogml.gap.programme_family import Family
-from fogml.gap.rehearsal import Rehearsal, stage
-from fogml.gap.separating import LEAST_DISTANCE, distances, members_of, separating_run
+from fogml.gap.planning.programme_design import Design
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.rehearsal import Rehearsal, stage
+from fogml.gap.planning.separating import LEAST_DISTANCE, distances, members_of, separating_run
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import load_programme

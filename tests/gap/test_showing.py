@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import yaml
 
-from fogml.gap.fisher import usual_value
-from fogml.gap.programme_design import Design
-from fogml.gap.programme_family import Family
-from fogml.gap.rehearsal import Rehearsal, stage
-from fogml.gap.separating import LEAST_DISTANCE, distances, members_of
-from fogml.gap.showing import lengths, showing_run
+from fogml.gap.planning.fisher import usual_value
+from fogml.gap.planning.programme_design import Design
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.rehearsal import Rehearsal, stage
+from fogml.gap.planning.separating import LEAST_DISTANCE, distances, members_of
+from fogml.gap.planning.showing import lengths, showing_run
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.programme import load_programme

@@ -7,9 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.how_far import averages
-from fogml.gap.model import EffectValue, NoisePrior
-from fogml.gap.twin_model import TwinModel
+from fogml.gap.model import EffectValue, NoisePrior, TwinModel
+from fogml.gap.where import averages
 from fogml.twin.twin_file import load_twin
 
 TWIN = load_twin("nominal").with_nominal(b0=1.0, e0=100.0)

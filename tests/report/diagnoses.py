@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from fogml.gap.counterfactual_result import Counterfactual, Course
 from fogml.gap.result import (
     CandidateEvidence,
     ConstantFit,
@@ -22,7 +21,15 @@ from fogml.gap.result import (
     Unknown,
     Verdict,
 )
-from fogml.gap.where_result import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
+from fogml.gap.result_parts import (
+    Counterfactual,
+    Course,
+    GapSegment,
+    Share,
+    TemperatureExcess,
+    TimescaleExcess,
+    Where,
+)
 
 FLOOR = 0.0075
 

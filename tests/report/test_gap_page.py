@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.gap.result import HowFar
-from fogml.gap.where_result import Where
+from fogml.gap.result_parts import Where
 from fogml.report import gap_page
 from fogml.report.gap_page import MOST_RUNS_DRAWN
 from fogml.report.gap_tables import causes_table

@@ -1,1 +1,0 @@
-"""The diagnosis on families: one linear-Gaussian model in which a cause is all that it can do."""

@@ -1,0 +1,1 @@
+"""Programmes that tell causes or constants apart."""

@@ -1,0 +1,206 @@
+"""What runs tell of constants and effects: Fisher information, and the standard errors that follow.
+
+With whitened responses J of the output to all unknowns and normal priors of precision P the information is
+``J'J + P``, its inverse the covariance that a fit of all unknowns together expects.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.gap.model import EffectValue
+from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
+from fogml.gap.shapes import usual_shape
+from fogml.intervals import Z90
+from fogml.runs.run import FloatArray
+from fogml.twin.effect import Effect, NoiseEffect
+from fogml.twin.quantities import Quantity
+from fogml.twin.registry import effect
+
+Criterion = Literal["D", "A"]
+_SHAPE_STEP = 0.01
+_FLAT = 1e-12
+"""Precision of an amplitude's prior in usual sizes: it may be anything."""
+UNSEEN = 1e5
+"""A standard error of this many usual sizes is none."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """An unknown: a constant by its name, or ``effect.amplitude`` and ``effect.parameter``.
+
+    Attributes
+    ----------
+    name, unit
+        What it is.
+    value
+        Where it is taken.
+    scale
+        Its size: the prior's standard deviation, or the usual amplitude.
+    prior
+        Standard deviation of its prior; None for an amplitude, which may be anything.
+    """
+
+    name: str
+    unit: str
+    value: float
+    scale: float
+    prior: float | None
+
+
+@dataclass(frozen=True)
+class Unknowns:
+    """All that is fitted together: the constants, then each effect's amplitude and shape.
+
+    Attributes
+    ----------
+    parameters
+        In order.
+    effects
+        With the amplitudes and shapes at which they are taken.
+    wanted
+        Places of those that are asked for.
+    """
+
+    parameters: tuple[Parameter, ...]
+    effects: tuple[EffectValue, ...]
+    wanted: tuple[int, ...]
+
+    def prior_information(self) -> FloatArray:
+        """Information of the priors, in scales, shape (p, p)."""
+        return np.diag([_FLAT if p.prior is None else (p.scale / p.prior) ** 2 for p in self.parameters])
+
+
+def unknowns(on: Stage, names: Sequence[str]) -> Unknowns:
+    """The unknowns that names ask for, with all that has to be fitted beside.
+
+    Parameters
+    ----------
+    on
+        The twin.
+    names
+        Constants, effects, or single parameters as ``effect.amplitude`` or ``effect.parameter``.
+
+    Raises
+    ------
+    InputError
+        If a name is unknown, or an effect is a random error.
+    """
+    grade = on.model.grade
+    parameters = [Parameter(c.name, c.unit, c.mean, c.sd, c.sd) for c in on.model.constants]
+    constants = {p.name for p in parameters}
+    ids = list(dict.fromkeys(name.partition(".")[0] for name in names if name not in constants))
+    effects = []
+    for id in ids:
+        value = usual_value(on, id, constants)
+        effects.append(value)
+        candidate = effect(id)
+        size = abs(value.amplitude) or abs(candidate.amplitude.typical(grade))
+        unit = candidate.amplitude.unit
+        parameters.append(Parameter(f"{id}.amplitude", unit, value.amplitude, size, None))
+        for quantity in candidate.shape:
+            sd = _shape_sd(quantity, *quantity.range(grade))
+            name = f"{id}.{quantity.name}"
+            parameters.append(Parameter(name, quantity.unit, value.shape[quantity.name], sd, sd))
+    known = {p.name: i for i, p in enumerate(parameters)}
+    wanted: dict[int, None] = {}
+    for name in names:
+        places = [i for key, i in known.items() if key == name or key.partition(".")[0] == name]
+        if not places:
+            own = [key.partition(".")[2] for key in known if key.startswith(f"{name.partition('.')[0]}.")]
+            raise InputError(
+                f"--want {name}: effect '{name.partition('.')[0]}' has no such parameter; "
+                f"it has {', '.join(own)}"
+            )
+        wanted |= dict.fromkeys(places)
+    return Unknowns(tuple(parameters), tuple(effects), tuple(sorted(wanted)))
+
+
+def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) -> EffectValue:
+    """An effect at the size and shape that the twin states, else at the usual ones of its grade.
+
+    Raises
+    ------
+    InputError
+        If there is none of this id, or it is a random error.
+    """
+    try:
+        declared = effect(id)
+    except InputError as error:
+        known = f"; constants are {', '.join(sorted(constants))}" if constants else ""
+        raise InputError(f"{error}{known}") from None
+    if isinstance(declared, NoiseEffect):
+        raise InputError(
+            f"effect '{id}' is a random error: no programme shows it better than a long static run; "
+            "see fogml noise"
+        )
+    return stated_or_usual(on, declared)
+
+
+def stated_or_usual(on: Stage, declared: Effect) -> EffectValue:
+    """An effect as the twin states it, else at the usual size and shape of its grade."""
+    held, grade = on.model.twin.settings.get(declared.id), on.model.grade
+    shape = usual_shape(declared, grade)
+    if held is None:
+        return EffectValue(declared.id, declared.amplitude.typical(grade), shape)
+    return EffectValue(declared.id, held.amplitude, {name: held.shape[name] for name in shape})
+
+
+def responses(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
+    """Whitened responses of the output to each unknown in its scale, shape (m, p)."""
+    scales = {p.name: p.scale for p in of.parameters}
+    blocks = [rehearsal.constants]
+    for value in of.effects:
+        columns = rehearsal.white(value.id, _moved(value, scales))
+        blocks.append(columns[:, :1] * scales[f"{value.id}.amplitude"])
+        ups, downs = columns[:, 1::2], columns[:, 2::2]
+        blocks.append(value.amplitude * (ups - downs) / (2.0 * _SHAPE_STEP))
+    return np.concatenate(blocks, axis=1)
+
+
+def information(rehearsal: ExpectedRuns, of: Unknowns) -> FloatArray:
+    """Fisher information of runs beside what is always a little off, priors included, in scales.
+
+    Shape (p, p).
+    """
+    return rehearsal.beside_nuisances.gram(responses(rehearsal, of)) + of.prior_information()
+
+
+def covariance(info: FloatArray) -> FloatArray:
+    """Expected covariance, in scales, shape (p, p)."""
+    # Brought to a unit diagonal first: informations differ by many powers of ten.
+    root = 1.0 / np.sqrt(np.diag(info))
+    inverse = np.linalg.inv(info * np.outer(root, root))
+    return np.asarray(0.5 * (inverse + inverse.T) * np.outer(root, root))
+
+
+def merit(info: FloatArray, wanted: Sequence[int], criterion: Criterion) -> float:
+    """Mean logarithm of what the wanted are known better than their scales.
+
+    D: the geometric mean of the axes of the confidence ellipsoid counts, A: the root mean square of the
+    standard errors.
+    """
+    block = covariance(info)[np.ix_(wanted, wanted)]
+    if criterion == "A":
+        return -0.5 * math.log(float(np.trace(block)) / len(block))
+    return -0.5 * float(np.linalg.slogdet(block)[1]) / len(block)
+
+
+def _moved(value: EffectValue, scales: Mapping[str, float]) -> list[Mapping[str, float]]:
+    """The shape, and for each of its parameters one a step above and one a step below."""
+    shapes: list[Mapping[str, float]] = [value.shape]
+    for name, number in value.shape.items():
+        step = _SHAPE_STEP * scales[f"{value.id}.{name}"]
+        shapes += [{**value.shape, name: number + step}, {**value.shape, name: number - step}]
+    return shapes
+
+
+def _shape_sd(quantity: Quantity, low: float, high: float) -> float:
+    """Standard deviation of a shape parameter's prior, as the fit of a diagnosis has it."""
+    return max(0.5 * (high - low) / Z90, 1e-12)

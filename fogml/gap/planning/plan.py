@@ -1,0 +1,269 @@
+"""Planning of runs: programmes that make wanted constants and effects identifiable, without a diagnosis.
+
+Runs are planned one after another, each for what those before it leave open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fogml.errors import InputError
+from fogml.gap.inference import foreseen
+from fogml.gap.model import TwinModel
+from fogml.gap.planning.fisher import (
+    UNSEEN,
+    Criterion,
+    Unknowns,
+    covariance,
+    information,
+    merit,
+    unknowns,
+    usual_value,
+)
+from fogml.gap.planning.next_run import rehearse
+from fogml.gap.planning.plan_result import ExpectedError, Outlook, Plan, PlannedRun, Separation
+from fogml.gap.planning.programme_design import Design, Mounting
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
+from fogml.gap.planning.rehearsal import (
+    COARSE_S,
+    FINE_S,
+    ExpectedRuns,
+    Rehearsal,
+    Stage,
+    Together,
+    mounted,
+    stage,
+)
+from fogml.gap.planning.separating import Member, distances, least_distance, log_distance, members_of
+from fogml.gap.result_parts import Rehearsed
+from fogml.gap.settings import Priors
+from fogml.runs.facts import Facts
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.noise import NoiseConstants
+from fogml.twin.nominal import NAMES
+from fogml.twin.twin import Twin
+
+MOST_PLANNED = 8
+_EXACT = "table rate and clock are exact, and the plant, the noise and the constants' priors are the twin's"
+
+
+@dataclass(frozen=True)
+class _Goal:
+    """What is asked for: parameters, and groups of effects to be told apart."""
+
+    of: Unknowns | None
+    groups: tuple[tuple[Member, ...], ...]
+    criterion: Criterion
+
+    def merit(self, rehearsed: ExpectedRuns) -> float:
+        """Logarithm of how well it is reached, each part counting the same."""
+        total = 0.0
+        if self.of is not None:
+            total += merit(information(rehearsed, self.of), self.of.wanted, self.criterion)
+        for group in self.groups:
+            total += log_distance(least_distance(rehearsed, group)) / len(self.groups)
+        return total
+
+    def outlook(self, rehearsed: ExpectedRuns) -> Outlook:
+        """What runs are expected to tell."""
+        separations = []
+        for group in self.groups:
+            pairs = distances(rehearsed, group, refined=True)
+            apart = pairs[0, 0] if len(group) == 1 else pairs[~np.eye(len(group), dtype=bool)].min()
+            separations.append(Separation(tuple(m.value.id for m in group), float(apart), pairs))
+        if self.of is None:
+            return Outlook((), np.zeros((0, 0)), tuple(separations))
+        block = covariance(information(rehearsed, self.of))[np.ix_(self.of.wanted, self.of.wanted)]
+        deviations = np.sqrt(np.diag(block))
+        errors = tuple(
+            ExpectedError(p.name, p.unit, p.value, p.prior, float(d) * p.scale if d < UNSEEN else None)
+            for p, d in zip((self.of.parameters[i] for i in self.of.wanted), deviations)
+        )
+        return Outlook(errors, block / np.outer(deviations, deviations), tuple(separations))
+
+
+def plan_runs(
+    twin: Twin,
+    want: Sequence[str] = (),
+    *,
+    separate: Sequence[Sequence[str]] = (),
+    hours: float = 24.0,
+    criterion: Criterion = "D",
+    runs: int = 1,
+    limits: tuple[float, float] = (-40.0, 60.0),
+    noise: NoiseModel | None = None,
+    facts: Facts | None = None,
+    mountings: Sequence[Mounting] | None = None,
+    columns: Sequence[str] | None = None,
+    power_steps: bool = True,
+    seed: int = 0,
+    most: int = MOST_RUNS,
+    rehearsed: bool = False,
+    progress: Callable[[str], None] | None = None,
+) -> Plan:
+    """Programmes that make wanted parameters identifiable, or pull effects apart, within so many hours.
+
+    Parameters
+    ----------
+    twin
+        Whose responses, priors and noise are planned with; its effects that are on are wanted at their
+        values, others at the usual ones of its grade.
+    want
+        Nominal constants such as ``k1``, effects, or single parameters such as
+        ``thermal_hysteresis.half_width``. All are fitted together, with the nominal constants beside them
+        under their priors.
+    separate
+        Groups of effects to be told apart; a group of one is to be shown.
+    hours
+        Longest time of each run [h].
+    criterion
+        ``D``: the volume of the wanted parameters' confidence ellipsoid; ``A``: the mean of their squared
+        standard errors; each in prior standard deviations or usual sizes.
+    runs
+        How many runs; each is planned for what those before it leave open.
+    limits
+        Lowest and highest temperature [degC].
+    noise
+        Of the gyro; the twin's if None.
+    facts
+        Of the set-up; latitude 39.9 deg if None.
+    mountings
+        Where the input axis may point; if None as the facts say, or up or north where there are none.
+    columns
+        What a run records; what `fogml simulate` does if None.
+    power_steps
+        Whether the power may be switched.
+    seed
+        Of the search.
+    most
+        Programmes that are tried at most for each run.
+    rehearsed
+        Whether to tell what a diagnosis of all planned runs would name of each candidate.
+    progress
+        Told what is being done.
+
+    Raises
+    ------
+    InputError
+        If nothing is asked for, a name is unknown, or hours, limits or the number of runs are out of range.
+    """
+    if not want and not separate:
+        raise InputError(
+            "nothing is asked for; name constants or effects with --want, or a pair with --separate"
+        )
+    if criterion not in ("D", "A"):
+        raise InputError(f"criterion '{criterion}': D or A was expected")
+    if not 1 <= runs <= MOST_PLANNED:
+        raise InputError(f"{runs} runs: 1 to {MOST_PLANNED} can be planned")
+    ways: tuple[Mounting | None, ...] = ("up", "north") if facts is None else (None,)
+    family = Family(hours, limits, ways if mountings is None else tuple(mountings), power_steps)
+    if noise is None:
+        noise = NoiseModel(twin.noise.N, twin.noise.B, twin.noise.K)
+    values, assumed = _values(twin)
+    on = stage(twin, noise, values, facts=facts, columns=columns)
+    goal = _Goal(
+        unknowns(on, want) if want else None,
+        tuple(members_of(on, family, [usual_value(on, id) for id in group]) for group in separate),
+        criterion,
+    )
+    planned: list[PlannedRun] = []
+    for number in range(runs):
+        tell = _numbered(progress, number, runs)
+        planned.append(_next_run(on, family, goal, planned, seed + number, most, tell))
+    return Plan(
+        twin.name,
+        twin.grade,
+        criterion,
+        hours,
+        limits,
+        noise,
+        tuple(planned),
+        (*on.assumed, *assumed, _EXACT),
+        _rehearsed(twin, noise, planned, columns, seed, progress) if rehearsed else (),
+    )
+
+
+def _rehearsed(
+    twin: Twin,
+    noise: NoiseModel,
+    planned: Sequence[PlannedRun],
+    columns: Sequence[str] | None,
+    seed: int,
+    progress: Callable[[str], None] | None,
+) -> tuple[Rehearsed, ...]:
+    """What a diagnosis of the planned runs, their sensors as the twin's, would name of each candidate."""
+    if progress is not None:
+        progress("rehearsing each candidate")
+    quiet = replace(twin, noise=NoiseConstants())
+    runs = [
+        quiet.simulate(
+            p.programme, sample_s=FINE_S, facts=p.facts, columns=None if columns is None else tuple(columns),
+            seed=seed + i,
+        ).run
+        for i, p in enumerate(planned)
+    ]  # fmt: skip
+    return rehearse(foreseen(TwinModel(quiet), runs, noise, Priors()))
+
+
+def _next_run(
+    on: Stage,
+    family: Family,
+    goal: _Goal,
+    before: Sequence[PlannedRun],
+    seed: int,
+    most: int,
+    progress: Callable[[str], None] | None,
+) -> PlannedRun:
+    earlier = [run.rehearsal for run in before]
+
+    def together(design: Design, sample_s: float) -> ExpectedRuns:
+        new = Rehearsal(on, family, design, sample_s)
+        return Together([*earlier, new]) if earlier else new
+
+    tried = search(
+        family, lambda d: goal.merit(together(d, COARSE_S)), seed=seed, most=most, progress=progress
+    )
+    finals: list[Tried] = finely(tried, lambda d: goal.merit(together(d, FINE_S)))
+    name = "planned" if not before else f"planned-{len(before) + 1}"
+    best = finals[0].design
+    rehearsal = Rehearsal(on, family, best, FINE_S)
+    return PlannedRun(
+        family.programme(best, name),
+        family.in_words(best),
+        mounted(on.facts, best),
+        goal.outlook(Together([*earlier, rehearsal])),
+        tuple(
+            (
+                family.programme(one.design, f"{name}-alternative-{i}"),
+                family.in_words(one.design),
+                goal.outlook(together(one.design, FINE_S)),
+            )
+            for i, one in enumerate(finals[1:], start=1)
+        ),
+        rehearsal,
+    )
+
+
+def _values(twin: Twin) -> tuple[dict[str, float], list[str]]:
+    """Constants at which effects on inputs are taken: the twin's, or one prior deviation for those at 0."""
+    values, zero = {}, []
+    for name in NAMES:
+        value, sd = getattr(twin.nominal, name), getattr(twin.nominal_sd, name)
+        values[name] = value or sd
+        zero += [] if value else [name]
+    if not zero:
+        return values, []
+    listed = ", ".join(zero)
+    return values, [
+        f"effects of sensors act by way of the constants: {listed} are taken as one prior standard deviation"
+    ]
+
+
+def _numbered(progress: Callable[[str], None] | None, number: int, runs: int) -> Callable[[str], None] | None:
+    if progress is None or runs == 1:
+        return progress
+    return lambda text: progress(f"run {number + 1} of {runs}, {text}")

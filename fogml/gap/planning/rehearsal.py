@@ -1,0 +1,212 @@
+"""A programme rehearsed: what a run of it would show of each effect, whitened as a diagnosis would."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from fogml.gap.frame import fixed_columns, whitener_of
+from fogml.gap.linear_gaussian import LinearGaussian
+from fogml.gap.model import TwinModel
+from fogml.gap.planning.programme_design import Design
+from fogml.gap.planning.programme_family import Family
+from fogml.gap.reading import rows_of
+from fogml.gap.rows import Rows, slopes
+from fogml.gap.scene import Scene
+from fogml.gap.settings import Priors
+from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.runs.facts import Facts
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.noise import NoiseConstants
+from fogml.twin.plant.heat import SelfHeating
+from fogml.twin.registry import effect
+from fogml.twin.set_up import Sensors
+from fogml.twin.simulate import DEFAULT_FACTS
+from fogml.twin.twin import Twin
+
+COARSE_S, FINE_S = 60.0, 10.0
+"""Sample interval of a search and of the figures that are told [s]."""
+LEAST_ROWS = 256
+"""A short programme is sampled finer, down to about as many rows."""
+USUAL_POWER_W = {"tactical": 3.0, "navigation": 8.0}
+"""Heat of the electronics where the twin states none."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Who rehearses: the twin made ready, its noise and constants.
+
+    Attributes
+    ----------
+    model
+        The twin with exact sensors, as a model that can be diagnosed.
+    sensors
+        Those that it has, whose noise tells how much rows weigh.
+    noise
+        Of the gyro.
+    values
+        Constants at which effects that act on inputs are taken.
+    facts
+        Of the set-up; the mounting is the design's where that states one.
+    columns
+        What a run records; what `fogml simulate` does if None.
+    assumed
+        What was assumed of the twin, in words.
+    """
+
+    model: TwinModel
+    sensors: Sensors
+    noise: NoiseModel
+    values: Mapping[str, float]
+    facts: Facts
+    columns: tuple[str, ...] | None
+    assumed: tuple[str, ...]
+
+
+def stage(
+    twin: Twin,
+    noise: NoiseModel,
+    values: Mapping[str, float],
+    *,
+    facts: Facts | None = None,
+    columns: Sequence[str] | None = None,
+) -> Stage:
+    """The twin made ready.
+
+    Responses are those to exact sensors: their noise must not make responses look unlike each other; and the
+    gyro's own is stated, so that none is drawn. A twin
+    that states no heat of its electronics gets the usual one, or power steps would warm nothing.
+    """
+    assumed = []
+    heating = twin.plant.heating
+    plant = twin.plant
+    if heating.steady_w == 0.0 and heating.initial_w == 0.0:
+        watts = USUAL_POWER_W[twin.grade]
+        plant = replace(plant, heating=SelfHeating(watts, watts, heating.time_constant_s, heating.node))
+        assumed.append(
+            f"the electronics turn {watts:g} W into heat while on; twin {twin.name} states no heat of its own"
+        )
+    ready = replace(twin, plant=plant)
+    return Stage(
+        TwinModel(replace(ready, sensors=Sensors(), noise=NoiseConstants())),
+        ready.sensors,
+        noise,
+        dict(values),
+        DEFAULT_FACTS if facts is None else facts,
+        None if columns is None else tuple(columns),
+        tuple(assumed),
+    )
+
+
+class ExpectedRuns:
+    """Whitened columns of one run or of several together.
+
+    Attributes
+    ----------
+    stage
+        Who rehearses.
+    constants
+        Whitened responses to one prior standard deviation of each constant, shape (m, c).
+    nuisances
+        Those to what a diagnosis takes to be always a little off, shape (m, k).
+    """
+
+    def __init__(self, on: Stage, constants: FloatArray, nuisances: FloatArray) -> None:
+        self.stage, self.constants, self.nuisances = on, constants, nuisances
+        nothing = LinearGaussian.of(np.zeros(len(constants)))
+        self.beside_nuisances = nothing.beside(nuisances)
+        self.beside_all = self.beside_nuisances.beside(constants)
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        raise NotImplementedError
+
+    def beside(self, columns: FloatArray) -> FloatArray:
+        """Inner products of whitened columns beside constants and nuisances with priors, shape (k, k)."""
+        return self.beside_all.gram(columns)
+
+
+class Rehearsal(ExpectedRuns):
+    """A run of a design as a diagnosis would see it.
+
+    Parameters
+    ----------
+    on
+        Who rehearses.
+    family, design
+        What is rehearsed.
+    sample_s
+        Sample interval [s]; less where the programme is short.
+
+    Attributes
+    ----------
+    rows
+        The run.
+    """
+
+    def __init__(self, on: Stage, family: Family, design: Design, sample_s: float = COARSE_S) -> None:
+        programme = family.programme(design)
+        sample_s = min(sample_s, max(math.floor(programme.total_s / LEAST_ROWS), 1.0))
+        model, facts = on.model, mounted(on.facts, design)
+        run = model.twin.simulate(programme, sample_s=sample_s, facts=facts, columns=on.columns).run
+        # What a run of it would give is no matter, and without noise might pass for a stuck output.
+        run = run.with_columns(gyro=np.where(np.isfinite(run.gyro), 0.0, np.nan))
+        self.rows = rows = rows_of(run, model.twin, len(run), exact=True)
+        self._values = on.values
+        self._whitener = whitener_of(on.noise, rows)
+        reading = _reading_noise(rows, on.sensors, on.values)
+        self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
+        scene, none = Scene((rows,), 1, on.model.grade), dict[str, float]()
+        fixed = fixed_columns(rows, 0, scene, model.twin, model.constants, none, on.values, Priors())
+        white, count = self._whiten(fixed), len(model.constants)
+        super().__init__(on, white[:, :count], white[:, count:])
+
+    def _whiten(self, columns: FloatArray) -> FloatArray:
+        return np.asarray(self._weights[:, None] * self._whitener.whiten(np.ascontiguousarray(columns)))
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        return self._whiten(np.column_stack([self.response(id, shape) for shape in shapes]))
+
+    def response(self, id: str, shape: Mapping[str, float]) -> FloatArray:
+        """An effect's response to a unit of its amplitude [deg/h], shape (m,)."""
+        declared = effect(id)
+        if AT_AMPLITUDE not in shape:
+            return self.rows.response(declared, shape, None, self._values)
+        about = shape[AT_AMPLITUDE]
+        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+        return self.rows.changed_output(declared, bare, about, self._values) / about
+
+
+class Together(ExpectedRuns):
+    """Several runs of one unit, whose constants and effects are the same in all."""
+
+    def __init__(self, runs: Sequence[ExpectedRuns]) -> None:
+        self._runs = runs
+        constants = np.concatenate([run.constants for run in runs])
+        super().__init__(runs[0].stage, constants, block_diag(*(run.nuisances for run in runs)))
+
+    def white(self, id: str, shapes: Sequence[Mapping[str, float]]) -> FloatArray:
+        """Whitened responses of an effect to a unit of its amplitude, shape (m, shapes)."""
+        return np.concatenate([run.white(id, shapes) for run in self._runs])
+
+
+def _reading_noise(rows: Rows, sensors: Sensors, values: Mapping[str, float]) -> FloatArray:
+    """Standard deviation that noise and last digit of the sensors make of the replay [deg/h], shape (m,)."""
+    variance = np.zeros(len(rows.kept))
+    for name, slope in slopes(rows, values).items():
+        place = rows.even.place(name)
+        if place is not None:
+            errors = sensors.of(place)
+            variance += (slope * math.hypot(errors.noise, errors.resolution / math.sqrt(12.0))) ** 2
+    return rows.of(np.sqrt(variance))
+
+
+def mounted(facts: Facts, design: Design) -> Facts:
+    """The facts with the design's mounting, where it states one."""
+    return facts.model_copy(update={"input_axis": design.mounting or facts.input_axis})

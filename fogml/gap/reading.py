@@ -1,0 +1,209 @@
+"""A recording brought to rows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.errors import InputError
+from fogml.gap.model import GyroModel
+from fogml.gap.own_simulator import OwnOnRun
+from fogml.gap.rows import BySample, Rows
+from fogml.runs.outliers import find_outliers
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
+from fogml.twin.inputs import Inputs
+from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, nominal_columns
+from fogml.twin.plant.estimate import estimate_nodes
+from fogml.twin.replay import Replayer
+from fogml.twin.twin import Twin
+
+FEWEST_ROWS = 16
+LEAST_FULL = 0.5
+"""A row needs this share of its samples."""
+SHORT_GAP = 0.25
+"""Readings are linear over a gap of this share of the model's memory; a longer one is left out."""
+SATURATED = 3
+"""Neighbouring samples at the greatest or least value of all from which on it is a limit."""
+
+
+ROUGHER = 0.03
+"""Share of the smoothing's penalty under which noise of the readings shows."""
+
+
+class Unusable(InputError):
+    """A run that a diagnosis can't use; others may do."""
+
+
+def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, exact: bool = False) -> Rows:
+    """A run brought to `most` rows at most, replayed by the twin, or by another model in its place.
+
+    Of `exact` readings there is nothing to be smoothed.
+
+    Raises
+    ------
+    Unusable
+        If it holds no temperature, or hardly a sample that can be used.
+    """
+    run = run.without_dropouts
+    if not run.temperature_columns:
+        raise Unusable(f"{run.name}: holds no temperature; a replay needs 'T [degC]' or 'T_in [degC]'")
+    usable, masked = _usable(run)
+    if usable.sum() < FEWEST_ROWS:
+        empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
+        if empty:
+            raise Unusable(f"{run.name}: column '{empty[0]}' holds no number; fill it or leave it out")
+        raise Unusable(
+            f"{run.name}: {int(usable.sum())} rows have a number in every column; a diagnosis needs more"
+        )
+    step = float(np.median(np.diff(run.time)))
+    width = max(1, -(-round(run.span_s / step + 1.0) // most))
+    row_s = width * step
+    row = np.floor((run.time - run.time[0] + 0.5 * step) / row_s).astype(np.intp)
+    count = int(row[-1]) + 1
+    replayer = Replayer(run)
+    counts = np.bincount(row[usable], minlength=count).astype(np.float64)
+    spread = (row_s**2 - step**2) / 12.0
+    samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
+    time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
+    even, readings, noise = _even(samples, time, twin, replayer, exact)
+    smooth = {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
+    own = None
+    if model is not None:
+        own = OwnOnRun(model, run.with_columns(**{n: v for n, v in smooth.items() if n in run.columns}))
+        replayed = own.output({c.name: c.mean for c in model.constants})
+        errors, columns = np.zeros((len(time), 2)), samples.means_of(own.columns())
+    else:
+        replayed = replayer.with_temperatures(smooth).output(twin)
+        errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed)
+        columns = _constant_columns(samples, even, step)
+    memory_s = 2.0 * DELTA_WINDOW_S if model is None else model.memory_s
+    kept = counts >= LEAST_FULL * width
+    kept &= time - row_s >= run.time[0] + min(memory_s, 0.1 * run.span_s) - step
+    kept &= ~_after_gaps(run, time, row_s, memory_s)
+    if kept.sum() < FEWEST_ROWS:
+        raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
+    return Rows(
+        run=run,
+        gap=samples.means(run.gyro_deg_h - replayed)[kept],
+        recorded=samples.means(run.error_deg_h)[kept],
+        end_s=(time + 0.5 * (row_s))[kept],
+        row_s=row_s,
+        weight=np.sqrt(np.minimum(counts / width, 1.0))[kept],
+        constants=columns[kept],
+        even=even,
+        kept=kept,
+        readings=readings,
+        smoothness=noise,
+        by_sample=samples,
+        replay_errors=errors[kept],
+        own=own,
+        masked=masked,
+    )
+
+
+def _replay_errors(
+    run: Run,
+    twin: Twin,
+    replayer: Replayer,
+    even: Inputs,
+    readings: Mapping[str, FloatArray],
+    samples: BySample,
+    replayed: FloatArray,
+) -> FloatArray:
+    """What errors of the readings make of the twin's own effects, shape (e, 2) [deg/h].
+
+    Readings that are late by 1 s; and readings as they were, of which smoothing takes away noise and some
+    of what is true.
+    """
+    if not twin.on:
+        return np.zeros((len(even.time), 2))
+    columns = []
+    late = {n: even.temperatures[n] + np.gradient(even.temperatures[n], even.time) for n in readings}
+    rougher = {n: smoothed(values, ROUGHER)[0] for n, values in readings.items()}
+    for moved in (late, rougher):
+        other = replayer.with_temperatures(
+            {n: at_points(even.time, v, run.time, samples.spread) for n, v in moved.items()}
+        )
+        columns.append(samples.means(other.output(twin) - replayed))
+    return np.column_stack(columns)
+
+
+def _usable(run: Run) -> tuple[NDArray[np.bool_], dict[str, int]]:
+    usable = np.ones(len(run), dtype=np.bool_)
+    for values in run.columns.values():
+        usable &= np.isfinite(values)
+    masked = {"no number": int((~usable).sum())}
+    gyro = np.where(np.isfinite(run.gyro), run.gyro, 0.0)
+    outliers, _ = find_outliers(gyro, run.columns.get("rate"))
+    masked["outliers"] = len(outliers)
+    usable[outliers] = False
+    if not np.any(run.rate):
+        held = gyro[usable]
+        for extreme in (held.max(), held.min()) if len(held) else ():
+            at = np.concatenate([[0], (gyro == extreme).astype(np.int8), [0]])
+            edges = np.flatnonzero(np.diff(at))
+            for first, last in zip(edges[::2], edges[1::2]):
+                if last - first >= SATURATED and np.ptp(gyro) > 0.0 and len(np.unique(gyro)) > 50:
+                    usable[first:last] = False
+                    masked["saturated"] = masked.get("saturated", 0) + int(last - first)
+    return usable, {why: n for why, n in masked.items() if n}
+
+
+def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float) -> NDArray[np.bool_]:
+    """Even rows into which the model's memory [s] reaches from over a long gap."""
+    hidden = np.zeros(len(time), dtype=np.bool_)
+    jumps = np.flatnonzero(np.diff(run.time) > max(SHORT_GAP * memory, 3.0 * run.sample_s))
+    for i in jumps.tolist():
+        hidden |= (time + 0.5 * row_s > run.time[i]) & (time - row_s < run.time[i + 1] + memory)
+    return hidden
+
+
+def _even(
+    samples: BySample, time: FloatArray, twin: Twin, replayer: Replayer, exact: bool
+) -> tuple[Inputs, dict[str, FloatArray], dict[str, Smoothness]]:
+    recorded = samples.recorded
+    at = samples.means(recorded.time)
+    readings, smooth, noise = {}, {}, dict[str, Smoothness]()
+    for name, values in recorded.temperatures.items():
+        means = np.interp(time, at, samples.means(values))
+        readings[name] = means
+        smooth[name], noise[name] = (means, Smoothness(0.0, 0.0)) if exact else smoothed(means)
+    drives = {name: samples.means(values) for name, values in recorded.drives.items()}
+    if "angle" in drives:
+        drives["angle"] = np.interp(time, recorded.time, recorded.drives["angle"])
+    even = replace(
+        recorded,
+        time=time,
+        temperatures=smooth,
+        sensors={},
+        table_rate=samples.means(recorded.table_rate),
+        drives=drives,
+        rate_window_s=0.0,
+        hindsight=True,
+        cache={},
+    )
+    nodes = estimate_nodes(
+        twin.network,
+        time,
+        smooth,
+        powered=replayer.windows,
+        fan=drives.get("fan"),
+        table_rate=even.table_rate,
+    )
+    even = replace(even, temperatures={**nodes, **smooth}, cache={})
+    return even, readings, noise
+
+
+def _constant_columns(samples: BySample, even: Inputs, sample_s: float) -> FloatArray:
+    """Response to each nominal constant on the even rows, shape (e, 8); 0 where a run can't show one."""
+    by_sample = samples.inputs(even, None)
+    told = dict(nominal_columns(even))
+    if np.any(even.table_rate):
+        fast = nominal_columns(by_sample)
+        told |= {name: samples.means(fast[name]) for name in ("e0", "k1", "k2")}
+    told["m"] = window_difference(even.time, even.temperature("T"), DELTA_WINDOW_S, 0.5 * sample_s)
+    return np.column_stack([told.get(name, np.zeros(len(even.time))) for name in NAMES])

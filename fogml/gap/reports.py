@@ -1,0 +1,305 @@
+"""What a diagnosis reports beside its verdict: candidates, constants, noise, series, sentences."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from fogml.gap.frame import whitener_of
+from fogml.gap.inference import FAR_OFF, Inference
+from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, RunSeries, Unknown, Verdict
+from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset
+from fogml.gap.search import Member
+from fogml.gap.where import averages
+from fogml.runs.run import FloatArray
+from fogml.signals.noise_expectation import floor_square
+from fogml.signals.whiteness import whiteness
+from fogml.twin.effect import NoiseEffect
+
+if TYPE_CHECKING:
+    from fogml.gap.how_far import Foretold
+    from fogml.gap.inference import Inference
+    from fogml.gap.posterior import Judgement
+
+FEWEST_CHECKED = 64
+"""Held-out rows under which the noise can't be checked."""
+POSSIBLE = 0.05
+"""A candidate is possible from this probability on."""
+STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor"}
+"""Stages that causes without a card act on."""
+UNKNOWN_STAGE = "bias"
+"""Stage that an unknown cause is booked on where its family says nothing of it."""
+
+
+def candidate_evidence(
+    found: Inference, judged: Judgement, named: Sequence[str]
+) -> tuple[CandidateEvidence, ...]:
+    """Each candidate alone, what the runs can show of it, and what became of it."""
+    gains, families = found.search.alone(), found.columns.families
+    index = {f.id: i for i, f in enumerate(families) if f.kind == "known"}
+    rows = []
+    for id, declared in found.setting.scene.candidates.items():
+        i = index.get(id)
+        if i is None or i not in gains:
+            # A random error has no mean response; others lie in the span of the constants.
+            rows.append(CandidateEvidence(id, declared.title, declared.stage, 0.0, 0.0, 0.0, "in_constants"))
+            continue
+        usual = usual_length(found, id)
+        held = float(sum(w for e, w in zip(judged.explanations, judged.weights) if i in e.key))
+        status: Literal["named", "possible", "no_sign", "undetectable", "in_constants"]
+        if id in named:
+            status = "named"
+        elif usual < found.setting.priors.least_detectable:
+            status = "undetectable"
+        else:
+            status = "possible" if held >= POSSIBLE else "no_sign"
+        rows.append(CandidateEvidence(id, declared.title, declared.stage, gains[i], held, usual, status))
+    return tuple(sorted(rows, key=lambda r: -r.gain))
+
+
+def usual_length(found: Inference, id: str) -> float:
+    """Whitened length beside the constants of an effect of the usual size and shape in its card."""
+    setting = found.setting
+    declared = setting.scene.candidates[id]
+    if isinstance(declared, NoiseEffect) and not declared.steady:
+        return float(setting.priors.least_detectable)
+    grade = setting.scene.grade
+    amplitude = declared.amplitude.typical(grade)  # type: ignore[arg-type]
+    shape = declared.default_shape(grade)  # type: ignore[arg-type]
+    runs = setting.scene.runs[: setting.scene.fitted]
+    parts = [amplitude * r.response(declared, shape, None, setting.values) for r in runs]
+    white = found.field.whitening.stacked(parts)
+    across = found.field.base.basis.T @ white
+    return float(np.sqrt(max(float(white @ white - across @ across), 0.0)))
+
+
+def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[str, float]:
+    """Energy of what acts by stage: that of each cause's card, the unknown's own guess."""
+    total: dict[str, float] = {}
+    for member, energy in energies.items():
+        family = found.columns.families[member.family]
+        stage: str = UNKNOWN_STAGE
+        if family.kind == "known":
+            stage = found.setting.scene.candidates[family.id].stage
+        else:
+            stage = STAGES.get(family.id, UNKNOWN_STAGE)
+        total[stage] = total.get(stage, 0.0) + energy
+    return total
+
+
+def constants_of(found: Inference, after: Foretold) -> tuple[ConstantFit, ...]:
+    """The constants, before and after."""
+    deviations = found.setting.deviations
+    errors = np.sqrt(np.maximum(np.diagonal(after.posterior.covariance), 0.0))
+    return tuple(
+        ConstantFit(
+            c.name,
+            c.unit,
+            c.mean,
+            c.sd,
+            float(c.mean + sd * after.posterior.mean[i]),
+            float(sd * errors[i]),
+        )
+        for i, (c, sd) in enumerate(zip(found.setting.constants, deviations))
+    )
+
+
+def noise_of(found: Inference, after: Foretold) -> NoiseReport:
+    """The noise that the diagnosis judged by, and whether held-out runs' innovations are white by it."""
+    model, errors = found.field.whitening.noise, found.points.fit.standard_errors
+    told = NoiseReport(
+        {"N": model.N, "B": model.B, "K": model.K},
+        dict(zip("NBK", map(float, errors))),
+        found.points.source,
+    )
+    scene, parts = found.setting.scene, []
+    for i in range(scene.fitted, len(scene.runs)):
+        rows = scene.runs[i]
+        gap = rows.gap - after.on(i)
+        parts.append(whitener_of(model, rows).whiten(gap - np.mean(gap)))
+    count = sum(map(len, parts))
+    if count < FEWEST_CHECKED:
+        return told
+    step = scene.runs[scene.fitted].row_s
+    check = whiteness(parts, sample_s=step)
+    return replace(
+        told,
+        white=bool(check.white),
+        p_value=float(check.p_value),
+        failed=tuple(check.failed),
+        lags_s=tuple(float(x) * step for x in check.lags),
+        autocorrelation=tuple(map(float, check.autocorrelation)),
+        scales_s=tuple(float(x) * step for x in check.scales),
+        variance_ratio=tuple(map(float, check.variance_ratio)),
+        samples=count,
+    )
+
+
+def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tuple[RunSeries, ...]:
+    """Averages of every run for drawing."""
+    scene, model = found.setting.scene, found.field.whitening.noise
+    out = []
+    for i, rows in enumerate(scene.runs):
+        windows = averages(rows)
+        temperature = windows.of(rows.temperature)
+        speed = (
+            60.0 * np.gradient(temperature, windows.time)
+            if len(temperature) > 1
+            else np.zeros(len(temperature))
+        )
+        gaps = {
+            "before": rows.gap,
+            "recalibrated": rows.gap - recalibrated.on(i),
+            "after": rows.gap - after.on(i),
+        }
+        gap: dict[str, FloatArray] = {name: windows.of(values) for name, values in gaps.items()}
+        recorded = windows.of(rows.recorded)
+        out.append(
+            RunSeries(
+                run=rows.run.name,
+                role="fit" if i < scene.fitted else "held_out",
+                averaging_s=windows.window_s,
+                time_s=windows.time,
+                temperature_degc=temperature,
+                rate_degc_min=speed,
+                regime=rows.regime[windows.starts[windows.full]],
+                recorded=recorded,
+                replayed_before=recorded - gap["before"],
+                replayed_recalibrated=recorded - gap["recalibrated"],
+                replayed_after=recorded - gap["after"],
+                gap_before=gap["before"],
+                gap_recalibrated=gap["recalibrated"],
+                gap_after=gap["after"],
+                floor=float(floor_square(model, windows.time, windows.window_s)) ** 0.5,
+                gyro=rows.run.facts.unit,
+                axis=rows.run.facts.axis,
+                note=rows.run.facts.notes or "",
+            )
+        )
+    return tuple(out)
+
+
+def assumed(found: Inference) -> tuple[str, ...]:
+    """What was taken for granted, in sentences, the priors among them."""
+    setting, said = found.setting, []
+    for name, factor in setting.widened.items():
+        constant = next(c for c in setting.constants if c.name == name)
+        off = abs(setting.values[name] - constant.mean) / constant.sd
+        if off > FAR_OFF:
+            said.append(
+                f"{name} = {setting.values[name]:.4g} {constant.unit} is {off:.3g} standard deviations off "
+                f"what was expected ({constant.mean:g} ± {constant.sd:g}): a unit, a sign or the twin may be "
+                f"wrong. Its prior was widened {factor:.3g} times for the rest."
+            )
+    for rows in setting.scene.runs:
+        if rows.masked:
+            listed = ", ".join(f"{count} {why}" for why, count in rows.masked.items())
+            said.append(f"{rows.run.name}: samples left out: {listed}.")
+    if any("T_electronics" not in r.readings for r in setting.scene.runs):
+        said.append(
+            "The temperature of the electronics is not recorded: what follows it is looked for at several "
+            "places. A column T_electronics would tell."
+        )
+    widths = sorted({f"{r.row_s:g}" for r in setting.scene.runs})
+    said.append(f"Runs were brought to means over {', '.join(widths)} s; faster effects can't be seen.")
+    said.append(f"Noise: {found.points.source}; white noise is what the runs themselves show.")
+    said.append("Priors: " + "; ".join(setting.priors.described()) + ".")
+    return tuple(said)
+
+
+def looks_like(found: Inference, judged: Judgement) -> str:
+    """What the unknown looks like; empty where there is none."""
+    families = found.columns.families
+    weights: dict[str, float] = {}
+    for e, w in zip(judged.explanations, judged.weights):
+        for m in e.members:
+            if families[m.family].kind == "unknown":
+                between = found.columns.nodes[m.node].shape.get("between")
+                words = families[m.family].words + (f", {between}" if between else "")
+                weights[words] = weights.get(words, 0.0) + float(w)
+    if judged.unknown < 0.05 or not weights:
+        return ""
+    return max(weights, key=weights.__getitem__)
+
+
+def _since(found: Inference, onset: Onset) -> str:
+    """When something began: between two runs, or within one."""
+    scene = found.setting.scene
+    order = sorted(range(scene.fitted), key=lambda i: scene.begun_s[i])
+    names = [scene.runs[i].run.name for i in order]
+    at = names.index(onset.run)
+    if at and onset.time_s <= float(scene.runs[order[at]].time_s[0]):
+        return f"began between {names[at - 1]} and {onset.run}"
+    return f"acts from {onset.run} on, {onset.time_s:.0f} s into it"
+
+
+def headline(
+    found: Inference,
+    unknown: Unknown,
+    verdict: Verdict,
+    shown: Sequence[Found],
+    nearest: Sequence[Nearest],
+    far: Sequence[HowFar],
+    segments: Sequence[GapSegment],
+    other_plant: bool,
+) -> tuple[str, ...]:
+    """Sentences: the verdict, each cause with its size, share and place, the nearest where none is sure.
+
+    `other_plant` says that the likeliest set holds another flow of heat.
+    """
+    said, titles = [], found.setting.scene.candidates
+    if verdict == "no_gap" and other_plant:
+        said.append(
+            "Heat flows a little otherwise than the model's plant says, or a sensor lags: fit its time "
+            "constants. Nothing beyond that is missing that these runs could show."
+        )
+    elif verdict == "no_gap":
+        said.append("Nothing is missing that these runs could show.")
+    for f in (f for f in shown if f.named):
+        title = titles[f.effect].title
+        others = f" (or {', '.join(f.others)})" if f.others else ""
+        size = f"{f.amplitude.value:.3g} {f.amplitude.unit}"
+        usual = f", {f.times_usual:.2g} times the usual most" if (f.times_usual or 0.0) > 1.0 else ""
+        share = f", {f.share:.0%} of the gap" if f.share is not None else ""
+        look = f"; look at the {f.place}" if f.place else ""
+        said.append(f"{title}{others}: {f.probability:.0%} probable, {size}{usual}{share}{look}.")
+        if f.onset is not None:
+            said.append(f"{title} {_since(found, f.onset)}, and not before.")
+        if f.grows is not None:
+            way = "grows" if f.grows * f.amplitude.value > 0.0 else "fades"
+            said.append(f"{title} {way} from run to run, by {abs(f.grows):.2g} {f.amplitude.unit} a day.")
+        elif not f.consistent and len(f.by_run) > 1:
+            said.append(f"{title}: the runs do not agree in its size.")
+    for f in (f for f in shown if f.left_out):
+        said.append(
+            f"{titles[f.effect].title} may as well be {', '.join(f.left_out)}, left out of the candidates."
+        )
+    if verdict in ("unknown", "partly_explained"):
+        like = unknown.looks_like
+        said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
+        for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
+            if n.share >= 0.2:
+                said.append(
+                    f"Nearest known cause: {titles[n.effect].title.lower()}, in whatever form, holds "
+                    f"{n.share:.0%} of the gap."
+                )
+    order = sorted(range(found.setting.scene.fitted), key=lambda i: found.setting.scene.begun_s[i])
+    runs = [found.setting.scene.runs[i].run.name for i in order]
+    first = min((runs.index(s.run) for s in segments), default=0)
+    if first > 0:
+        begun = min(s.from_s for s in segments if s.run == runs[first])
+        said.append(
+            f"The gap shows from {runs[first]}, {begun:.0f} s, on, and in no run before: a diagnosis of the "
+            "runs from there on may name more."
+        )
+    for h in far:
+        if h.closed is None:
+            said.append(f"{h.run}: {h.note}.")
+        elif any(f.named for f in shown):
+            said.append(f"{h.run}: {h.closed:.0%} of the gap closes{' — ' + h.note if h.note else ''}.")
+        elif h.note:
+            said.append(f"{h.run}: {h.note}.")
+    return tuple(said)

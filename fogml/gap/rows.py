@@ -1,0 +1,264 @@
+"""A run as rows: what was recorded and what drives it, as means over spans of time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fogml.gap.own_simulator import OwnEffect, OwnOnRun
+from fogml.runs.regimes import regimes
+from fogml.runs.run import FloatArray, Run
+from fogml.signals.smoothing import Smoothness, at_points, window_difference
+from fogml.twin.effect import Effect, LoopEffect
+from fogml.twin.inputs import Inputs
+from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """One run, m rows.
+
+    Attributes
+    ----------
+    run
+        As recorded.
+    gap
+        Recorded less the twin's replay at its priors' means, shape (m,) [deg/h].
+    recorded
+        Recorded less reference, shape (m,) [deg/h].
+    end_s, row_s
+        Where each row ends [s], shape (m,), and how long it lasts.
+    weight
+        Square root of the share of its samples that a row has, shape (m,).
+    constants
+        Response to a unit of each nominal constant, shape (m, 8) [deg/h].
+    even, kept
+        Inputs on even rows without a gap, temperatures smooth; which of them are rows.
+    readings
+        Temperatures as they were read, by name, on the even rows.
+    smoothness
+        How they were smoothed, by name.
+    replay_errors
+        What a lag of the readings of 1 s, and what smoothing leaves, make of the twin's own effects, shape
+        (m, 2) [deg/h].
+    own
+        A laboratory's own simulator on the run, where that takes the twin's place.
+    masked
+        Samples left out, by why.
+    cache
+        Inputs that were worked out, by the temperatures and constants in them.
+    """
+
+    run: Run
+    gap: FloatArray
+    recorded: FloatArray
+    end_s: FloatArray
+    row_s: float
+    weight: FloatArray
+    constants: FloatArray
+    even: Inputs
+    kept: NDArray[np.bool_]
+    readings: Mapping[str, FloatArray]
+    smoothness: Mapping[str, Smoothness]
+    by_sample: BySample
+    replay_errors: FloatArray
+    own: OwnOnRun | None = None
+    masked: Mapping[str, int] = field(default_factory=dict)
+    cache: dict[tuple[Any, ...], Inputs] = field(default_factory=dict)
+
+    def __len__(self) -> int:
+        return len(self.gap)
+
+    @property
+    def turns(self) -> bool:
+        """Whether the table turns."""
+        angle = self.even.drives.get("angle")
+        return bool(np.any(self.even.table_rate)) or (angle is not None and float(np.ptp(angle)) > 0.0)
+
+    @cached_property
+    def temperature(self) -> FloatArray:
+        """T of each row [degC], shape (m,)."""
+        return self.even.temperature("T")[self.kept]
+
+    @cached_property
+    def time_s(self) -> FloatArray:
+        """Middle of each row [s], shape (m,)."""
+        return self.end_s - 0.5 * self.row_s
+
+    @property
+    def time(self) -> FloatArray:
+        """As `time_s`."""
+        return self.time_s
+
+    @cached_property
+    def regime(self) -> NDArray[np.int8]:
+        """Regime of each row; see `fogml.runs.regimes`."""
+        labels = regimes(self.run).labels
+        at = np.clip(np.searchsorted(self.run.time, self.time_s), 0, len(labels) - 1)
+        return np.asarray(labels[at])
+
+    def of(self, values: FloatArray) -> FloatArray:
+        """Rows of what is given on the even ones, shape (e, ...) to (m, ...)."""
+        return values[self.kept]
+
+    def response(
+        self,
+        declared: Effect,
+        shape: Mapping[str, float],
+        temperatures: Mapping[str, FloatArray] | None = None,
+        constants: Mapping[str, float] | None = None,
+    ) -> FloatArray:
+        """Of an effect per unit of its amplitude [deg/h], shape (m,).
+
+        `temperatures` take the place of those of the even rows; `constants` are those at which an effect
+        meets output and slopes.
+        """
+        if isinstance(declared, OwnEffect):
+            assert self.own is not None
+            return self.samples(self.own.response(declared.id, shape, constants or {}))
+        fast = {"rate", "angle", "output", "slopes", "earth"} & set(declared.needs)
+        met = constants if {"output", "slopes"} & set(declared.needs) else None
+        if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
+            inputs = self._by_sample_inputs(temperatures, met)
+            return self.of(self.by_sample.means(np.asarray(declared.response(inputs, **shape), np.float64)))
+        values = declared.response(self._even_inputs(temperatures, met), **shape)
+        return self.of(np.broadcast_to(np.asarray(values, dtype=np.float64), self.kept.shape))
+
+    def _by_sample_inputs(
+        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+    ) -> Inputs:
+        """Inputs at the samples."""
+        key = ("samples", *_key(temperatures, constants))
+        if key not in self.cache:
+            self.cache[key] = self._meeting(self.by_sample.inputs(self.even, temperatures), constants)
+        return self.cache[key].afresh()
+
+    def _even_inputs(
+        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+    ) -> Inputs:
+        """Inputs on the even rows."""
+        key = ("even", *_key(temperatures, constants))
+        if key not in self.cache:
+            inputs = self.even
+            if temperatures:
+                inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
+            self.cache[key] = self._meeting(inputs, constants)
+        return self.cache[key].afresh()
+
+    def samples(self, values: FloatArray) -> FloatArray:
+        """Means of a series over the samples, shape (n,) to (m,)."""
+        return self.of(self.by_sample.means(values))
+
+    def _meeting(self, inputs: Inputs, constants: Mapping[str, float] | None) -> Inputs:
+        """Inputs with the output of the model without effects, and its slopes, at constants."""
+        if constants is None:
+            return inputs
+        if self.own is not None:
+            by_sample = len(inputs.time) == len(self.by_sample.row)
+            over = (lambda values: values) if by_sample else self.by_sample.means
+            told = {name: over(slope) for name, slope in self.own.slopes(constants).items()}
+            return replace(inputs, output=over(self.own.output(constants)), slopes=told)
+        from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
+
+        nominal = NominalConstants(**dict(constants))
+        rate = inputs.input_rate_deg_h
+        output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * rate + bias_deg_h(inputs, nominal)
+        return replace(inputs, output=np.asarray(output), slopes=temperature_slopes(inputs, nominal))
+
+    def changed_output(
+        self, declared: Effect, shape: Mapping[str, float], amplitude: float, constants: Mapping[str, float]
+    ) -> FloatArray:
+        """What an effect that meets the output makes of it at an amplitude [deg/h], shape (m,)."""
+        if isinstance(declared, OwnEffect):
+            assert self.own is not None
+            return self.samples(self.own.changed(declared.id, shape, amplitude, constants))
+        assert isinstance(declared, LoopEffect)
+        inputs = self._by_sample_inputs(None, constants)
+        output = np.asarray(inputs.output)
+        return self.of(self.by_sample.means(declared.apply(output, inputs, amplitude) - output))
+
+    def delayed(self, delay_s: float, constants: Mapping[str, float]) -> FloatArray:
+        """What a delay of the output [s] makes of it [deg/h], shape (m,)."""
+        inputs = self._by_sample_inputs(None, constants)
+        output = np.asarray(inputs.output)
+        late = np.interp(inputs.time - delay_s, inputs.time, output)
+        return self.of(self.by_sample.means(late - output))
+
+
+@dataclass(frozen=True, eq=False)
+class BySample:
+    """Samples of a run, the even row that each is in, and their mean square about its middle [s^2]."""
+
+    recorded: Inputs
+    row: NDArray[np.intp]
+    used: NDArray[np.bool_]
+    counts: FloatArray
+    spread: float
+    cache: dict[int, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
+
+    def means(self, values: FloatArray) -> FloatArray:
+        """Means of a series over even rows, shape (n,) to (e,); interpolated where there is no sample."""
+        total = np.bincount(self.row[self.used], weights=values[self.used], minlength=len(self.counts))
+        held = self.counts > 0
+        means = np.divide(total, self.counts, out=np.zeros(len(total)), where=held)
+        at = np.arange(len(total))
+        return means if held.all() else np.where(held, means, np.interp(at, at[held], means[held]))
+
+    def means_of(self, columns: FloatArray) -> FloatArray:
+        """The same of columns side by side, shape (n, k) to (e, k)."""
+        return np.column_stack([self.means(c) for c in columns.T])
+
+    def inputs(self, even: Inputs, temperatures: Mapping[str, FloatArray] | None) -> Inputs:
+        """Inputs at the samples, with the even rows' temperatures."""
+        held = {**even.temperatures, **(temperatures or {})}
+        smooth = {name: self._at_samples(even.time, values) for name, values in held.items()}
+        return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={}, coil=even.coil)
+
+    def _at_samples(self, time: FloatArray, values: FloatArray) -> FloatArray:
+        """A course on the even rows at the samples, worked out once."""
+        if id(values) not in self.cache:
+            self.cache[id(values)] = values, at_points(time, values, self.recorded.time, self.spread)
+        return self.cache[id(values)][1]
+
+
+def _key(
+    temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+) -> tuple[Any, ...]:
+    """What inputs are told apart by; the arrays are kept with them, so that none takes another's place."""
+    told = tuple((name, id(values)) for name, values in (temperatures or {}).items())
+    return told, None if constants is None else tuple(constants.values())
+
+
+def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:
+    """Change of the nominal output with each temperature and with DeltaT, on the even rows."""
+    if rows.own is not None:
+        return {name: rows.by_sample.means(slope) for name, slope in rows.own.slopes(constants).items()}
+    from fogml.twin.nominal import NominalConstants, temperature_slopes
+
+    return temperature_slopes(rows.even.afresh(), NominalConstants(**dict(constants)))
+
+
+def through_nominal(
+    rows: Rows, told: Mapping[str, FloatArray], errors: Mapping[str, FloatArray]
+) -> FloatArray:
+    """What errors of temperatures [degC] on the even rows make of the replay, given slopes.
+
+    Shape (m,) for errors of shape (e,); (m, k) for k errors side by side, shape (e, k).
+    """
+    total = np.zeros((len(rows.kept), *next((e.shape[1:] for e in errors.values()), ())))
+    for name, slope in told.items():
+        if name == DELTA:
+            error = errors.get("T", errors.get("T_in"))
+            if error is not None:
+                ahead = 0.5 * rows.run.sample_s
+                error = window_difference(rows.even.time, error, DELTA_WINDOW_S, ahead)
+        else:
+            error = errors.get(name, errors.get({"T": "T_in", "T_in": "T"}.get(name, name)))
+        if error is not None:
+            total = total + (slope if error.ndim == 1 else slope[:, None]) * error
+    return rows.of(total)

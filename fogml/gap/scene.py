@@ -1,0 +1,257 @@
+"""Where causes sit: the temperatures that may drive them, and the lines that stand out of the gaps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from fogml.gap.rows import Rows
+from fogml.runs.run import FloatArray
+from fogml.runs.steps import recorded_step
+from fogml.signals.recursions import lag_kernel
+from fogml.twin.effect import Effect
+from fogml.twin.twin import Twin
+
+MIXES = (0.5, 0.0, 1.0, -0.5)
+"""Shares of the outer face in a place's temperature: within, inner, outer, and beyond the inner one."""
+LAGS_S = (0.0, 600.0, 1800.0)
+"""Lags of a place behind that [s]."""
+DIRECTION_DEGC_MIN = 0.05
+"""Rates under this are no direction."""
+COARSE_STEP_DEGC = 0.0101
+"""Steps of a good sensor are no coarser: part of any recording."""
+SAME_DEGC = 0.3
+"""Places that stay this near to one before drive alike."""
+
+
+class Place(NamedTuple):
+    """A temperature on the even rows [degC], how likely it is the one, and where it is."""
+
+    temperature: FloatArray
+    weight: float
+    name: str
+
+
+def lag(time: FloatArray, x: FloatArray, time_constant_s: float) -> FloatArray:
+    """First-order lag from rest, shape (n,)."""
+    if time_constant_s <= 0.0:
+        return x
+    return np.asarray(lag_kernel(time, x, np.array([time_constant_s]), np.nan, np.nan, np.nan)[0])
+
+
+def rate(time: FloatArray, x: FloatArray) -> FloatArray:
+    """Rate of a smooth course per minute, shape (n,)."""
+    return np.asarray(60.0 * np.gradient(x, time)) if len(x) > 1 else np.zeros(len(x))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """All runs of a diagnosis together: what grids and places have to be the same for.
+
+    Attributes
+    ----------
+    runs
+        Fit runs, then held-out ones.
+    fitted
+        How many are fit runs.
+    grade
+        Whose ranges hold.
+    lines_hz
+        Frequencies that stand out of the fit runs.
+    candidates
+        What may be named, by id.
+    cache
+        What several families ask for.
+    """
+
+    runs: tuple[Rows, ...]
+    fitted: int
+    grade: str
+    lines_hz: tuple[float, ...] = ()
+    candidates: Mapping[str, Effect] = field(default_factory=dict)
+    cache: dict[Any, Any] = field(default_factory=dict)
+
+    @cached_property
+    def range_degc(self) -> tuple[float, float]:
+        """Least and greatest T of the fit runs."""
+        held = [r.temperature for r in self.runs[: self.fitted]]
+        return min(float(t.min()) for t in held), max(float(t.max()) for t in held)
+
+    @property
+    def span_degc(self) -> float:
+        """Width of that range, 1 at least."""
+        low, high = self.range_degc
+        return max(high - low, 1.0)
+
+    @cached_property
+    def span_s(self) -> float:
+        """The longest fit run [s]."""
+        return max(float(r.run.span_s) for r in self.runs[: self.fitted])
+
+    @cached_property
+    def row_s(self) -> float:
+        """The longest row [s]."""
+        return max(r.row_s for r in self.runs[: self.fitted])
+
+    @cached_property
+    def begun_s(self) -> tuple[float, ...]:
+        """When each run's clock began, after the first run's [s]; one after the other where unknown."""
+        started = [r.run.facts.started for r in self.runs]
+        if all(s is not None for s in started):
+            first = min(s.timestamp() for s in started)  # type: ignore[union-attr]
+            return tuple(s.timestamp() - first for s in started)  # type: ignore[union-attr]
+        edges = np.cumsum([0.0, *(float(r.run.span_s) + r.row_s for r in self.runs)])
+        return tuple(float(e) - float(r.run.time[0]) for e, r in zip(edges, self.runs))
+
+    @cached_property
+    def order_known(self) -> bool:
+        """Whether the runs say when they began, so that what one leaves behind meets the next."""
+        return len(self.runs) > 1 and all(r.run.facts.started is not None for r in self.runs)
+
+    def before(self, rows: Rows) -> tuple[Rows, ...]:
+        """Runs that came before one, in order; none where that is not known."""
+        if not self.order_known:
+            return ()
+        own = self.begun_s[self.runs.index(rows)]
+        earlier = [(b, i) for i, b in enumerate(self.begun_s) if b < own]
+        return tuple(self.runs[i] for _, i in sorted(earlier))
+
+    def coil(self, rows: Rows, mixes: Sequence[float] = (0.5, 0.0, 1.0)) -> list[Place]:
+        """Places in the winding."""
+        return self._bank(rows, mixes, (0.0,))
+
+    def optics(self, rows: Rows, mixes: Sequence[float] = MIXES) -> list[Place]:
+        """Places of optics and electronics: the recorded one first, then lags behind the coil's faces."""
+        recorded = rows.even.temperatures.get("T_electronics") if "T_electronics" in rows.readings else None
+        bank = self._bank(rows, mixes, LAGS_S)
+        if recorded is None:
+            # As the model's own plant has it, self-heating included.
+            return [Place(rows.even.temperature("T_electronics"), 1.0, "electronics"), *bank]
+        return [Place(recorded, float(len(bank)), "recorded electronics"), *bank]
+
+    def _bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
+        key = ("bank", id(rows), tuple(mixes), tuple(lags_s))
+        if key not in self.cache:
+            self.cache[key] = self._made_bank(rows, mixes, lags_s)
+        return list(self.cache[key])
+
+    def _made_bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
+        inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
+        mixed = [m for m, same in zip(mixes, self._same(mixes)) if not same]
+        time = rows.even.time
+        names = {0.5: "middle of the coil", 0.0: "inner face", 1.0: "outer face", -0.5: "hub"}
+        return [
+            Place(
+                lag(time, (1.0 - m) * inner + m * outer, s), 1.0, names[m] + (f", {s:g} s late" if s else "")
+            )
+            for m in mixed
+            for s in lags_s
+        ]
+
+    def _same(self, mixes: Sequence[float]) -> list[bool]:
+        """Which mixes drive as the first one does, on all runs."""
+        apart = max(
+            float(np.abs(r.even.temperature("T_out") - r.even.temperature("T_in")).max()) for r in self.runs
+        )
+        return [i > 0 and abs(m - mixes[0]) * apart < SAME_DEGC for i, m in enumerate(mixes)]
+
+
+def steps_are_coarse(scene: Scene, twin: Twin) -> bool:
+    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's.
+
+    Of those that the model is driven by: a chamber's set point goes in whole steps by itself.
+    """
+    usual = max(COARSE_STEP_DEGC, 1.01 * twin.sensors.common.resolution)
+    runs = scene.runs[: scene.fitted]
+    names = {n for r in runs for place in ("T", "T_in", "T_out") for n in r.run.sensors(place)}
+    steps = [recorded_step(r.run.columns[n]) for r in runs for n in names & set(r.run.columns)]
+    return max(steps, default=0.0) > usual
+
+
+SMOOTH_S = 3000.0
+"""What is slower than this is no line but drift, and taken out first [s]."""
+APART = 0.25
+"""Spacing of the frequencies in cycles over the longest run."""
+NEIGHBOURS = 41
+
+
+def outstanding_lines(scene: Scene, count: int) -> tuple[float, ...]:
+    """The frequencies [Hz] of most power over that of their neighbours, the most first."""
+    step = APART / scene.span_s
+    frequencies = np.arange(4.0 * step, 0.5 / scene.row_s, step)
+    if len(frequencies) < NEIGHBOURS:
+        return tuple(float(f) for f in frequencies[:count])
+    power = np.zeros(len(frequencies))
+    for rows in scene.runs[: scene.fitted]:
+        phase = np.pi * (rows.time_s - rows.time_s[0]) / max(rows.time_s[-1] - rows.time_s[0], 1.0)
+        order = max(int((rows.time_s[-1] - rows.time_s[0]) / SMOOTH_S), 1)
+        smooth = np.cos(phase[:, None] * np.arange(order + 1))
+        known = np.concatenate([smooth, rows.constants], axis=1)
+        known = known / np.maximum(np.linalg.norm(known, axis=0), 1e-300)
+        left = rows.gap - known @ np.linalg.lstsq(known, rows.gap, rcond=1e-10)[0]
+        waves = np.exp(-2j * np.pi * np.outer(frequencies, rows.time_s))
+        power += np.abs(waves @ left) ** 2 / max(float(left @ left), 1e-300)
+    power /= np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
+    peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
+    best = peaks[np.argsort(-power[peaks])][:count]
+    return tuple(float(f) for f in frequencies[best])
+
+
+class Block(NamedTuple):
+    """One member of a family, its few shapes given: columns of independent coefficients.
+
+    ``columns`` [deg/h per unit] have shape (m, k), ``shape`` says which member, ``weight`` how likely it is.
+    Of a ``positive`` one physics gives the first column's sign.
+    """
+
+    columns: FloatArray
+    shape: Mapping[str, Any] = {}
+    weight: float = 1.0
+    positive: bool = False
+
+
+Build = Callable[[Rows, Scene, Mapping[str, float]], Iterator[Block]]
+"""Blocks of one run, the same on every run of a scene, at the nominal constants."""
+
+
+@dataclass(frozen=True)
+class Family:
+    """What a cause can do.
+
+    Attributes
+    ----------
+    id
+        The effect's; of an unknown cause what it looks like.
+    kind
+        ``known`` may be named, ``unknown`` and ``plant`` may not; what is ``left_out`` by the user
+        takes no part, and is asked whether it looks like what is named.
+    build
+        Its blocks on a run.
+    words
+        What it looks like, of an unknown.
+    drawn_per_run
+        Whether each run draws its coefficients anew.
+    place
+        Where it acts, for words.
+    largest
+        Usual most of a coefficient, in its unit, where no card says it.
+    """
+
+    id: str
+    kind: Literal["known", "unknown", "plant", "left_out"]
+    build: Build
+    words: str = ""
+    drawn_per_run: bool = False
+    place: str = ""
+    largest: float = math.inf
+
+
+def column_block(*columns: FloatArray, positive: bool = False, **shape: Any) -> Block:
+    """A block of columns of shape (m,) each."""
+    return Block(np.column_stack(columns), shape, positive=positive)

@@ -1,0 +1,115 @@
+"""Whole answers: nothing where nothing is missing, a twin's wrong size, dropped rows."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fogml.errors import InputError
+from fogml.gap.diagnosis import diagnose
+from fogml.gap.model import TwinModel
+from fogml.gap.reading import rows_of
+from fogml.runs.run import Run
+from fogml.twin.programme import programme_from
+from fogml.twin.simulate import simulate
+from fogml.twin.twin_file import load_twin
+
+
+def _run(twin, seed, sample_s=60.0, hot=50):
+    steps = [
+        "soak at 25 degC for 1 h",
+        f"ramp to {hot} degC at 1 degC/min",
+        f"soak at {hot} degC for 1.5 h",
+        "ramp to -10 degC at 1 degC/min",
+        "soak at -10 degC for 1.5 h",
+        "ramp to 25 degC at 0.5 degC/min",
+        "soak at 25 degC for 1 h",
+    ]
+    return _simulated(twin, steps, seed, sample_s)
+
+
+def _simulated(twin, steps, seed, sample_s=60.0):
+    values = {"schema": "fogml.programme/1", "name": f"p{seed}", "steps": steps}
+    programme = programme_from(values | {"start_temperature": "25 degC", "power": "on"}, "test")
+    return simulate(programme, twin, sample_s=sample_s, seed=seed).run
+
+
+@pytest.fixture(scope="module")
+def tactical():
+    return load_twin("tactical")
+
+
+@pytest.fixture(scope="module")
+def runs(tactical):
+    return [_run(tactical, 1), _run(tactical, 2, hot=40), _run(tactical, 3, hot=45)]
+
+
+def test_the_same_twin_with_its_own_sensors_leaves_no_gap(tactical, runs):
+    quieter = replace(tactical, noise=replace(tactical.noise, N=0.5 * tactical.noise.N))
+    static = _simulated(quieter, ["soak at 25 degC for 6 h"], 9)
+    # White noise that differs from the static run's is no evidence of anything.
+    found = diagnose(TwinModel(tactical), runs[:2], runs[2:], noise=static, plan=False)
+    assert found.verdict == "no_gap"
+    assert found.noise.coefficients["N"] == pytest.approx(tactical.noise.N, rel=0.1)
+    assert not found.named
+    errors = [abs(c.value - getattr(tactical.nominal, c.name)) / c.se for c in found.constants]
+    assert max(errors) < 3.0
+
+
+def test_a_table_that_turns_all_the_time_makes_no_noise(tactical):
+    # Scale factor off by 950 ppm: at turning rates that change from row to row, hundreds of times the noise.
+    runs = [_run(tactical, seed) for seed in (1, 2)]
+    turned = []
+    for run in runs:
+        rate = 3.0 * np.sin(run.time / 300.0 + 0.5 * np.sin(run.time / 77.0))
+        gyro = run.gyro_deg_h + (1.0 + 950e-6) * 3600.0 * rate
+        turned.append(run.with_columns(rate=rate, gyro=gyro))
+    held = diagnose(TwinModel(tactical), turned[:1], turned[1:], plan=False).how_far[0]
+    still = diagnose(TwinModel(tactical), runs[:1], runs[1:], plan=False).how_far[0]
+    assert held.floor == pytest.approx(still.floor, rel=0.15)
+    assert "white noise" not in held.note
+
+
+def test_a_size_that_the_twin_has_wrong_gets_its_own_name(tactical, runs, tmp_path):
+    wrong = tactical.with_effect("thermal_hysteresis", 0.9, half_width=8.0)
+    found = diagnose(TwinModel(wrong), runs[:2], runs[2:], plan=False, rehearsed=True)
+    assert [f.effect for f in found.named] == ["thermal_hysteresis"]
+    (cause,) = found.named
+    assert cause.amplitude.value == pytest.approx(0.12 - 0.9, abs=4.0 * cause.amplitude.se)
+    assert found.how_far[0].closed is not None and found.how_far[0].closed > 0.8
+    # The twin that is written holds all of the effect, not the correction alone.
+    found.write_model(TwinModel(wrong), tmp_path / "twin.yaml")
+    written = load_twin(tmp_path / "twin.yaml").settings["thermal_hysteresis"]
+    assert written.amplitude == pytest.approx(0.12, abs=4.0 * cause.amplitude.se)
+    assert cause.consistent and cause.onset is None and cause.grows is None
+    _rehearsed(found.rehearsal)
+
+
+def _rehearsed(rows):
+    """What hardly shows is missed; of one form a larger size shows as much more, and is no less sure."""
+    assert {r.outcome for r in rows if r.length < 2.0} == {"missed"}
+    own = [r for r in rows if r.effect == "thermal_hysteresis" and r.form == "usual"]
+    usual, large = sorted(own, key=lambda r: r.length)
+    assert (usual.size, large.size) == ("usual", "found")
+    assert large.outcome == "named" and "thermal_hysteresis" in large.named_as
+    assert large.probability >= usual.probability
+    assert all((r.outcome == "missed") == (not r.named_as) for r in rows)
+
+
+def test_an_effect_that_no_one_knows_is_no_candidate(tactical, runs):
+    with pytest.raises(InputError, match="there is no such effect"):
+        diagnose(TwinModel(tactical), runs[:1], without=["phlogiston"])
+
+
+def test_dropped_rows_change_nothing_that_is_systematic(tactical):
+    run = _run(load_twin("nominal"), 4, sample_s=5.0)
+    keep = np.random.default_rng(1).random(len(run)) > 0.08
+    keep[[0, -1]] = True
+    less = Run(name="less", columns={n: v[keep] for n, v in run.columns.items()}, facts=run.facts)
+    whole, part = (rows_of(r, tactical, 600) for r in (run, less))
+    assert len(part) == len(whole)
+    held = np.isin(whole.end_s, part.end_s)
+    assert held.all()
+    scale = np.abs(whole.constants).max(axis=0)
+    # What is left is the noise of the readings that were dropped.
+    assert np.all(np.abs(part.constants - whole.constants) < 1e-2 * np.maximum(scale, 1e-12))

@@ -1,0 +1,56 @@
+"""Families as features of a drift model: understood, causal, and wide enough for what the family can do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from fogml.features.grammar import parse_terms
+from fogml.features.parse import parse_features
+from fogml.gap.compensation import _SPANS, Recorded, constants_features, features_of
+from fogml.gap.thermal_families import HALF_WIDTHS_DEGC, preisach
+from fogml.runs.run import Run
+from fogml.twin.registry import effects
+
+COLUMNS = frozenset(
+    {"T_in", "T_out", "T_case", "T_electronics", "T_chamber", "heater", "compressor"}
+    | {"supply", "vibration", "humidity", "angle", "B_x"}
+)
+EVERYTHING = Recorded(COLUMNS, 64.0, True, 80.0)
+ONE_SENSOR = Recorded(frozenset({"T"}), 200.0, False, 80.0)
+CANDIDATES = {id: declared for id, declared in effects().items() if declared.candidate}
+
+
+@pytest.mark.parametrize("recorded", [EVERYTHING, ONE_SENSOR], ids=["everything", "one sensor"])
+@pytest.mark.parametrize("place", ["", "hub, 600 s late", "recorded electronics", "chamber air"])
+def test_every_candidate_is_features_or_a_reason(recorded: Recorded, place: str) -> None:
+    for id, declared in CANDIDATES.items():
+        form = {"place": place, "period": 9.0, "transition_temperature": 40.0, "width": 5.0}
+        features, reason = features_of(declared, [form, {**form, "half_width": 6.0}], recorded)
+        assert bool(features) != bool(reason), id
+        for text in (*features, *constants_features(recorded)):
+            sensors = {
+                name for term in parse_terms(text) for atom in term.atoms for name in atom.signal.sensors
+            }
+            assert sensors <= recorded.columns | {"time_on", "T"}, (id, text)
+
+
+def test_each_family_of_the_bias_is_a_span() -> None:
+    left = {d.family for d in CANDIDATES.values() if d.stage == "bias" and not d.drawn_per_run}
+    assert left - set(_SPANS) <= {"signature", "ageing"}
+
+
+def test_powers_of_plays_hold_a_smooth_plane_of_relays() -> None:
+    time = np.arange(0.0, 60000.0, 40.0)
+    T = 15.0 + 35.0 * np.sin(time / 6000.0) + 12.0 * np.sin(time / 1700.0)
+    rng = np.random.default_rng(3)
+    plane = [preisach(T, float(T.min()), float(T.max()), w) for w in HALF_WIDTHS_DEGC]
+    loop = sum(columns @ (1.0 + rng.uniform(-0.6, 0.6, columns.shape[1])) for columns in plane)
+    texts, _ = features_of(CANDIDATES["thermal_hysteresis"], [{}], ONE_SENSOR)
+    columns = parse_features(", ".join(["T", "T^2", *texts])).transform(
+        Run("r", {"time": time, "gyro": 0.0 * time, "T": T})
+    )
+    design = np.column_stack([np.ones(len(time)), columns / np.abs(columns).max(axis=0)])
+    half = slice(len(time) // 4, None)
+    left = loop[half] - design[half] @ np.linalg.lstsq(design[half], loop[half], rcond=1e-10)[0]
+    assert np.std(left) < 0.03 * np.std(loop[half])

@@ -1,0 +1,81 @@
+"""Runs as rows: what is masked, constants far off, what each run draws anew."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from fogml.gap.frame import Columns
+from fogml.gap.inference import _setting
+from fogml.gap.model import TwinModel
+from fogml.gap.other_families import power_cycles
+from fogml.gap.reading import rows_of
+from fogml.gap.reports import assumed
+from fogml.gap.scene import Family, Scene, steps_are_coarse
+from fogml.gap.settings import Priors
+from fogml.runs.run import Run
+from fogml.signals.noise_model import NoiseModel
+from fogml.twin.twin_file import load_twin
+
+NOISE = NoiseModel(0.005, 0.0, 0.0)
+
+
+def _cycle(name="a", offset=0.0, seed=1):
+    """White noise of 0.1 deg/h about a constant, the temperature up and down by 40 degC."""
+    time = 5.0 * np.arange(3000)
+    gyro = offset + 0.1 * np.random.default_rng(seed).standard_normal(len(time))
+    temperature = 25.0 + 20.0 * np.sin(2.0 * np.pi * time / time[-1])
+    return Run.from_columns(name, time=time, gyro=gyro, T=temperature)
+
+
+def _scene(*runs):
+    return Scene(tuple(rows_of(run, load_twin("nominal"), 600) for run in runs), len(runs), "tactical")
+
+
+def test_spikes_and_a_limit_of_the_output_are_masked():
+    clean = _cycle()
+    gyro = clean.gyro.copy()
+    gyro[[500, 1200, 1900]] += [30.0, -40.0, 25.0]
+    gyro[2400:2420] = 0.5  # no other sample but a spike is as great
+    spoilt = Run.from_columns("spoilt", time=clean.time, gyro=gyro, T=clean.columns["T"])
+    rows, whole = (rows_of(run, load_twin("nominal"), 600) for run in (spoilt, clean))
+    assert rows.masked == {"outliers": 3, "saturated": 20}
+    assert np.abs(rows.gap).max() < 1.5 * np.abs(whole.gap).max()
+    assert not whole.masked
+
+
+def test_a_constant_far_off_is_said_and_fitted_all_the_same():
+    scene = _scene(_cycle(offset=-40.0))
+    twin = load_twin("nominal")
+    setting = _setting(TwinModel(twin), twin, scene, Priors(), NOISE)
+    assert setting.values["b0"] == pytest.approx(-40.0, abs=0.1)
+    assert setting.widened["b0"] == pytest.approx(2.0 * 40.0 / 5.0, rel=0.05)
+    found = SimpleNamespace(setting=setting, points=SimpleNamespace(source="-"))
+    (said,) = [line for line in assumed(found) if "standard deviations off" in line]
+    assert said.startswith("b0 = -40") and "is 8 standard deviations off" in said
+
+
+def test_what_each_run_draws_anew_has_columns_of_its_own():
+    scene = _scene(_cycle("a"), _cycle("b", seed=2))
+    family = Family("turn_on_bias", "known", power_cycles, drawn_per_run=True)
+    one, other = Columns.of([family], scene, {}).by_run
+    assert one.shape[1] == other.shape[1] == 2
+    np.testing.assert_array_equal(one, np.column_stack([np.ones(len(one)), np.zeros(len(one))]))
+    np.testing.assert_array_equal(other, np.column_stack([np.zeros(len(other)), np.ones(len(other))]))
+
+
+def test_steps_of_a_chambers_set_point_are_no_coarse_sensors():
+    twin, time = load_twin("nominal"), np.arange(0.0, 36000.0, 60.0)
+    x = 25.0 + 20.0 * np.sin(time / 5000.0)
+
+    def coarse(inner):
+        columns = {
+            "T_in": inner,
+            "T_out": x + 0.1 * np.cos(time / 900.0),
+            "T_chamber": np.rint(2.0 * x) / 2.0,
+        }
+        run = Run.from_columns("a", time=time, gyro=np.zeros(len(time)), **columns)
+        return steps_are_coarse(Scene((rows_of(run, twin, 600),), 1, "tactical"), twin)
+
+    assert not coarse(x)
+    assert coarse(np.rint(10.0 * x) / 10.0)

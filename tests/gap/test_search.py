@@ -1,0 +1,134 @@
+"""Sets of causes by inner products alone, and what stands in for a name."""
+
+import copy
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from tests.gap.families.test_answer import _run
+
+from fogml.gap.causes import _onset, cards_of
+from fogml.gap.how_far import Foretold
+from fogml.gap.inference import infer
+from fogml.gap.model import TwinModel
+from fogml.gap.planning import next_run as ahead
+from fogml.gap.posterior import _likeliest, judge
+from fogml.gap.scene import Scene
+from fogml.gap.settings import Priors
+from fogml.gap.unknown import _decay, unknown_families
+from fogml.runs.epochs import with_epoch
+from fogml.twin.twin_file import load_twin
+
+
+@pytest.fixture(scope="module")
+def found():
+    twin = load_twin("tactical")
+    wrong = twin.with_effect("thermal_hysteresis", 0.9, half_width=8.0)
+    runs = [_run(twin, 1, 120.0), _run(twin, 2, 120.0, hot=40)]
+    return infer(TwinModel(wrong), *with_epoch(runs, [], [])[:2], None, (), Priors())
+
+
+def test_evidence_by_inner_products_is_that_of_the_data(found):
+    search = found.search
+    for explanation in found.explanations[:5]:
+        held = search._held(explanation.members).log_evidence
+        assert held == pytest.approx(search.field.beside(explanation.nodes).log_evidence, rel=1e-9)
+
+
+def test_what_stands_in_for_a_name_has_none_of_its_class(found):
+    best = found.explanations[0]
+    names = found.search.names(best)
+    assert [found.columns.families[f].id for f in names] == ["thermal_hysteresis"]
+    for other in found.search.unexplained(best, names):
+        assert not names & set(other.key)
+        assert other.score < best.score
+    assert found.search.without(best, names).log_prior == pytest.approx(0.0)
+
+
+def test_a_name_is_no_surer_than_its_evidence_and_what_carries_over(found):
+    priors = found.setting.priors
+    (cause,) = judge(found).causes
+    assert cause.evidence <= cause.known
+    judged = judge(found)
+    assert all(0.0 <= p <= 1.0 for p in (judged.unknown, judged.nothing, cause.evidence))
+    against = np.exp(-priors.trust * np.array([cause.odds, cause.within])).sum() + np.exp(-priors.surest)
+    # All that is made is its own.
+    assert cause.log_share == 0.0
+    assert cause.probability == pytest.approx(1.0 / (1.0 + against))
+    # Beside one that makes nine times as much, against it counts ten times what no evidence shows.
+    beside = priors.believed(cause.odds, cause.within, log_share=np.log(0.1))
+    assert beside == pytest.approx(1.0 / (1.0 + against + 9.0 * np.exp(-priors.surest)))
+    # Of a rival that is known nothing more is unknown.
+    rival = replace(cause, evidence=0.5 * cause.evidence)
+    assert rival.odds == cause.odds and rival.within < cause.within
+
+
+def test_a_cause_acts_since_it_left_a_trace(found):
+    """Its course in the first run and a half of the second taken out of the data: it begins there."""
+    best = found.explanations[0]
+    every = Foretold.of(found, best.members, best.members)
+    (cause,) = judge(found).causes
+    assert _onset(found, every, cause) is None
+    courses = [sum(every.of_member(i, m) for m in cause.members) for i in range(2)]
+    half = len(courses[1]) // 2
+    courses[1] = np.where(np.arange(len(courses[1])) < half, courses[1], 0.0)
+    later = copy.copy(found.field)
+    later.base = replace(later.base, data=later.base.data - later.whitening.stacked(courses))
+    onset = _onset(SimpleNamespace(setting=found.setting, field=later), every, cause)
+    assert onset.run == found.setting.scene.runs[1].run.name
+    assert onset.time_s == pytest.approx(found.setting.scene.runs[1].time_s[half], abs=300.0)
+
+
+def test_a_name_among_several_that_are_alike_counts_for_all(found):
+    """Two sets with a name, each less likely than the one without, together more likely."""
+    named = found.explanations[0]
+    none = replace(named, members=())
+    one, other = (replace(named, log_prior=named.log_prior - less) for less in (0.3, 0.4))
+    assert _likeliest(found, [none, one, other]) is one
+    assert _likeliest(found, [none, one]) is none
+
+
+def test_members_of_a_class_are_told_apart_at_the_sizes_that_they_would_have(found, monkeypatch):
+    judged = judge(found)
+    item = SimpleNamespace(
+        effect="thermal_hysteresis", named=True, members=("thermal_hysteresis", "glass_transition")
+    )
+    asked = {}
+
+    def told(twin, noise, constants, members, **rest):
+        asked.update(members=members, **rest)
+        return "a run"
+
+    monkeypatch.setattr(ahead, "separating_run", told)
+    assert ahead.next_run(found, judged, [item], (), 3, print) == "a run"
+    assert [m.id for m in asked["members"]] == list(item.members)
+    own, other = asked["members"]
+    assert own.amplitude == pytest.approx(cards_of(found, judged)[own.id].value.amplitude)
+    assert other.amplitude != 0.0
+    alone = SimpleNamespace(effect="thermal_hysteresis", named=True, members=("thermal_hysteresis",))
+    assert ahead.next_run(found, judged, [alone], (), 3, print) is None
+
+
+def test_noise_beside_what_was_found_is_the_twins(found):
+    white = found.field.whitening.noise.N
+    assert white == pytest.approx(load_twin("tactical").noise.N, rel=0.1)
+
+
+def test_what_an_event_leaves_heals_in_its_time():
+    time = np.arange(0.0, 5000.0, 50.0)
+    kicks = np.zeros((len(time), 2))
+    kicks[10], kicks[40, 1] = (1.0, 2.0), -1.0
+    left = _decay(time, kicks, 900.0)
+    since = np.maximum(time - time[10], 0.0)
+    assert left[10:, 0] == pytest.approx(np.exp(-since[10:] / 900.0))
+    assert left[-1, 1] == pytest.approx(2.0 * left[-1, 0] - np.exp(-(time[-1] - time[40]) / 900.0))
+
+
+def test_each_unknown_gives_the_same_blocks_on_every_run(found):
+    scene: Scene = found.setting.scene
+    for family in unknown_families():
+        widths = [
+            [b.columns.shape[1] for b in family.build(r, scene, found.setting.values)] for r in scene.runs
+        ]
+        assert widths[0] == widths[1]

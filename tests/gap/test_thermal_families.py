@@ -1,0 +1,59 @@
+"""Columns of families against loops written by hand, and against the effects themselves."""
+
+import numpy as np
+
+from fogml.gap.thermal_families import DENSITY_BUMPS, RELAYS, bumps, preisach, relays
+from fogml.signals.recursions import play_kernel
+from fogml.signals.smoothing import smoothed, window_difference
+
+
+def _course(n=300, seed=3):
+    rng = np.random.default_rng(seed)
+    return np.cumsum(rng.standard_normal(n)) + 10.0 * np.sin(np.arange(n) / 30.0)
+
+
+def test_relays_switch_as_relays_do():
+    x, centres, half = _course(), np.linspace(-15.0, 15.0, 7), 4.0
+    found = relays(x, centres, half)
+    for j, centre in enumerate(centres):
+        state = -1 if centre > x[0] else 1
+        for i, value in enumerate(x):
+            if value >= centre + half:
+                state = 1
+            elif value <= centre - half:
+                state = -1
+            inside = centre - half < value < centre + half
+            assert found[i, j] == (state if inside else 0)
+
+
+def test_a_plane_is_the_sum_of_its_relays():
+    x, half = _course(), 3.0
+    centres = np.linspace(-20.0 - half, 20.0 + half, RELAYS)
+    density = bumps(centres, -20.0 - half, 20.0 + half, DENSITY_BUMPS) / RELAYS
+    expected = sum(np.outer(relays(x, centres[j : j + 1], half)[:, 0], density[j]) for j in range(RELAYS))
+    np.testing.assert_allclose(preisach(x, -20.0, 20.0, half), expected, atol=1e-12)
+
+
+def test_relays_of_one_half_width_make_the_play_operator():
+    x, half = 25.0 * np.sin(np.arange(400) / 40.0), 5.0
+    centres = np.linspace(-40.0, 40.0, 2001)
+    # Of relays spread evenly over all centres, the loop less both branches' mean is the play's lag.
+    loop = relays(x, centres, half).sum(axis=1) * (centres[1] - centres[0]) / 2.0
+    lag = play_kernel(x, half, np.nan)[0] - x
+    np.testing.assert_allclose(loop, lag, atol=0.05)
+
+
+def test_readings_lose_their_noise_and_keep_their_course():
+    rng = np.random.default_rng(5)
+    time = np.arange(1200) * 30.0
+    course = 30.0 * np.tanh((time - 18000.0) / 3000.0)
+    smooth, left = smoothed(np.round(course + 0.03 * rng.standard_normal(1200), 2))
+    assert np.std(smooth - course) < 0.012
+    expected = np.sqrt(np.mean(np.sum(left.errors(1200) ** 2, axis=1)))
+    assert 0.5 < expected / np.std(smooth - course) < 2.0
+
+
+def test_window_differences_are_integrals():
+    time = np.array([0.0, 10.0, 30.0, 40.0, 90.0, 100.0, 200.0, 300.0])
+    np.testing.assert_allclose(window_difference(time, 0.5 * time, 40.0)[5:], 0.5 * 40.0)
+    np.testing.assert_allclose(window_difference(time, np.full(8, 7.0), 40.0), 0.0, atol=1e-12)

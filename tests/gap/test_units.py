@@ -1,0 +1,55 @@
+"""Several units: causes shared, sizes each unit's own, what the next unit may have."""
+
+import pytest
+
+from fogml.errors import InputError
+from fogml.gap import units
+from fogml.gap.diagnosis import diagnose
+from fogml.gap.model import EffectValue
+from fogml.gap.units import diagnose_units
+from fogml.runs.facts import Facts
+
+from .test_own_simulator import Simulator, made_runs
+
+
+def _of(unit, size, seed, count=2):
+    effects = (EffectValue("bend", size, {"centre_temperature": 17.0, "width": 5.0}),) if size else ()
+    made = made_runs(effects, seed=seed)[:count]
+    return [run.with_facts(Facts(unit=unit)) for run in made]
+
+
+def test_weak_causes_of_two_units_are_surer_together_whatever_their_order(monkeypatch):
+    model, runs = Simulator(offered=("bend", "creep")), {"A": _of("A", 0.1, 5), "B": _of("B", 0.14, 6)}
+    known = {}
+
+    def inferred(model, fit, *given):
+        """Each unit's own posterior once: it does not depend on the others."""
+        unit = fit[0].facts.unit
+        known[unit] = known.get(unit) or units_inferred(model, fit, *given)
+        return known[unit]
+
+    units_inferred = units.inferred
+    monkeypatch.setattr(units, "inferred", inferred)
+    both = [diagnose_units(model, [*runs[a], *runs[b]]) for a, b in (("A", "B"), ("B", "A"))]
+    (cause,), (turned,) = (found.shared for found in both)
+    assert cause.effect == turned.effect == "bend"
+    assert cause.probability == pytest.approx(turned.probability, rel=1e-9)
+    assert cause.mean.value == pytest.approx(turned.mean.value, rel=1e-9)
+    for unit, size in (("A", 0.1), ("B", 0.14)):
+        assert abs(cause.sizes[unit].value - size) < 4.0 * cause.sizes[unit].se
+        alone = units.answered(known[unit], None, True, 0, 1.0)
+        own = next((f.probability for f in alone.found if f.effect == "bend"), 0.0)
+        (told,) = (f.probability for f in both[0].by_unit[unit].found if f.effect == "bend")
+        assert told > own
+    assert cause.next_unit[0] < 0.12 < cause.next_unit[1]
+    assert "the next unit's lies between" in both[0].lines()[0]
+
+
+def test_units_that_are_not_told_or_have_no_run_to_fit_on_are_refused():
+    (run, _), (held, _) = _of("A", 0.0, 5), _of("B", 0.0, 6)
+    with pytest.raises(InputError, match="does not say its unit"):
+        diagnose_units(Simulator(), [run, held.with_facts(Facts())])
+    with pytest.raises(InputError, match="unit B has runs, and none to fit on"):
+        diagnose_units(Simulator(), [run], [held])
+    with pytest.raises(InputError, match="diagnose one unit at a time"):
+        diagnose(Simulator(), [run, held])
