@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 
 from fogml.gap.model import Candidate, TwinModel
-from fogml.gap.noise import MOST_ROWS
 from fogml.gap.reading import rows_of
 from fogml.gap.rows import Rows
+from fogml.gap.settings import STANDARD
 from fogml.runs.reading import read_run
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_fit import fit_noise
@@ -67,7 +67,7 @@ class Stack:
     @cached_property
     def time(self) -> list[FloatArray]:
         """Time of each run's rows [s]."""
-        return [part.time for part in self.parts]
+        return [part.time_s for part in self.parts]
 
     @cached_property
     def gap(self) -> FloatArray:
@@ -115,7 +115,7 @@ class Stack:
         """Whitened columns, shape (n,) or (n, m), each run by itself."""
         return np.concatenate(
             [
-                Whitener(noise, part.time, averaging_s=part.row_s).whiten(rows)
+                Whitener(noise, part.time_s, averaging_s=part.row_s).whiten(rows)
                 for part, rows in zip(self.parts, self.split(values))
             ]
         )
@@ -125,19 +125,23 @@ def noise_of(static: Path | None, fit: Stack) -> NoiseModel:
     """Noise coefficients from a static run, or from the fit runs beside what smooth curves take up."""
     if static is not None:
         run = read_run(static)
-        return fit_noise([run.time], [run.gyro_deg_h], averaging_s=run.sample_s, most=MOST_ROWS).model
+        return fit_noise(
+            [run.time], [run.gyro_deg_h], averaging_s=run.sample_s, most=STANDARD.noise.most_rows
+        ).model
     columns = np.column_stack([fit.nominal, smooth_curves(fit)])
     sizes = np.linalg.norm(columns, axis=0)
     parts = fit.split(columns[:, sizes > 0.0] / sizes[sizes > 0.0])
     row_s = fit.parts[0].row_s
-    return fit_noise(fit.time, fit.split(fit.gap), parts, averaging_s=row_s, most=MOST_ROWS).model
+    return fit_noise(
+        fit.time, fit.split(fit.gap), parts, averaging_s=row_s, most=STANDARD.noise.most_rows
+    ).model
 
 
 def smooth_curves(stack: Stack) -> FloatArray:
     """Legendre polynomials in each run's time, and higher powers of temperature, shape (n, k)."""
     columns = []
     for index, part in enumerate(stack.parts):
-        x = 2.0 * (part.time - part.time[0]) / max(part.time[-1] - part.time[0], 1e-300) - 1.0
+        x = 2.0 * (part.time_s - part.time_s[0]) / max(part.time_s[-1] - part.time_s[0], 1e-300) - 1.0
         powers = np.polynomial.legendre.legvander(x, _TIME_ORDERS)[:, 1:]
         rows = np.zeros((len(part), len(stack.parts) * _TIME_ORDERS))
         rows[:, index * _TIME_ORDERS : (index + 1) * _TIME_ORDERS] = powers

@@ -1,10 +1,9 @@
-"""Covariance of constants and causes together, in the terms of a twin file."""
+"""What a diagnosis leaves for simulation: covariance, courses of effects, and the twin with all of it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -13,10 +12,13 @@ from fogml.gap.causes import Card
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
-from fogml.gap.model import EffectValue, amplitudes_about, within_limits
+from fogml.gap.model import EffectValue, within_limits
 from fogml.gap.own_simulator import OwnEffect
 from fogml.gap.posterior import Cause
+from fogml.gap.result import Diagnosis
 from fogml.gap.result_parts import Counterfactual, Course
+from fogml.gap.rows import READ
+from fogml.gap.settings import Reported
 from fogml.gap.where import averages
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.noise_expectation import floor_square
@@ -28,13 +30,8 @@ from fogml.twin.registry import effect
 from fogml.twin.twin import Twin
 from fogml.twin.uncertainty import Suspected, Uncertainty
 
-if TYPE_CHECKING:
-    from fogml.gap.result import Diagnosis
-
-SHAPE_STEP = 0.02
-"""Shapes are moved by this share of their range for the slope of a response."""
-WIDE = 10.0
-"""Prior standard deviation of an amplitude over its usual most, or its value: as good as free."""
+NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
+"""Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
 
 
 def joint_uncertainty(found: Inference, values: Sequence[EffectValue]) -> Uncertainty | None:
@@ -43,33 +40,30 @@ def joint_uncertainty(found: Inference, values: Sequence[EffectValue]) -> Uncert
     Linear about them, given the noise; amplitudes also by what no form is known more exactly than. None of a
     laboratory's own simulator.
     """
-    setting, held = found.setting, found.field
+    setting, held, grade = found.setting, found.field, found.scene.grade
     if tuple(c.name for c in setting.constants) != NAMES:
         return None
     names = [f"nominal.{name}" for name in NAMES]
     scales, columns, extra = list(setting.deviations), [], dict[int, float]()
-    fitted = setting.scene.runs[: setting.scene.fitted]
     for value in values:
-        declared = setting.scene.candidates[value.id]
+        declared = found.scene.candidates[value.id]
         if isinstance(declared, OwnEffect) or declared.drawn_per_run or declared.family == "line":
             continue
-        _, most = declared.amplitude.range(setting.scene.grade)  # type: ignore[arg-type]
+        _, most = declared.amplitude.range(grade)
         extra[len(names)] = setting.priors.form_error * value.amplitude
         names.append(f"effects.{value.id}.amplitude")
-        scales.append(WIDE * max(abs(value.amplitude), most))
-        columns.append([r.response(declared, value.shape, None, setting.values) for r in fitted])
+        scales.append(setting.priors.reported.free_amplitude * max(abs(value.amplitude), most))
+        columns.append(held.response(declared, value.shape))
         for q in declared.shape:
-            low, high = q.range(setting.scene.grade)  # type: ignore[arg-type]
+            low, high = q.range(grade)
             if high > low:
                 names.append(f"effects.{value.id}.{q.name}")
                 scales.append(0.5 * (high - low))
-                columns.append(_slope(found, declared, value, q.name, SHAPE_STEP * (high - low), q.limits))
+                step = setting.priors.reported.shape_step * (high - low)
+                columns.append(_slope(found, declared, value, q.name, step, q.limits))
     count = len(NAMES)
-    design = held.fixed
-    if columns:
-        by_run = [np.column_stack(parts) for parts in zip(*columns)]
-        white = held.whitening.stacked(by_run) * np.array(scales[count:])
-        design = np.concatenate([held.fixed, white], axis=1)
+    white = np.column_stack([np.empty((len(held.base.data), 0)), *columns]) * np.array(scales[count:])
+    design = np.concatenate([held.fixed, white], axis=1)
     covariance = Posterior.of(design, held.base.data).covariance
     kept = [*range(count), *range(held.fixed.shape[1], design.shape[1])]
     matrix = covariance[np.ix_(kept, kept)] * np.outer(scales, scales)
@@ -85,64 +79,53 @@ def _slope(
     name: str,
     step: float,
     limits: tuple[float, float],
-) -> list[FloatArray]:
-    """Change of each fit run with a shape parameter [deg/h per its unit], by central differences."""
-    runs = found.setting.scene.runs[: found.setting.scene.fitted]
+) -> FloatArray:
+    """Whitened change of the fit runs with a shape parameter [per its unit], by central differences."""
+    values = found.setting.values
     ends = [float(np.clip(value.shape[name] + by, *limits)) for by in (-step, step)]
-
-    def response(at: float) -> list[FloatArray]:
-        shape: Mapping[str, float] = {**value.shape, name: at}
-        return [r.response(declared, shape, None, found.setting.values) for r in runs]
-
-    low, high = (response(at) for at in ends)
     width = max(ends[1] - ends[0], 1e-12)
-    return [value.amplitude * (b - a) / width for a, b in zip(low, high)]
-
-
-SHOWN_SHARE = 0.05
-"""Share of the noise floor that an effect of its usual size has to make of some run to be shown."""
-NOT_LINEAR = ("line", "power_cycles", "sensor_steps", "clock_skew")
-"""Families that no size moves alone: of a phase of their own, or not in proportion to their size."""
+    changes = []
+    for rows in found.scene.fit:
+        low, high = (rows.response(declared, {**value.shape, name: at}, None, values) for at in ends)
+        changes.append(value.amplitude * (high - low) / width)
+    return found.field.whitening.stacked(changes)
 
 
 def counterfactuals(
-    found: Inference, after: Foretold, named: Sequence[Cause], cards: dict[str, Card]
+    found: Inference, after: Foretold, named: Sequence[Cause], cards: Mapping[str, Card]
 ) -> tuple[Counterfactual, ...]:
     """Every run with courses of what is named, of what the twin has, and of others at their usual size."""
-    told = []
-    for i, rows in enumerate(found.setting.scene.runs):
-        windows = averages(rows)
+    settings, told = found.setting.priors.reported, []
+    for i, rows in enumerate(found.scene.runs):
+        windows = averages(rows, settings.averaging_s)
         courses = [c for c in _courses(found, after, named, cards, i) if np.isfinite(c.values).all()]
         acting = np.sum([c.values for c in courses if c.acts], axis=0) if courses else 0.0
         # What is replayed in all, less what acts: the twin's own effects are part of its replay.
         whole = rows.recorded - rows.gap + after.on(i)
         floor = float(floor_square(found.field.whitening.noise, windows.time, windows.window_s)) ** 0.5
-        kept = tuple(
-            Course(c.effect, c.size, c.unit, c.acts, c.signed, windows.of(c.values))
-            for c in courses
-            if c.acts or float(np.std(windows.of(c.values))) > SHOWN_SHARE * floor
-        )
+        averaged = [replace(c, values=windows.of(c.values)) for c in courses]
+        least = settings.shown_share * floor
         told.append(
             Counterfactual(
                 run=rows.run.name,
-                held_out=i >= found.setting.scene.fitted,
+                held_out=i >= found.scene.fitted,
                 averaging_s=windows.window_s,
                 time_s=windows.time,
                 temperature_degc=windows.of(rows.temperature),
                 recorded=windows.of(rows.recorded),
                 replayed=windows.of(whole - acting),
                 floor=floor,
-                courses=kept,
+                courses=tuple(c for c in averaged if c.acts or float(np.std(c.values)) > least),
             )
         )
     return tuple(told)
 
 
 def _courses(
-    found: Inference, after: Foretold, named: Sequence[Cause], cards: dict[str, Card], run: int
+    found: Inference, after: Foretold, named: Sequence[Cause], cards: Mapping[str, Card], run: int
 ) -> list[Course]:
-    scene, values = found.setting.scene, found.setting.values
-    rows, grade = scene.runs[run], scene.grade
+    scene, values = found.scene, found.setting.values
+    rows = scene.runs[run]
     on = {declared.id: setting for declared, setting in found.plant.on}
     by_id = {cause.ids[0]: cause for cause in named}
     courses = []
@@ -151,16 +134,16 @@ def _courses(
         if not acts and not _linear(declared):
             continue
         course: FloatArray = np.zeros(len(rows))
-        size = cards[id].value.amplitude if id in by_id else 0.0
+        size = 0.0
         if id in by_id:
+            size = cards[id].value.amplitude
             course = course + np.sum([after.of_member(run, m) for m in by_id[id].members], axis=0)
         if id in on:
             course = course + on[id].amplitude * rows.response(declared, on[id].shape, None, values)
             size += on[id].amplitude
         if not acts:
-            size = declared.amplitude.typical(grade)  # type: ignore[arg-type]
-            shape = declared.default_shape(grade)  # type: ignore[arg-type]
-            course = size * rows.response(declared, shape, None, values)
+            size = declared.amplitude.typical(scene.grade)
+            course = size * rows.response(declared, declared.default_shape(scene.grade), None, values)
         courses.append(Course(id, size, declared.amplitude.unit, acts, declared.amplitude.signed, course))
     return courses
 
@@ -168,18 +151,12 @@ def _courses(
 def _linear(declared: Effect) -> bool:
     """Whether an effect of the catalogue is in proportion to its size and the same on each run."""
     random = isinstance(declared, NoiseEffect) and not declared.steady
-    return not (
-        random or declared.drawn_per_run or declared.family in NOT_LINEAR or amplitudes_about(declared)
-    )
+    return not (random or declared.drawn_per_run or declared.family in NOT_LINEAR or declared.amplitudes)
 
 
-LEAST_SUSPECTED = 0.05
-"""A cause is kept as suspected from this probability on."""
-RECORDED = ("T", "T_in", "T_out")
-"""What an effect may need and a plant not change, any run of a coil having it."""
-
-
-def better_twin(twin: Twin, found: Diagnosis, runs: Sequence[Run]) -> tuple[Twin, tuple[str, ...]]:
+def better_twin(
+    twin: Twin, found: Diagnosis, runs: Sequence[Run], least: float = Reported.suspected
+) -> tuple[Twin, tuple[str, ...]]:
     """A diagnosed twin with what is known and not known of it, and what was fitted in sentences.
 
     Parameters
@@ -190,8 +167,9 @@ def better_twin(twin: Twin, found: Diagnosis, runs: Sequence[Run]) -> tuple[Twin
         The diagnosis.
     runs
         Fit runs, for the plant; without any it stays as it was.
+    least
+        A cause is kept as suspected from this probability on.
     """
-    source = f"diagnosis of {' and '.join(found.fit)}"
     told, matrices, names = [], [], list[str]()
     if found.uncertainty is not None:
         names += found.uncertainty.names
@@ -211,16 +189,15 @@ def better_twin(twin: Twin, found: Diagnosis, runs: Sequence[Run]) -> tuple[Twin
         told.append(f"Plant fitted to recorded temperatures: {sizes}")
     elif why_not:
         told.append(why_not)
-    on = set(twin.settings)
-    unsure = [f for f in (*found.found, *found.suspected) if not f.named and f.probability >= LEAST_SUSPECTED]
     suspected = {}
-    for f in unsure:
-        if f.effect not in on:
+    for f in (*found.found, *found.suspected):
+        if not f.named and f.probability >= least and f.effect not in twin.settings:
             shape = {name: value.value for name, value in f.parameters.items()}
             amplitude, held = within_limits(f.effect, f.amplitude.value, shape, twin.grade)
             suspected[f.effect] = Suspected(f.probability, amplitude, held)
     if suspected:
         told.append(f"Suspected, and not on in twin.yaml: {', '.join(suspected)}")
+    source = f"diagnosis of {' and '.join(found.fit)}"
     uncertainty = Uncertainty(tuple(names), block_diag(*matrices), source) if names else None
     return replace(twin, uncertainty=uncertainty, suspected=suspected), tuple(told)
 
@@ -233,12 +210,9 @@ def diagnosed_plant(twin: Twin, runs: Sequence[Run]) -> tuple[PlantFit | None, s
     """
     if not runs or not all("T_chamber" in run.columns for run in runs):
         return None, ""
-    recorded = set.intersection(*(set(run.columns) for run in runs)) | set(RECORDED)
-    asked = {
-        id: sorted(n for n in effect(id).needs if n.startswith("T_") and n not in recorded)
-        for id in twin.settings
-    }
-    for id, lacking in asked.items():
+    recorded = set.intersection(*(set(run.columns) for run in runs)) | set(READ)
+    for id in twin.settings:
+        lacking = sorted(n for n in effect(id).needs if n.startswith("T_") and n not in recorded)
         if lacking:
             return None, f"Plant as it was: {id} follows {lacking[0]}, which was not recorded"
     return fit_plant(twin.plant, runs), ""

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from fogml.errors import InputError
 from fogml.gap.better_twin import counterfactuals, joint_uncertainty
@@ -14,7 +15,6 @@ from fogml.gap.compensation import compensation_of
 from fogml.gap.how_far import Foretold, HeldOut, cause_shares
 from fogml.gap.inference import Inference, Progress, check_runs, infer, keep_back
 from fogml.gap.model import AnyModel, TwinModel
-from fogml.gap.noise import Noise
 from fogml.gap.own_simulator import candidates_of
 from fogml.gap.planning.next_run import next_run, rehearse
 from fogml.gap.posterior import Cause, Judgement, at_cost, doubted, judge
@@ -30,20 +30,14 @@ from fogml.gap.reports import (
 )
 from fogml.gap.result import NAMED, Diagnosis, Unknown, Verdict
 from fogml.gap.result_parts import Nearest, WhatIf
-from fogml.gap.settings import Priors
+from fogml.gap.settings import STANDARD, Priors
 from fogml.gap.where import GapOnRun, where
 from fogml.runs.epochs import with_epoch
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
+from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
 
 __all__ = ["diagnose"]
-
-
-SURELY_NOT_NOTHING = 0.02
-"""Probability that nothing acts under which there is a gap, whatever makes it."""
-LISTED = 0.02
-"""Causes are listed from this probability on."""
-NEAREST = 5
 
 
 def diagnose(
@@ -112,10 +106,6 @@ def inferred(
     tell: Progress,
 ) -> Inference:
     """The posterior of causes behind the runs of one unit, once those are checked."""
-    from threadpoolctl import threadpool_limits
-
-    from fogml.twin.registry import effects
-
     model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
     for id in without:
         if id not in candidates_of(model) and id not in effects():
@@ -124,9 +114,9 @@ def inferred(
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])
     if not held_out:
-        fit, held_out = keep_back(fit)
+        fit, held_out = keep_back(fit, (priors or STANDARD).rows.kept_back)
     with threadpool_limits(1):
-        return infer(model, fit, held_out, noise, without, priors or Priors(), tell)
+        return infer(model, fit, held_out, noise, without, priors or STANDARD, tell)
 
 
 def answered(
@@ -141,8 +131,6 @@ def answered(
     tell: Progress = lambda what: None,
 ) -> Diagnosis:
     """What is said of a posterior; `part` where the last stretch of the last run was held out."""
-    from threadpoolctl import threadpool_limits
-
     with threadpool_limits(1):
         judged = judge(found)
         answer = _answer(found, judged, noise, part, seed, cost_of_false_name, courses)
@@ -165,49 +153,42 @@ def _answer(
     cost: float,
     courses: bool,
 ) -> Diagnosis:
-    scene = found.setting.scene
+    scene, settings, likeliest = found.scene, found.setting.priors.reported, judged.best.members
     shifted = [at_cost(c.probability, cost) for c in judged.causes]
     named = [c for c, p in zip(judged.causes, shifted) if p >= NAMED]
     recalibrated = Foretold.of(found, (), ())
-    every = Foretold.of(found, judged.best.members, judged.best.members)
+    every = Foretold.of(found, likeliest, likeliest)
     counted = [m for c in named for m in c.members]
     # Beside what is unknown, but not beside causes that nobody would add: two that cancel foretell nothing.
-    beside = [m for m in judged.best.members if found.columns.families[m.family].kind != "known"]
+    beside = [m for m in likeliest if found.kind(m) != "known"]
     after = Foretold.of(found, [*counted, *beside], counted) if named else recalibrated
-    structural = [r.gap - recalibrated.on(i) for i, r in enumerate(scene.runs)]
-    energies = {m: energy(found, every, m) for m in judged.best.members}
     shares = cause_shares(found, judged, every, recalibrated, seed)
     share = {s.effect: s.share for s in shares if s.run is None and s.regime is None}
     cards = cards_of(found, judged)
     items = tuple(
         found_cause(found, every, c, p, cards[c.ids[0]], share.get(c.ids[0], 0.0))
         for c, p in zip(judged.causes, shifted)
-        if p >= LISTED
+        if p >= settings.listed
     )
     held_out = [
-        HeldOut(found, i, recalibrated, judged.best.members, seed)
-        for i in range(scene.fitted, len(scene.runs))
+        HeldOut(found, i, recalibrated, likeliest, seed) for i in range(scene.fitted, len(scene.runs))
     ]
     far = tuple(h.how_far(after) for h in held_out)
     gaps = [
-        GapOnRun(r, structural[i], every.on(i) - _constants_alone(every, i), 0.0)
-        for i, r in enumerate(scene.runs[: scene.fitted])
+        GapOnRun(r, r.gap - recalibrated.on(i), every.on(i) - every.constants_on(i))
+        for i, r in enumerate(scene.fit)
     ]
+    stages = stage_energies(found, {m: energy(found, every, m) for m in likeliest})
+    lies = where(gaps, stages, found.points.fit.model, settings)
     evidence = candidate_evidence(found, judged, [i for f in items if f.named for i in f.members])
     what_if = _what_if(found, named, held_out)
     nearest = _nearest(found, what_if, judged)
     unknown = doubted(Unknown(judged.unknown, looks_like(found, judged)), items)
-    verdict = _verdict(named, unknown, judged.nothing)
+    verdict = _verdict(named, unknown, judged.nothing < settings.surely_not_nothing)
     shown = () if verdict == "unknown" else items
-    other_plant = any(found.columns.families[m.family].kind == "plant" for m in judged.best.members)
-    lies = where(
-        gaps,
-        stage_energies(found, energies),
-        Noise(found.field.whitening.noise, found.points.fit, found.points.source),
-    )
     values = fitted_values(found, judged, named, cards)
     return Diagnosis(
-        fit=tuple(r.run.name for r in scene.runs[: scene.fitted]),
+        fit=tuple(r.run.name for r in scene.fit),
         held_out=tuple(r.run.name for r in scene.runs[scene.fitted :]),
         noise_run=noise.name if noise else None,
         held_out_is_part=part,
@@ -233,22 +214,26 @@ def _answer(
         nearest=nearest,
         shares=shares,
         compensation=compensation_of(found, judged.causes, named),
-        headline=headline(found, unknown, verdict, shown, nearest, far, lies.segments, other_plant),
+        headline=headline(
+            found,
+            unknown,
+            verdict,
+            shown,
+            nearest,
+            far,
+            lies.segments,
+            any(found.kind(m) == "plant" for m in likeliest),
+        ),
     )
 
 
-def _constants_alone(every: Foretold, run: int) -> FloatArray:
-    """What the fixed block makes of a run [deg/h], shape (m,)."""
-    count = every.found.field.fixed.shape[1]
-    return np.asarray(every.design(run)[:, :count] @ every.posterior.mean[:count])
-
-
-def _verdict(named: Sequence[Cause], unknown: Unknown, nothing: float) -> Verdict:
-    if named and unknown.probability >= 0.5:
+def _verdict(named: Sequence[Cause], unknown: Unknown, something: bool) -> Verdict:
+    """In a word; `something` says that a gap is there, whatever makes it."""
+    if named and unknown.probability >= NAMED:
         return "partly_explained"
     if named:
         return "explained" if all(len(c.ids) == 1 for c in named) else "ambiguous"
-    return "unknown" if unknown.probability >= 0.5 or nothing < SURELY_NOT_NOTHING else "no_gap"
+    return "unknown" if unknown.probability >= NAMED or something else "no_gap"
 
 
 def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOut]) -> tuple[WhatIf, ...]:
@@ -276,7 +261,7 @@ def _what_if(found: Inference, named: Sequence[Cause], held_out: Sequence[HeldOu
 def _closed_share(found: Inference, foretold: Foretold) -> float:
     """Share of the fit runs' structural gap above the noise, whitened, that is gone with causes."""
     held = found.field
-    left = held.beside([(m.node, m.size) for m in foretold.members])
+    left = held.beside(foretold.members)
     along = [float(np.sum((b.basis.T @ b.data) ** 2)) for b in (held.base, left)]
     above = float(held.base.data @ held.base.data) - along[0] - len(held.base.data)
     return float(np.clip((along[1] - along[0]) / above, 0.0, 1.0)) if above > 0.0 else 0.0
@@ -284,20 +269,14 @@ def _closed_share(found: Inference, foretold: Foretold) -> float:
 
 def _nearest(found: Inference, what_if: Sequence[WhatIf], judged: Judgement) -> tuple[Nearest, ...]:
     alone = {w.effect: w.share for w in what_if if not w.beside}
-    families = found.columns.families
-    probability = {
-        f.id: float(sum(w for e, w in zip(judged.explanations, judged.weights) if i in e.key))
-        for i, f in enumerate(families)
-        if f.kind == "known"
-    }
-    gains = found.search.alone()
-    order = sorted((i for i in gains if families[i].kind == "known"), key=lambda i: -gains[i])[:NEAREST]
+    families, gains = found.columns.families, found.search.alone()
+    order = sorted(found.search.families_of("known"), key=lambda i: -gains[i])
     return tuple(
         Nearest(
-            found.setting.scene.candidates[families[i].id].family.replace("_", " "),
+            found.scene.candidates[families[i].id].family.replace("_", " "),
             families[i].id,
             alone.get(families[i].id, 0.0),
-            probability[families[i].id],
+            judged.weight_of(i),
         )
-        for i in order
+        for i in order[: found.setting.priors.reported.nearest]
     )

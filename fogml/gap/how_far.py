@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fogml.gap.field import Member
 from fogml.gap.inference import Inference
 from fogml.gap.linear_gaussian import Posterior
-from fogml.gap.noise import UNIT_FACTOR, white_noise
+from fogml.gap.noise import white_noise
 from fogml.gap.posterior import Judgement
 from fogml.gap.result_parts import CauseShare, HowFar
 from fogml.gap.rows import Rows
-from fogml.gap.search import Member
 from fogml.gap.where import averages
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import Fitted, expected_mean_square, floor_square, mean_square_draws
 from fogml.signals.noise_model import NoiseModel
-
-DRAWS, NOISES = 40, 200
-LEAST_GAP = 0.2
-"""A floor that is uncertain leaves this share of the gap above it, at least, in an interval."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +48,7 @@ class Foretold:
     def of(cls, found: Inference, members: Sequence[Member], counted: Sequence[Member]) -> Foretold:
         """Members fitted, and those among them that count."""
         held = found.field
-        posterior = Posterior.of(held.design([(m.node, m.size) for m in members]), held.base.data)
+        posterior = Posterior.of(held.design(members), held.base.data)
         kept = [np.ones(held.fixed.shape[1])]
         kept += [np.full(held.block(m.node).shape[1], float(m in counted)) for m in members]
         return cls(found, tuple(members), posterior, np.concatenate(kept))
@@ -86,16 +82,18 @@ class Foretold:
             at += width
         raise ValueError("not a member")
 
+    def constants_on(self, run: int) -> FloatArray:
+        """What the fixed block alone makes of a run [deg/h], shape (m,)."""
+        count = self.found.field.fixed.shape[1]
+        return np.asarray(self.design(run)[:, :count] @ self.posterior.mean[:count])
+
     def drawn(self, rng: np.random.Generator) -> FloatArray:
         """The mean of the coefficients, then draws from their posterior, shape (q, 1 + draws)."""
+        draws = self.found.setting.priors.reported.draws
         values, vectors = np.linalg.eigh(self.posterior.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        off = np.concatenate([np.zeros((len(values), 1)), rng.standard_normal((len(values), DRAWS))], axis=1)
+        off = np.concatenate([np.zeros((len(values), 1)), rng.standard_normal((len(values), draws))], axis=1)
         return np.asarray(self.posterior.mean[:, None] + root @ off)
-
-    def draws(self, run: int, rng: np.random.Generator) -> FloatArray:
-        """What coefficients drawn from the posterior foretell, shape (m, draws)."""
-        return np.asarray(self.design(run) @ self.drawn(rng)[:, 1:])
 
 
 class HeldOut:
@@ -119,8 +117,9 @@ class HeldOut:
         self, found: Inference, run: int, recalibrated: Foretold, members: Sequence[Member], seed: int
     ) -> None:
         self.run, self.rows = run, found.setting.scene.runs[run]
+        self._settings = settings = found.setting.priors.reported
         self._rng = np.random.default_rng([seed, run])
-        self._windows = windows = averages(self.rows)
+        self._windows = windows = averages(self.rows, settings.averaging_s)
         nodes = [found.columns.nodes[m.node] for m in members]
         made = [found.columns.by_run[run][:, n.start : n.stop] for n in nodes]
         model, self._noisier = _own_noise(self.rows, found, made)
@@ -128,7 +127,7 @@ class HeldOut:
         self._recalibrated = _square(windows.of(self.rows.gap - recalibrated.on(run)))
         self._floor = float(floor_square(model, windows.time, windows.window_s))
         as_much = model.N / found.field.whitening.noise.N
-        drawn = found.points.fit.draw(self._rng, DRAWS)
+        drawn = found.points.fit.draw(self._rng, settings.draws)
         models = [replace(m, N=as_much * m.N) for m in drawn]
         self._floors = np.array([floor_square(m, windows.time, windows.window_s) for m in models])
         self._noises = self._drawn(model, None)
@@ -143,7 +142,8 @@ class HeldOut:
         """Mean squares of noises on the run's windows, their mean the expected one."""
         windows = self._windows
         expected = expected_mean_square(model, windows.time, windows.window_s, fitted=fitted)
-        drawn = mean_square_draws(model, windows.time, windows.window_s, NOISES, self._rng, fitted=fitted)
+        count = self._settings.noises
+        drawn = mean_square_draws(model, windows.time, windows.window_s, count, self._rng, fitted=fitted)
         return np.asarray(drawn / drawn.mean() * expected)
 
     def how_far(self, after: Foretold) -> HowFar:
@@ -154,19 +154,19 @@ class HeldOut:
         """
         windows, rec, floor = self._windows, self._recalibrated, self._floor
         aft = _square(windows.of(self.rows.gap - after.on(self.run)))
-        closed, interval = None, None
+        closed, interval, draws = None, None, self._settings.draws
         note = "the recalibrated twin is at the floor within its noise: what is closed can't be told"
         if not self._at_floor:
             note = "" if aft <= rec else "the run is foretold worse with what was found than without"
             gap = rec - floor
             closed = (rec - aft) / gap
-            moved = np.zeros(DRAWS)
+            moved = np.zeros(draws)
             if after.members:
-                left = self.rows.gap[:, None] - after.draws(self.run, self._rng)
+                left = self.rows.gap[:, None] - after.design(self.run) @ after.drawn(self._rng)[:, 1:]
                 moved = np.array([_square(windows.of(column)) for column in left.T]) - aft
-            room = np.maximum(aft - self._rng.choice(self._noises, (DRAWS, DRAWS)), 0.0)
+            room = np.maximum(aft - self._rng.choice(self._noises, (draws, draws)), 0.0)
             closing = rec - aft + np.minimum(moved[:, None], room)
-            drawn = closing / np.maximum(rec - self._floors[None, :], LEAST_GAP * gap)
+            drawn = closing / np.maximum(rec - self._floors[None, :], self._settings.least_gap * gap)
             low, high = np.quantile(drawn, (0.05, 0.95))
             interval = min(float(low), closed), max(float(high), closed)
         if self._noisier:
@@ -187,10 +187,11 @@ class HeldOut:
 def _own_noise(rows: Rows, found: Inference, made: Sequence[FloatArray]) -> tuple[NoiseModel, str]:
     """The noise of a held-out run, white as it is itself where that differs beyond chance, and words."""
     model = found.field.whitening.noise
-    own, usual = white_noise(rows, found.points.prior, made), model.N
+    settings = found.setting.priors.noise
+    own, usual = white_noise(rows, settings.noiseless * found.points.prior.centre.N, made), model.N
     # The median of second differences of m rows is told to about 1.4 over the root of m.
     chance = 3.0 * 1.4 / math.sqrt(len(rows))
-    if abs(math.log(own / usual)) < max(chance, math.log(UNIT_FACTOR)):
+    if abs(math.log(own / usual)) < max(chance, math.log(settings.unit_factor)):
         return model, ""
     apart = f"{own / usual:.2g} times" if own > usual else f"only {own / usual:.2g} times"
     said = f"white noise of this run is {apart} that of the others; its floor is its own"
@@ -201,38 +202,47 @@ def _square(values: FloatArray) -> float:
     return float(np.mean(values**2))
 
 
-UNKNOWN = "unknown"
-"""What a share of anything but a known cause is called."""
-LEAST_PART = 0.03
-"""A run or regime with less of all that is taken away is left out: nothing can be told of it."""
-
-
 def cause_shares(
     found: Inference, judged: Judgement, every: Foretold, recalibrated: Foretold, seed: int
 ) -> tuple[CauseShare, ...]:
-    """Shapley's shares of what the causes of the likeliest set take away on the fit runs, in all, by run, by
+    """Shapley's shares of what the causes of the likeliest set take away on the fit runs: in all, by run, by
     regime; intervals of 90 % from the posterior of coefficients.
+
+    A set S of causes takes the energy ``v(S) = sum r^2 - sum (r - sum_S c)^2`` away from a gap r. Shapley's
+    value of this game (L. S. Shapley, Ann. Math. Stud. 28 (1953) 307) has a closed form, since what two
+    causes do together is a product of the two, which they share alike::
+
+        value of i = sum over rows of c_i (2 r - sum_k c_k)
+
+    ``c`` are the causes' courses less what the constants would take up of each. Values add up to v of all
+    causes. Known causes are told apart; all others are ``unknown``.
     """
-    scene = found.setting.scene
-    runs = range(scene.fitted)
-    groups = _groups(found, judged)
+    scene, least = found.scene, found.setting.priors.reported.least_part
+    groups: dict[str, list[Member]] = {}
+    for m in judged.best.members:
+        id = found.columns.families[m.family].id if found.kind(m) == "known" else "unknown"
+        groups.setdefault(id, []).append(m)
     if not groups:
         return ()
     rng = np.random.default_rng([seed, len(groups)])
     courses = _group_courses(found, every, recalibrated, list(groups.values()), rng)
-    values = [shapley_values(scene.runs[i].gap - recalibrated.on(i), courses[i]) for i in runs]
-    labels = [scene.runs[i].regime for i in runs]
-    whole = np.sum([v.sum(axis=0) for v in values], axis=0)
-    found_shares = _told(groups, whole, None, None)
-    for i in runs:
-        part = values[i].sum(axis=0)
-        if scene.fitted > 1 and part[:, 0].sum() > LEAST_PART * whole[:, 0].sum():
-            found_shares += _told(groups, part, scene.runs[i].run.name, None)
+    values = [
+        shapley_values(r.gap - recalibrated.on(i), c) for i, (r, c) in enumerate(zip(scene.fit, courses))
+    ]
+    by_run = [v.sum(axis=0) for v in values]
+    whole = np.sum(by_run, axis=0)
+    parts: list[tuple[str | None, str | None, FloatArray]] = []
+    if scene.fitted > 1:
+        parts += [(r.run.name, None, part) for r, part in zip(scene.fit, by_run)]
     for index, name in enumerate(Regimes.names):
-        part = np.sum([v[label == index].sum(axis=0) for v, label in zip(values, labels)], axis=0)
-        if part[:, 0].sum() > LEAST_PART * whole[:, 0].sum():
-            found_shares += _told(groups, part, None, name)
-    return tuple(found_shares)
+        inside = [v[r.regime == index].sum(axis=0) for r, v in zip(scene.fit, values)]
+        parts.append((None, name, np.sum(inside, axis=0)))
+    shares = _told(groups, whole, None, None)
+    for run, regime, part in parts:
+        # Of a part with hardly anything of all that is taken away nothing can be told.
+        if part[:, 0].sum() > least * whole[:, 0].sum():
+            shares += _told(groups, part, run, regime)
+    return tuple(shares)
 
 
 def shapley_values(gap: FloatArray, courses: FloatArray) -> FloatArray:
@@ -242,15 +252,6 @@ def shapley_values(gap: FloatArray, courses: FloatArray) -> FloatArray:
     """
     left = gap.reshape(len(gap), *(1 for _ in courses.shape[1:]))
     return np.asarray(courses * (2.0 * left - courses.sum(axis=1, keepdims=True)))
-
-
-def _groups(found: Inference, judged: Judgement) -> dict[str, list[Member]]:
-    """Members of the likeliest set by cause: those of a known one together, all others as one."""
-    groups: dict[str, list[Member]] = {}
-    for m in judged.best.members:
-        family = found.columns.families[m.family]
-        groups.setdefault(family.id if family.kind == "known" else UNKNOWN, []).append(m)
-    return groups
 
 
 def _group_courses(
@@ -264,7 +265,7 @@ def _group_courses(
 
     Shape (m, groups, 1 + draws) for each run.
     """
-    scene, held = found.setting.scene, found.field
+    scene, held = found.scene, found.field
     drawn = every.drawn(rng)
     parts = [
         np.stack([np.sum([every.part(i, m, drawn) for m in group], axis=0) for group in groups], axis=1)
@@ -272,15 +273,10 @@ def _group_courses(
     ]
     flat = held.whitening.stacked([p.reshape(len(p), -1) for p in parts])
     taken = recalibrated.posterior.covariance @ (held.fixed.T @ flat)
-    return [
-        p - (found.setting.fixed[i] @ taken).reshape(p.shape[0], len(groups), 1 + DRAWS)
-        for i, p in enumerate(parts)
-    ]
+    return [p - (found.setting.fixed[i] @ taken).reshape(p.shape) for i, p in enumerate(parts)]
 
 
-def _told(
-    groups: Mapping[str, object], values: FloatArray, run: str | None, regime: str | None
-) -> list[CauseShare]:
+def _told(groups: Iterable[str], values: FloatArray, run: str | None, regime: str | None) -> list[CauseShare]:
     """Shares of values of shape (groups, 1 + draws)."""
     total = values.sum(axis=0)
     shares = values / np.where(np.abs(total) > 0.0, total, np.inf)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -10,33 +9,20 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.catalogue import families_of
-from fogml.gap.frame import (
-    Columns,
-    Field,
-    Setting,
-    Whitening,
-    fixed_columns,
-    reading_errors,
-    whitener_of,
-    with_form_errors,
-)
-from fogml.gap.linear_gaussian import LinearGaussian, Posterior, log_evidence
+from fogml.gap.field import Columns, Field, Member
+from fogml.gap.frame import Setting, gap_length, setting_of, with_form_errors
+from fogml.gap.linear_gaussian import log_evidence
 from fogml.gap.model import AnyModel, TwinModel
 from fogml.gap.noise import NoisePoints, first_noise, noise_points, prior_of
-from fogml.gap.other_families import LINES
 from fogml.gap.own_simulator import candidates_of, plant_of
 from fogml.gap.reading import Unusable, rows_of
 from fogml.gap.rows import Rows
 from fogml.gap.scene import Scene, outstanding_lines
 from fogml.gap.search import Explanation, Search
-from fogml.gap.settings import Priors
+from fogml.gap.settings import Priors, RowSettings
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.twin import Twin
-
-LEAST_MOTION_DEGC = 2.0
-KEPT_BACK = 0.25
-"""Share of the last run that is held out where no run is."""
 
 
 def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -> None:
@@ -69,23 +55,15 @@ def check_runs(fit: Sequence[Run], held_out: Sequence[Run], noise: Run | None) -
             raise InputError(f"the runs are of different {what}s ({listed}); diagnose one {what} at a time")
 
 
-def keep_back(fit: Sequence[Run]) -> tuple[Sequence[Run], Sequence[Run]]:
-    """Fit runs less the last stretch of the last one, and that."""
+def keep_back(
+    fit: Sequence[Run], share: float = RowSettings.kept_back
+) -> tuple[Sequence[Run], Sequence[Run]]:
+    """Fit runs less the last stretch of the last one, a share of it, and that."""
     last = fit[-1]
-    cut = int(len(last) * (1.0 - KEPT_BACK))
+    cut = int(len(last) * (1.0 - share))
     return [*fit[:-1], last[:cut]], [last[cut:]]
 
 
-FAR_OFF = 3.0
-"""Prior standard deviations from which on a constant is said to be far off, and its prior widened."""
-MOST_ROUNDS = 3
-"""Searches, each at the noise that the one before found likeliest."""
-WHITE_FACTORS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)
-"""White noise beside what was found, over that beside nothing."""
-SURE = 5
-"""Sets by which white noise is judged again."""
-RESCORED = 24
-"""Sets whose evidence is taken at every noise."""
 Progress = Callable[[str], None]
 
 
@@ -137,6 +115,15 @@ class Inference:
         """At the noise that fits best."""
         return self.search.field
 
+    @property
+    def scene(self) -> Scene:
+        """Its runs."""
+        return self.setting.scene
+
+    def kind(self, member: Member) -> str:
+        """Kind of a member's family."""
+        return self.columns.families[member.family].kind
+
 
 def infer(
     model: AnyModel,
@@ -157,122 +144,87 @@ def infer(
     tell("reading inputs")
     plant = plant_of(model)
     most = min(priors.most_rows, priors.most_of_all // max(len(fit), 1))
-    runs, unusable = _rows(fit, model, plant, most)
+    runs, unusable = _rows(fit, model, plant, most, priors.rows)
     if not runs:
         raise InputError("; ".join(reason for _, reason in unusable))
-    held, more = _rows(held_out, model, plant, most)
-    scene = Scene((*runs, *held), len(runs), model.grade, candidates=candidates_of(model))
-    _check_motion(scene)
-    prior, source = prior_of(model, noise)
-    setting = _setting(model, plant, scene, priors, prior.centre)
+    held, more = _rows(held_out, model, plant, most, priors.rows)
+    scene = Scene((*runs, *held), len(runs), model.grade, (), candidates_of(model), priors.grids)
+    _check_motion(scene, priors.rows.least_motion_degc)
+    prior, source = prior_of(model, noise, priors.noise)
+    setting = setting_of(model, plant, scene, priors, prior.centre)
     first = first_noise(setting, prior)
-    setting = _setting(model, plant, scene, priors, first)
-    length = _gap_length(setting, first)
+    setting = setting_of(model, plant, scene, priors, first)
+    length = gap_length(setting, first)
     priors = priors.reaching(length)
     setting = with_form_errors(replace(setting, priors=priors), first, length)
     tell("fitting the noise")
     points = noise_points(setting, prior, source, noise, priors.hopeless)
-    setting = _setting(model, plant, scene, priors, points.fit.model)
+    setting = setting_of(model, plant, scene, priors, points.fit.model)
     setting = with_form_errors(setting, points.fit.model, length)
-    scene = replace(scene, lines_hz=outstanding_lines(scene, LINES))
+    scene = replace(scene, lines_hz=outstanding_lines(scene))
     setting = replace(setting, scene=scene)
     tell("building families")
     columns = Columns.of(families_of(plant, scene, without), scene, setting.values)
-    for _ in range(MOST_ROUNDS):
+    how, factors = priors.search, priors.noise.white_factors
+    for _ in range(how.rounds):
         tell("searching")
         best = points.best
         search = Search(Field(setting, columns, points.noises[best]))
         found = search.explanations()
-        found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members][:RESCORED]
+        found = [e for e in found if e.score > found[0].score - priors.hopeless or not e.members]
+        found = found[: how.rescored]
         # What fast causes make looks like noise until they are known.
-        whites = [points.with_white(factor) for factor in WHITE_FACTORS]
-        beside = [Field(setting, columns, p.noises[best], _nodes(found[:SURE])) for p in whites]
-        likeliest = over_noises(found[:SURE], beside, [0.0] * len(beside))
+        whites = [points.with_white(factor) for factor in factors]
+        sure = found[: how.sure]
+        beside = [Field(setting, columns, p.noises[best], _nodes(sure)) for p in whites]
+        likeliest = over_noises(sure, beside, [0.0] * len(beside))
         scores = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in likeliest])
-        settled = WHITE_FACTORS[int(np.argmax(scores))] == 1.0
+        settled = factors[int(np.argmax(scores))] == 1.0
         points = whites[int(np.argmax(scores))]
         fields = [Field(setting, columns, m, _nodes(found)) for m in points.noises]
         rescored = over_noises(found, fields, points.log_priors)
         by_noise = np.logaddexp.reduce([e.log_prior + np.array(e.by_noise) for e in rescored])
-        points = points.judged(by_noise)
+        points = replace(points, log_posteriors=by_noise)
         if settled and points.best == best:
             break
         points = points.within(priors.hopeless)
     return Inference(model, plant, setting, columns, points, search, tuple(rescored), (*unusable, *more))
 
 
-def _check_motion(scene: Scene) -> None:
-    fit = scene.runs[: scene.fitted]
-    moved = max(float(np.ptp(r.temperature)) for r in fit)
-    if moved < LEAST_MOTION_DEGC and not any(np.any(r.run.rate) for r in fit):
+def _check_motion(scene: Scene, least_degc: float) -> None:
+    moved = max(float(np.ptp(r.temperature)) for r in scene.fit)
+    if moved < least_degc and not any(np.any(r.run.rate) for r in scene.fit):
         raise InputError(
-            f"{', '.join(r.run.name for r in fit)}: temperature moves by {moved:.2g} degC in all; "
-            f"a diagnosis needs a run in which it moves by {LEAST_MOTION_DEGC:g} degC or more"
+            f"{', '.join(r.run.name for r in scene.fit)}: temperature moves by {moved:.2g} degC in all; "
+            f"a diagnosis needs a run in which it moves by {least_degc:g} degC or more"
         )
-
-
-def _gap_length(setting: Setting, noise: NoiseModel) -> float:
-    """Whitened length of the gap beside the constants, above noise."""
-    whitening, fitted = Whitening(noise, setting), setting.scene.fitted
-    data = whitening.stacked([r.gap for r in setting.scene.runs[:fitted]])
-    left = LinearGaussian.of(data).beside(whitening.stacked(setting.fixed[:fitted])).gram(data[:, None])
-    return math.sqrt(max(float(left[0, 0]) - len(data), 0.0))
 
 
 def foreseen(model: TwinModel, runs: Sequence[Run], noise: NoiseModel, priors: Priors) -> Search:
     """A search on runs that hold no gap: it tells what they would, of noise that is known."""
     most = min(priors.most_rows, priors.most_of_all // len(runs))
-    rows = tuple(rows_of(run, model.twin, most) for run in runs)
-    scene = Scene(rows, len(rows), model.grade, candidates=candidates_of(model))
-    setting = _setting(model, model.twin, scene, priors, noise)
-    columns = Columns.of(families_of(model.twin, scene, ()), scene, setting.values)
+    rows = tuple(rows_of(run, model.twin, most, settings=priors.rows) for run in runs)
+    scene = Scene(rows, len(rows), model.grade, (), candidates_of(model), priors.grids)
+    setting = setting_of(model, model.twin, scene, priors, noise)
+    columns = Columns.of(families_of(model.twin, scene), scene, setting.values)
     return Search(Field(setting, columns, noise))
 
 
 def _nodes(explanations: Sequence[Explanation]) -> list[int]:
-    return sorted({n for e in explanations for n, _ in e.nodes})
+    return sorted({m.node for e in explanations for m in e.members})
 
 
 def _rows(
-    runs: Sequence[Run], model: AnyModel, plant: Twin, most: int
+    runs: Sequence[Run], model: AnyModel, plant: Twin, most: int, settings: RowSettings
 ) -> tuple[list[Rows], list[tuple[str, str]]]:
     usable, unusable = [], []
     own = None if isinstance(model, TwinModel) else model
     for run in runs:
         try:
-            usable.append(rows_of(run, plant, most, own))
+            usable.append(rows_of(run, plant, most, own, settings))
         except Unusable as error:
             unusable.append((run.name, str(error)))
     return usable, unusable
-
-
-def _setting(model: AnyModel, plant: Twin, scene: Scene, priors: Priors, noise: NoiseModel) -> Setting:
-    """Constants fitted beside nothing, those widened that are far off, and the fixed block at them."""
-    constants = model.constants
-    values = {c.name: c.mean for c in constants}
-    widened: dict[str, float] = {}
-    noises = [float(np.median(whitener_of(noise, r).deviation)) for r in scene.runs[: scene.fitted]]
-    for _ in range(3):
-        errors = [reading_errors(r, values, by) for r, by in zip(scene.runs[: scene.fitted], noises)]
-        ends = np.cumsum([0, *(e.shape[1] for e in errors)])
-        blocks = []
-        for i, r in enumerate(scene.runs):
-            wide = np.zeros((len(r), int(ends[-1])))
-            if i < scene.fitted:
-                wide[:, ends[i] : ends[i + 1]] = errors[i]
-            own = fixed_columns(r, i, scene, plant, constants, widened, values, priors)
-            blocks.append(np.concatenate([own, wide], axis=1))
-        fixed = tuple(blocks)
-        setting = Setting(scene, constants, priors, fixed, values, widened)
-        whitening = Whitening(noise, setting)
-        fitted = scene.fitted
-        data = whitening.stacked([r.gap for r in scene.runs[:fitted]])
-        found = Posterior.of(whitening.stacked(fixed[:fitted]), data)
-        sd = setting.deviations
-        values = {c.name: float(c.mean + s * x) for c, s, x in zip(constants, sd, found.mean)}
-        off = {c.name: abs(values[c.name] - c.mean) / c.sd for c in constants}
-        widened |= {name: 2.0 * z for name, z in off.items() if z > FAR_OFF}
-    return replace(setting, values=values, fixed=fixed)
 
 
 def over_noises(
@@ -286,15 +238,11 @@ def over_noises(
         every = np.concatenate([held.fixed, held.white], axis=1)
         gram, fits = every.T @ every, every.T @ data
         for e, row in zip(explanations, by_noise):
-            places = [np.arange(first)] + [
-                np.arange(first + held.at[n].start, first + held.at[n].stop)
-                for n, _ in e.nodes
-                if n in held.at
-            ]
-            size = np.concatenate(
-                [np.ones(first), *(np.full(held.block(n).shape[1], s) for n, s in e.nodes if n in held.at)]
-            )
-            at = np.concatenate(places)
+            shown = [(held.at[m.node], m.size) for m in e.members if m.node in held.at]
+            places = [np.arange(first + span.start, first + span.stop) for span, _ in shown]
+            sizes = [np.full(span.stop - span.start, size) for span, size in shown]
+            at = np.concatenate([np.arange(first), *places])
+            size = np.concatenate([np.ones(first), *sizes])
             scaled = gram[np.ix_(at, at)] * np.outer(size, size)
             value = log_evidence(scaled, fits[at] * size, square)
             row.append(value + e.spread + log_prior - held.whitening.log_det)

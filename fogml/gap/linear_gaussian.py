@@ -68,6 +68,11 @@ class LinearGaussian:
         across = self.basis.T @ columns
         return np.asarray(columns.T @ columns - across.T @ across)
 
+    def length(self, series: FloatArray) -> float:
+        """Length of a series beside all blocks."""
+        along = self.basis.T @ series
+        return math.sqrt(max(float(series @ series - along @ along), 0.0))
+
 
 def size_gains(gram: FloatArray, fits: FloatArray, sizes: FloatArray) -> FloatArray:
     """Gain in log evidence of a block at each size.

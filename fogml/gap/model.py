@@ -6,7 +6,7 @@ effects, each linear in its amplitude at given shape parameters.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
@@ -15,11 +15,10 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 
 from fogml.runs.run import FloatArray, Run
-from fogml.twin.nominal import DELTA_WINDOW_S, NAMES, UNITS, NominalConstants
+from fogml.twin.nominal import NAMES, UNITS, NominalConstants
 from fogml.twin.quantities import Grade, Quantity
 from fogml.twin.registry import effect, effects
 from fogml.twin.twin import Twin
-from fogml.twin.twin_file import save_twin
 
 
 @dataclass(frozen=True)
@@ -64,7 +63,10 @@ class EffectValue:
 
 @runtime_checkable
 class Candidate(Protocol):
-    """An effect that a diagnosis may name; every `fogml.twin.effect.Effect` is one."""
+    """An effect that a diagnosis may name; every `fogml.twin.effect.Effect` is one.
+
+    It may have ``drawn_per_run``, ``told_by``, ``amplitudes`` and ``place`` besides, as effects have them.
+    """
 
     @property
     def id(self) -> str:
@@ -89,21 +91,6 @@ class Candidate(Protocol):
     @property
     def confused_with(self) -> Mapping[str, str]:
         """Id of a look-alike to what separates the two; may be empty."""
-
-
-def drawn_per_run(candidate: Candidate) -> bool:
-    """Whether a candidate is drawn anew on each run, which it says by an attribute of this name."""
-    return bool(getattr(candidate, "drawn_per_run", False))
-
-
-def told_by(candidate: Candidate) -> tuple[tuple[str, ...], ...]:
-    """Columns that tell a candidate from others, one of each group: its attribute of this name; else none."""
-    return tuple(getattr(candidate, "told_by", ()))
-
-
-def amplitudes_about(candidate: Candidate) -> Sequence[float]:
-    """Amplitudes about which a response not in proportion to them is taken: ``amplitudes``, if it has any."""
-    return tuple(getattr(candidate, "amplitudes", ()))
 
 
 class ModelOnRun(Protocol):
@@ -185,8 +172,6 @@ class TwinModel:
         Ids of effects that the catalogue is taken not to hold: as if nobody knew of them.
     """
 
-    memory_s = 2.0 * DELTA_WINDOW_S
-
     def __init__(self, twin: Twin, lacks: Iterable[str] = ()) -> None:
         self.twin, self.lacks = twin, frozenset(lacks)
         self.name = twin.name
@@ -212,17 +197,6 @@ class TwinModel:
             for id, declared in effects().items()
             if declared.candidate and id not in on | self.lacks and not on & set(declared.conflicts)
         }
-
-    def write(
-        self,
-        path: Path,
-        constants: Mapping[str, float],
-        effects: tuple[EffectValue, ...],
-        noise: NoisePrior,
-        standard_errors: Mapping[str, float],
-    ) -> None:
-        """Write a twin file: as `diagnosed`."""
-        save_twin(self.diagnosed(constants, effects, noise, standard_errors), path)
 
     def diagnosed(
         self,

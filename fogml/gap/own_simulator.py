@@ -13,24 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from fogml.gap.model import (
-    AnyModel,
-    Candidate,
-    EffectValue,
-    GyroModel,
-    ModelOnRun,
-    TwinModel,
-    amplitudes_about,
-    drawn_per_run,
-    told_by,
-)
+from fogml.gap.model import AnyModel, Candidate, EffectValue, GyroModel, ModelOnRun, TwinModel
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.effect import Effect
 from fogml.twin.inputs import Inputs
+from fogml.twin.registry import effects
 from fogml.twin.twin import Twin
-
-STEP_DEGC = 0.5
-"""Temperatures are moved by so much, up and down, for the slope of a replay."""
+from fogml.twin.twin_file import load_twin
 
 
 class OwnEffect(Effect):
@@ -51,12 +40,15 @@ class OwnOnRun:
         The simulator.
     run
         As it is replayed.
+    step_degc
+        Temperatures are moved by so much, up and down, for the slope of a replay.
     slopes_at
         Slopes that were worked out, by the constants.
     """
 
     model: GyroModel
     run: Run
+    step_degc: float
     slopes_at: dict[tuple[float, ...], dict[str, FloatArray]] = field(default_factory=dict)
 
     @cached_property
@@ -86,9 +78,9 @@ class OwnOnRun:
             self.model.on(
                 self.run.with_columns(**{name: self.run.columns[name] + step for name in sensors})
             ).output(constants)
-            for step in (STEP_DEGC, -STEP_DEGC)
+            for step in (self.step_degc, -self.step_degc)
         )
-        return np.asarray((np.asarray(up) - np.asarray(down)) / (2.0 * STEP_DEGC), dtype=np.float64)
+        return np.asarray((np.asarray(up) - np.asarray(down)) / (2.0 * self.step_degc), dtype=np.float64)
 
     def columns(self) -> FloatArray:
         """Response to a unit of each constant, shape (n, c); 0 where the run can't show one."""
@@ -116,8 +108,6 @@ def candidates_of(model: AnyModel) -> dict[str, Effect]:
 
     A candidate that bears an id of the catalogue's has that one's family, and its own sizes.
     """
-    from fogml.twin.registry import effects
-
     catalogue = {id: declared for id, declared in effects().items() if declared.candidate}
     if isinstance(model, TwinModel):
         return {id: declared for id, declared in catalogue.items() if id not in model.lacks}
@@ -134,9 +124,9 @@ def _declared(candidate: Candidate, alike: Effect | None) -> Effect:
         for name in ("id", "title", "stage", "amplitude", "shape", "confused_with")
     }
     told |= {
-        "drawn_per_run": drawn_per_run(candidate),
-        "told_by": told_by(candidate),
-        "amplitudes": tuple(amplitudes_about(candidate)),
+        "drawn_per_run": bool(getattr(candidate, "drawn_per_run", False)),
+        "told_by": tuple(getattr(candidate, "told_by", ())),
+        "amplitudes": tuple(getattr(candidate, "amplitudes", ())),
         "family": alike.family if alike else "signature",
         "place": getattr(candidate, "place", alike.place if alike else ""),
     }
@@ -147,6 +137,4 @@ def plant_of(model: AnyModel) -> Twin:
     """The twin whose plant tells temperatures that were not recorded: the model's, or the nominal one."""
     if isinstance(model, TwinModel):
         return model.twin
-    from fogml.twin.twin_file import load_twin
-
     return load_twin("nominal")

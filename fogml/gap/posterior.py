@@ -81,6 +81,10 @@ class Judgement:
     explanations: tuple[Explanation, ...]
     weights: FloatArray
 
+    def weight_of(self, family: int) -> float:
+        """Posterior probability of the sets that hold a family."""
+        return float(sum(w for e, w in zip(self.explanations, self.weights) if family in e.key))
+
 
 def judge(found: Inference) -> Judgement:
     """Causes of the likeliest set with their classes.
@@ -156,14 +160,14 @@ def _weights(explanations: Sequence[Explanation]) -> FloatArray:
 def _energies(found: Inference, explanation: Explanation) -> dict[int, float]:
     """Squares of the whitened lengths, beside what is fixed, of what each family makes; no plant's."""
     held = found.field
-    mean = Posterior.of(held.design(explanation.nodes), held.base.data).mean
+    mean = Posterior.of(held.design(explanation.members), held.base.data).mean
     made: dict[int, float] = {}
     at = held.fixed.shape[1]
     for m in explanation.members:
         block = m.size * held.block(m.node)
         course = block @ mean[at : at + block.shape[1]]
         at += block.shape[1]
-        if found.columns.families[m.family].kind != "plant":
+        if found.kind(m) != "plant":
             left = float(held.base.gram(course[:, None])[0, 0])
             made[m.family] = made.get(m.family, 0.0) + max(left, 0.0)
     return made
@@ -215,7 +219,7 @@ def carries(found: Inference, explanation: Explanation) -> float:
     if len(spans) == 1:
         middle = spans[0].stop // 2
         spans = [slice(0, middle), slice(middle, spans[0].stop)]
-    return left_out_log_density(held.design(explanation.nodes), held.base.data, spans)
+    return left_out_log_density(held.design(explanation.members), held.base.data, spans)
 
 
 def _with_more(explanations: Sequence[Explanation], more: Sequence[Explanation]) -> tuple[Explanation, ...]:

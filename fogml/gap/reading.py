@@ -12,6 +12,7 @@ from fogml.errors import InputError
 from fogml.gap.model import GyroModel
 from fogml.gap.own_simulator import OwnOnRun
 from fogml.gap.rows import BySample, Rows
+from fogml.gap.settings import STANDARD, RowSettings
 from fogml.runs.outliers import find_outliers
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.smoothing import Smoothness, at_points, smoothed, window_difference
@@ -21,24 +22,20 @@ from fogml.twin.plant.estimate import estimate_nodes
 from fogml.twin.replay import Replayer
 from fogml.twin.twin import Twin
 
-FEWEST_ROWS = 16
-LEAST_FULL = 0.5
-"""A row needs this share of its samples."""
-SHORT_GAP = 0.25
-"""Readings are linear over a gap of this share of the model's memory; a longer one is left out."""
-SATURATED = 3
-"""Neighbouring samples at the greatest or least value of all from which on it is a limit."""
-
-
-ROUGHER = 0.03
-"""Share of the smoothing's penalty under which noise of the readings shows."""
-
 
 class Unusable(InputError):
     """A run that a diagnosis can't use; others may do."""
 
 
-def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, exact: bool = False) -> Rows:
+def rows_of(
+    run: Run,
+    twin: Twin,
+    most: int,
+    model: GyroModel | None = None,
+    settings: RowSettings = STANDARD.rows,
+    *,
+    exact: bool = False,
+) -> Rows:
     """A run brought to `most` rows at most, replayed by the twin, or by another model in its place.
 
     Of `exact` readings there is nothing to be smoothed.
@@ -51,8 +48,8 @@ def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, 
     run = run.without_dropouts
     if not run.temperature_columns:
         raise Unusable(f"{run.name}: holds no temperature; a replay needs 'T [degC]' or 'T_in [degC]'")
-    usable, masked = _usable(run)
-    if usable.sum() < FEWEST_ROWS:
+    usable, masked = _usable(run, settings)
+    if usable.sum() < settings.fewest:
         empty = [name for name, values in run.columns.items() if not np.isfinite(values).any()]
         if empty:
             raise Unusable(f"{run.name}: column '{empty[0]}' holds no number; fill it or leave it out")
@@ -73,18 +70,20 @@ def rows_of(run: Run, twin: Twin, most: int, model: GyroModel | None = None, *, 
     smooth = {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
     own = None
     if model is not None:
-        own = OwnOnRun(model, run.with_columns(**{n: v for n, v in smooth.items() if n in run.columns}))
+        recorded = {n: v for n, v in smooth.items() if n in run.columns}
+        own = OwnOnRun(model, run.with_columns(**recorded), settings.slope_step_degc)
         replayed = own.output({c.name: c.mean for c in model.constants})
-        errors, columns = np.zeros((len(time), 2)), samples.means_of(own.columns())
+        errors = np.zeros((len(time), 2))
+        columns = np.column_stack([samples.means(c) for c in own.columns().T])
     else:
         replayed = replayer.with_temperatures(smooth).output(twin)
-        errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed)
+        errors = _replay_errors(run, twin, replayer, even, readings, samples, replayed, settings.rougher)
         columns = _constant_columns(samples, even, step)
     memory_s = 2.0 * DELTA_WINDOW_S if model is None else model.memory_s
-    kept = counts >= LEAST_FULL * width
+    kept = counts >= settings.least_full * width
     kept &= time - row_s >= run.time[0] + min(memory_s, 0.1 * run.span_s) - step
-    kept &= ~_after_gaps(run, time, row_s, memory_s)
-    if kept.sum() < FEWEST_ROWS:
+    kept &= ~_after_gaps(run, time, row_s, memory_s, settings.short_gap)
+    if kept.sum() < settings.fewest:
         raise Unusable(f"{run.name}: its stretches between gaps are too short for a replay")
     return Rows(
         run=run,
@@ -113,17 +112,18 @@ def _replay_errors(
     readings: Mapping[str, FloatArray],
     samples: BySample,
     replayed: FloatArray,
+    share: float,
 ) -> FloatArray:
     """What errors of the readings make of the twin's own effects, shape (e, 2) [deg/h].
 
     Readings that are late by 1 s; and readings as they were, of which smoothing takes away noise and some
-    of what is true.
+    of what is true: smoothed by a share of the penalty.
     """
     if not twin.on:
         return np.zeros((len(even.time), 2))
     columns = []
     late = {n: even.temperatures[n] + np.gradient(even.temperatures[n], even.time) for n in readings}
-    rougher = {n: smoothed(values, ROUGHER)[0] for n, values in readings.items()}
+    rougher = {n: smoothed(values, share)[0] for n, values in readings.items()}
     for moved in (late, rougher):
         other = replayer.with_temperatures(
             {n: at_points(even.time, v, run.time, samples.spread) for n, v in moved.items()}
@@ -132,7 +132,7 @@ def _replay_errors(
     return np.column_stack(columns)
 
 
-def _usable(run: Run) -> tuple[NDArray[np.bool_], dict[str, int]]:
+def _usable(run: Run, settings: RowSettings) -> tuple[NDArray[np.bool_], dict[str, int]]:
     usable = np.ones(len(run), dtype=np.bool_)
     for values in run.columns.values():
         usable &= np.isfinite(values)
@@ -143,20 +143,21 @@ def _usable(run: Run) -> tuple[NDArray[np.bool_], dict[str, int]]:
     usable[outliers] = False
     if not np.any(run.rate):
         held = gyro[usable]
+        varied = np.ptp(gyro) > 0.0 and len(np.unique(gyro)) > settings.distinct
         for extreme in (held.max(), held.min()) if len(held) else ():
             at = np.concatenate([[0], (gyro == extreme).astype(np.int8), [0]])
             edges = np.flatnonzero(np.diff(at))
             for first, last in zip(edges[::2], edges[1::2]):
-                if last - first >= SATURATED and np.ptp(gyro) > 0.0 and len(np.unique(gyro)) > 50:
+                if last - first >= settings.saturated and varied:
                     usable[first:last] = False
                     masked["saturated"] = masked.get("saturated", 0) + int(last - first)
     return usable, {why: n for why, n in masked.items() if n}
 
 
-def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float) -> NDArray[np.bool_]:
+def _after_gaps(run: Run, time: FloatArray, row_s: float, memory: float, short: float) -> NDArray[np.bool_]:
     """Even rows into which the model's memory [s] reaches from over a long gap."""
     hidden = np.zeros(len(time), dtype=np.bool_)
-    jumps = np.flatnonzero(np.diff(run.time) > max(SHORT_GAP * memory, 3.0 * run.sample_s))
+    jumps = np.flatnonzero(np.diff(run.time) > max(short * memory, 3.0 * run.sample_s))
     for i in jumps.tolist():
         hidden |= (time + 0.5 * row_s > run.time[i]) & (time - row_s < run.time[i + 1] + memory)
     return hidden

@@ -17,8 +17,8 @@ import numpy as np
 
 from fogml.errors import InputError
 from fogml.gap.model import TwinModel
-from fogml.gap.result import Diagnosis, RunSeries
-from fogml.gap.result_parts import Counterfactual
+from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import Counterfactual, RunSeries
 from fogml.runs.columns import REPLAYED
 from fogml.runs.run import FloatArray, Run
 from fogml.twin.nominal import NAMES, PRIOR_SD, nominal_columns

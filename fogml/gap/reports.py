@@ -4,30 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
+from fogml.gap.field import Member
 from fogml.gap.frame import whitener_of
-from fogml.gap.inference import FAR_OFF, Inference
-from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, RunSeries, Unknown, Verdict
-from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset
-from fogml.gap.search import Member
+from fogml.gap.how_far import Foretold
+from fogml.gap.inference import Inference
+from fogml.gap.posterior import Judgement
+from fogml.gap.result import CandidateEvidence, ConstantFit, Found, NoiseReport, Unknown, Verdict
+from fogml.gap.result_parts import GapSegment, HowFar, Nearest, Onset, RunSeries
 from fogml.gap.where import averages
 from fogml.runs.run import FloatArray
+from fogml.signals.bases import rate
 from fogml.signals.noise_expectation import floor_square
 from fogml.signals.whiteness import whiteness
-from fogml.twin.effect import NoiseEffect
+from fogml.twin.effect import Effect, NoiseEffect
 
-if TYPE_CHECKING:
-    from fogml.gap.how_far import Foretold
-    from fogml.gap.inference import Inference
-    from fogml.gap.posterior import Judgement
-
-FEWEST_CHECKED = 64
-"""Held-out rows under which the noise can't be checked."""
-POSSIBLE = 0.05
-"""A candidate is possible from this probability on."""
 STAGES = {"other_plant": "thermal", "table": "rig", "readings": "sensor"}
 """Stages that causes without a card act on."""
 UNKNOWN_STAGE = "bias"
@@ -38,42 +32,34 @@ def candidate_evidence(
     found: Inference, judged: Judgement, named: Sequence[str]
 ) -> tuple[CandidateEvidence, ...]:
     """Each candidate alone, what the runs can show of it, and what became of it."""
-    gains, families = found.search.alone(), found.columns.families
+    gains, families, priors = found.search.alone(), found.columns.families, found.setting.priors
     index = {f.id: i for i, f in enumerate(families) if f.kind == "known"}
     rows = []
-    for id, declared in found.setting.scene.candidates.items():
-        i = index.get(id)
+    for id, declared in found.scene.candidates.items():
+        i, about = index.get(id), (id, declared.title, declared.stage)
         if i is None or i not in gains:
             # A random error has no mean response; others lie in the span of the constants.
-            rows.append(CandidateEvidence(id, declared.title, declared.stage, 0.0, 0.0, 0.0, "in_constants"))
+            rows.append(CandidateEvidence(*about, 0.0, 0.0, 0.0, "in_constants"))
             continue
-        usual = usual_length(found, id)
-        held = float(sum(w for e, w in zip(judged.explanations, judged.weights) if i in e.key))
-        status: Literal["named", "possible", "no_sign", "undetectable", "in_constants"]
+        usual, held = usual_length(found, declared), judged.weight_of(i)
+        status: Literal["named", "possible", "no_sign", "undetectable"]
         if id in named:
             status = "named"
-        elif usual < found.setting.priors.least_detectable:
+        elif usual < priors.least_detectable:
             status = "undetectable"
         else:
-            status = "possible" if held >= POSSIBLE else "no_sign"
-        rows.append(CandidateEvidence(id, declared.title, declared.stage, gains[i], held, usual, status))
+            status = "possible" if held >= priors.reported.possible else "no_sign"
+        rows.append(CandidateEvidence(*about, gains[i], held, usual, status))
     return tuple(sorted(rows, key=lambda r: -r.gain))
 
 
-def usual_length(found: Inference, id: str) -> float:
+def usual_length(found: Inference, declared: Effect) -> float:
     """Whitened length beside the constants of an effect of the usual size and shape in its card."""
-    setting = found.setting
-    declared = setting.scene.candidates[id]
     if isinstance(declared, NoiseEffect) and not declared.steady:
-        return float(setting.priors.least_detectable)
-    grade = setting.scene.grade
-    amplitude = declared.amplitude.typical(grade)  # type: ignore[arg-type]
-    shape = declared.default_shape(grade)  # type: ignore[arg-type]
-    runs = setting.scene.runs[: setting.scene.fitted]
-    parts = [amplitude * r.response(declared, shape, None, setting.values) for r in runs]
-    white = found.field.whitening.stacked(parts)
-    across = found.field.base.basis.T @ white
-    return float(np.sqrt(max(float(white @ white - across @ across), 0.0)))
+        return float(found.setting.priors.least_detectable)
+    grade = found.scene.grade
+    response = found.field.response(declared, declared.default_shape(grade))
+    return found.field.base.length(declared.amplitude.typical(grade) * response)
 
 
 def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[str, float]:
@@ -81,11 +67,8 @@ def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[s
     total: dict[str, float] = {}
     for member, energy in energies.items():
         family = found.columns.families[member.family]
-        stage: str = UNKNOWN_STAGE
-        if family.kind == "known":
-            stage = found.setting.scene.candidates[family.id].stage
-        else:
-            stage = STAGES.get(family.id, UNKNOWN_STAGE)
+        known = family.kind == "known"
+        stage = found.scene.candidates[family.id].stage if known else STAGES.get(family.id, UNKNOWN_STAGE)
         total[stage] = total.get(stage, 0.0) + energy
     return total
 
@@ -115,13 +98,13 @@ def noise_of(found: Inference, after: Foretold) -> NoiseReport:
         dict(zip("NBK", map(float, errors))),
         found.points.source,
     )
-    scene, parts = found.setting.scene, []
+    scene, priors, parts = found.scene, found.setting.priors, []
     for i in range(scene.fitted, len(scene.runs)):
         rows = scene.runs[i]
         gap = rows.gap - after.on(i)
-        parts.append(whitener_of(model, rows).whiten(gap - np.mean(gap)))
+        parts.append(whitener_of(model, rows, priors.noise.longest_runs).whiten(gap - np.mean(gap)))
     count = sum(map(len, parts))
-    if count < FEWEST_CHECKED:
+    if count < priors.reported.fewest_checked:
         return told
     step = scene.runs[scene.fitted].row_s
     check = whiteness(parts, sample_s=step)
@@ -140,16 +123,11 @@ def noise_of(found: Inference, after: Foretold) -> NoiseReport:
 
 def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tuple[RunSeries, ...]:
     """Averages of every run for drawing."""
-    scene, model = found.setting.scene, found.field.whitening.noise
+    scene, model = found.scene, found.field.whitening.noise
     out = []
     for i, rows in enumerate(scene.runs):
-        windows = averages(rows)
+        windows = averages(rows, found.setting.priors.reported.averaging_s)
         temperature = windows.of(rows.temperature)
-        speed = (
-            60.0 * np.gradient(temperature, windows.time)
-            if len(temperature) > 1
-            else np.zeros(len(temperature))
-        )
         gaps = {
             "before": rows.gap,
             "recalibrated": rows.gap - recalibrated.on(i),
@@ -164,7 +142,7 @@ def series_of(found: Inference, recalibrated: Foretold, after: Foretold) -> tupl
                 averaging_s=windows.window_s,
                 time_s=windows.time,
                 temperature_degc=temperature,
-                rate_degc_min=speed,
+                rate_degc_min=rate(windows.time, temperature),
                 regime=rows.regime[windows.starts[windows.full]],
                 recorded=recorded,
                 replayed_before=recorded - gap["before"],
@@ -188,7 +166,7 @@ def assumed(found: Inference) -> tuple[str, ...]:
     for name, factor in setting.widened.items():
         constant = next(c for c in setting.constants if c.name == name)
         off = abs(setting.values[name] - constant.mean) / constant.sd
-        if off > FAR_OFF:
+        if off > setting.priors.noise.far_off:
             said.append(
                 f"{name} = {setting.values[name]:.4g} {constant.unit} is {off:.3g} standard deviations off "
                 f"what was expected ({constant.mean:g} ± {constant.sd:g}): a unit, a sign or the twin may be "
@@ -212,23 +190,21 @@ def assumed(found: Inference) -> tuple[str, ...]:
 
 def looks_like(found: Inference, judged: Judgement) -> str:
     """What the unknown looks like; empty where there is none."""
-    families = found.columns.families
     weights: dict[str, float] = {}
     for e, w in zip(judged.explanations, judged.weights):
         for m in e.members:
-            if families[m.family].kind == "unknown":
+            if found.kind(m) == "unknown":
                 between = found.columns.nodes[m.node].shape.get("between")
-                words = families[m.family].words + (f", {between}" if between else "")
+                words = found.columns.families[m.family].words + (f", {between}" if between else "")
                 weights[words] = weights.get(words, 0.0) + float(w)
-    if judged.unknown < 0.05 or not weights:
+    if judged.unknown < found.setting.priors.reported.possible or not weights:
         return ""
     return max(weights, key=weights.__getitem__)
 
 
 def _since(found: Inference, onset: Onset) -> str:
     """When something began: between two runs, or within one."""
-    scene = found.setting.scene
-    order = sorted(range(scene.fitted), key=lambda i: scene.begun_s[i])
+    scene, order = found.scene, found.scene.in_time
     names = [scene.runs[i].run.name for i in order]
     at = names.index(onset.run)
     if at and onset.time_s <= float(scene.runs[order[at]].time_s[0]):
@@ -250,7 +226,7 @@ def headline(
 
     `other_plant` says that the likeliest set holds another flow of heat.
     """
-    said, titles = [], found.setting.scene.candidates
+    said, titles = [], found.scene.candidates
     if verdict == "no_gap" and other_plant:
         said.append(
             "Heat flows a little otherwise than the model's plant says, or a sensor lags: fit its time "
@@ -281,13 +257,12 @@ def headline(
         like = unknown.looks_like
         said.append(f"Something acts that is not known{': it ' + like if like else ''}.")
         for n in [n for n in nearest if n.effect not in {f.effect for f in shown if f.named}][:2]:
-            if n.share >= 0.2:
+            if n.share >= found.setting.priors.reported.near_share:
                 said.append(
                     f"Nearest known cause: {titles[n.effect].title.lower()}, in whatever form, holds "
                     f"{n.share:.0%} of the gap."
                 )
-    order = sorted(range(found.setting.scene.fitted), key=lambda i: found.setting.scene.begun_s[i])
-    runs = [found.setting.scene.runs[i].run.name for i in order]
+    runs = [found.scene.runs[i].run.name for i in found.scene.in_time]
     first = min((runs.index(s.run) for s in segments), default=0)
     if first > 0:
         begun = min(s.from_s for s in segments if s.run == runs[first])

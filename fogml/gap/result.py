@@ -6,12 +6,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fogml.gap.model import EffectValue, NoisePrior
+from fogml.gap.model import AnyModel, EffectValue, NoisePrior, TwinModel
 from fogml.gap.result_json import gap_values
 from fogml.gap.result_parts import (
     CauseShare,
@@ -21,14 +18,12 @@ from fogml.gap.result_parts import (
     Nearest,
     Onset,
     Rehearsed,
+    RunSeries,
     WhatIf,
     Where,
 )
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import Run
 from fogml.twin.uncertainty import Uncertainty
-
-if TYPE_CHECKING:
-    from fogml.gap.model import AnyModel
 
 NAMED = 0.5
 """An effect is named from this probability on."""
@@ -188,35 +183,6 @@ class CandidateEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class RunSeries:
-    """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
-
-    ``recorded`` is less the reference; ``gap_before``, ``gap_recalibrated`` and ``gap_after`` are
-    recorded less replayed; ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the
-    unit, ``note`` is what the run's facts say of it.
-    """
-
-    run: str
-    role: Literal["fit", "held_out"]
-    averaging_s: float
-    time_s: FloatArray
-    temperature_degc: FloatArray
-    rate_degc_min: FloatArray
-    regime: NDArray[np.int8]
-    recorded: FloatArray
-    replayed_before: FloatArray
-    replayed_recalibrated: FloatArray
-    replayed_after: FloatArray
-    gap_before: FloatArray
-    gap_recalibrated: FloatArray
-    gap_after: FloatArray
-    floor: float
-    gyro: str | None = None
-    axis: str | None = None
-    note: str = ""
-
-
-@dataclass(frozen=True, eq=False)
 class Diagnosis:
     """The result of `fogml.gap.diagnose`.
 
@@ -314,7 +280,6 @@ class Diagnosis:
         A twin has its covariance, what is suspected, and a plant fitted to `runs` besides, told in sentences.
         """
         from fogml.gap.better_twin import better_twin
-        from fogml.gap.model import TwinModel
         from fogml.twin.twin_file import save_twin
 
         noise, spread = self.noise.coefficients, self.noise.relative_se

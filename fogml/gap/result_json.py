@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Mapping
+from dataclasses import asdict, is_dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,60 +15,50 @@ if TYPE_CHECKING:
 SCHEMA = "fogml.gap/1"
 
 
-def gap_values(diagnosis: Diagnosis) -> dict[str, Any]:
+def gap_values(found: Diagnosis) -> dict[str, Any]:
     """A diagnosis as plain values, ready for JSON."""
     return {
         "schema": SCHEMA,
         "runs": {
-            "fit": list(diagnosis.fit),
-            "held_out": list(diagnosis.held_out),
-            "noise": diagnosis.noise_run,
-            "held_out_is_part_of_last_run": diagnosis.held_out_is_part,
-            "unusable": [{"run": run, "reason": reason} for run, reason in diagnosis.unusable],
+            "fit": list(found.fit),
+            "held_out": list(found.held_out),
+            "noise": found.noise_run,
+            "held_out_is_part_of_last_run": found.held_out_is_part,
+            "unusable": [{"run": run, "reason": reason} for run, reason in found.unusable],
         },
-        "model": diagnosis.model,
-        "verdict": diagnosis.verdict,
-        "which": [_found(found) for found in diagnosis.found],
-        "suspected": [_found(found) for found in diagnosis.suspected],
-        "unknown": asdict(diagnosis.unknown),
-        "where": _where(diagnosis.where),
-        "how_far": [_plain(asdict(item)) for item in diagnosis.how_far],
-        "undetectable": list(diagnosis.undetectable),
-        "separating_run": None
-        if diagnosis.separating_run is None
-        else _plain(asdict(diagnosis.separating_run)),
+        "model": found.model,
+        "verdict": found.verdict,
+        "which": [_found(f) for f in found.found],
+        "suspected": [_found(f) for f in found.suspected],
+        "unknown": _plain(found.unknown),
+        "where": _where(found.where),
+        "how_far": _plain(found.how_far),
+        "undetectable": list(found.undetectable),
+        "separating_run": _plain(found.separating_run),
         "constants": {
             c.name: {"value": c.value, "se": c.se, "unit": c.unit, "prior": [c.prior_mean, c.prior_sd]}
-            for c in diagnosis.constants
+            for c in found.constants
         },
-        "noise": _plain(asdict(diagnosis.noise)),
-        "evidence": [_plain(asdict(item)) for item in diagnosis.evidence],
-        "what_if": [_plain(asdict(item)) for item in diagnosis.what_if],
-        "nearest": [_plain(asdict(item)) for item in diagnosis.nearest],
-        "headline": list(diagnosis.headline),
-        "shares": [_plain(asdict(item)) for item in diagnosis.shares],
-        "rehearsal": [_plain(asdict(item)) for item in diagnosis.rehearsal],
-        "compensation": None if diagnosis.compensation is None else _plain(asdict(diagnosis.compensation)),
-        "assumed": list(diagnosis.assumed),
+        **{
+            name: _plain(getattr(found, name))
+            for name in ("noise", "evidence", "what_if", "nearest", "headline", "shares", "rehearsal")
+        },
+        "compensation": _plain(found.compensation),
+        "assumed": list(found.assumed),
     }
 
 
 def _found(found: Found) -> dict[str, Any]:
+    odds = ("against_unknown", "among_known", "log_share")
+    same = ("probability", "amplitude", "parameters", "stage", "by_run", "consistent")
     return {
         "effect": found.effect,
         "class": list(found.members),
         "left_out": list(found.left_out),
-        "probability": found.probability,
-        "amplitude": asdict(found.amplitude),
-        "parameters": {name: asdict(value) for name, value in found.parameters.items()},
-        "stage": found.stage,
-        "by_run": [asdict(item) for item in found.by_run],
-        "consistent": found.consistent,
+        **{name: _plain(getattr(found, name)) for name in same},
         "grows_per_day": found.grows,
-        "onset": None if found.onset is None else asdict(found.onset),
-        "log_odds": None
-        if found.log_odds is None
-        else dict(zip(("against_unknown", "among_known", "log_share"), found.log_odds)),
+        "onset": _plain(found.onset),
+        "log_odds": None if found.log_odds is None else dict(zip(odds, found.log_odds)),
         "share": found.share,
         "place": found.place,
         "times_usual": found.times_usual,
@@ -76,8 +67,8 @@ def _found(found: Found) -> dict[str, Any]:
 
 def _where(where: Where) -> dict[str, Any]:
     return {
-        "stage": [_plain(asdict(item)) for item in where.stage],
-        "regime": [_plain(asdict(item)) for item in where.regime],
+        "stage": _plain(where.stage),
+        "regime": _plain(where.regime),
         "temperature": [
             {
                 "from": t.from_degc,
@@ -90,17 +81,17 @@ def _where(where: Where) -> dict[str, Any]:
             }
             for t in where.temperature
         ],
-        "timescale": [_plain(asdict(item)) for item in where.timescale],
-        "segments": [asdict(item) for item in where.segments],
+        "timescale": _plain(where.timescale),
+        "segments": _plain(where.segments),
     }
 
 
 def _plain(values: Any) -> Any:
-    """Tuples as lists, numpy numbers as Python's."""
-    if isinstance(values, dict):
+    """Dataclasses and mappings as dictionaries, tuples as lists, numpy numbers as Python's."""
+    if is_dataclass(values) and not isinstance(values, type):
+        values = asdict(values)
+    if isinstance(values, Mapping):
         return {key: _plain(value) for key, value in values.items()}
     if isinstance(values, list | tuple):
         return [_plain(value) for value in values]
-    if isinstance(values, np.generic):
-        return values.item()
-    return values
+    return values.item() if isinstance(values, np.generic) else values

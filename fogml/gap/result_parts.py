@@ -1,8 +1,12 @@
-"""Where a gap lies: shares, excesses over the floor and segments."""
+"""Parts of the result of a diagnosis: where, how far, what may be compensated, series for drawing."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
 
 from fogml.runs.run import FloatArray
 
@@ -266,3 +270,32 @@ class Counterfactual:
     replayed: FloatArray
     floor: float
     courses: tuple[Course, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class RunSeries:
+    """What a page draws of a run: averages over `averaging_s`, all of shape (k,) [deg/h] unless said.
+
+    ``recorded`` is less the reference; ``gap_before``, ``gap_recalibrated`` and ``gap_after`` are
+    recorded less replayed; ``rate_degc_min`` tells up and down apart. ``gyro`` and ``axis`` name the
+    unit, ``note`` is what the run's facts say of it.
+    """
+
+    run: str
+    role: Literal["fit", "held_out"]
+    averaging_s: float
+    time_s: FloatArray
+    temperature_degc: FloatArray
+    rate_degc_min: FloatArray
+    regime: NDArray[np.int8]
+    recorded: FloatArray
+    replayed_before: FloatArray
+    replayed_recalibrated: FloatArray
+    replayed_after: FloatArray
+    gap_before: FloatArray
+    gap_recalibrated: FloatArray
+    gap_after: FloatArray
+    floor: float
+    gyro: str | None = None
+    axis: str | None = None
+    note: str = ""

@@ -11,12 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fogml.gap.own_simulator import OwnEffect, OwnOnRun
+from fogml.gap.shapes import AT_AMPLITUDE
 from fogml.runs.regimes import regimes
 from fogml.runs.run import FloatArray, Run
 from fogml.signals.smoothing import Smoothness, at_points, window_difference
 from fogml.twin.effect import Effect, LoopEffect
 from fogml.twin.inputs import Inputs
-from fogml.twin.nominal import DELTA, DELTA_WINDOW_S
+from fogml.twin.nominal import (
+    DELTA,
+    DELTA_WINDOW_S,
+    NominalConstants,
+    bias_deg_h,
+    scale_factor_ppm,
+    temperature_slopes,
+)
+
+READ_GROUPS = (("T", "T_in"), ("T_out",))
+"""Temperatures that drive the model, by the sensors that err together."""
+READ = ("T", "T_in", "T_out")
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,17 +102,17 @@ class Rows:
         """Middle of each row [s], shape (m,)."""
         return self.end_s - 0.5 * self.row_s
 
-    @property
-    def time(self) -> FloatArray:
-        """As `time_s`."""
-        return self.time_s
-
     @cached_property
     def regime(self) -> NDArray[np.int8]:
         """Regime of each row; see `fogml.runs.regimes`."""
         labels = regimes(self.run).labels
         at = np.clip(np.searchsorted(self.run.time, self.time_s), 0, len(labels) - 1)
         return np.asarray(labels[at])
+
+    @cached_property
+    def per_ppm(self) -> FloatArray:
+        """Response to a scale factor error of 1 ppm [deg/h], shape (m,)."""
+        return 1e-6 * self.of(self.even.input_rate_deg_h * np.ones(len(self.kept)))
 
     def of(self, values: FloatArray) -> FloatArray:
         """Rows of what is given on the even ones, shape (e, ...) to (m, ...)."""
@@ -116,61 +128,65 @@ class Rows:
         """Of an effect per unit of its amplitude [deg/h], shape (m,).
 
         `temperatures` take the place of those of the even rows; `constants` are those at which an effect
-        meets output and slopes.
+        meets output and slopes. A shape that says `AT_AMPLITUDE` asks for what that amplitude makes of the
+        output, over it.
         """
+        if AT_AMPLITUDE in shape:
+            about = shape[AT_AMPLITUDE]
+            bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
+            return self._changed_output(declared, bare, about, constants or {}) / about
         if isinstance(declared, OwnEffect):
             assert self.own is not None
             return self.samples(self.own.response(declared.id, shape, constants or {}))
         fast = {"rate", "angle", "output", "slopes", "earth"} & set(declared.needs)
         met = constants if {"output", "slopes"} & set(declared.needs) else None
         if self.turns and (fast or declared.stage in ("scale_factor", "rig", "loop")):
-            inputs = self._by_sample_inputs(temperatures, met)
+            inputs = self._inputs(True, temperatures, met)
             return self.of(self.by_sample.means(np.asarray(declared.response(inputs, **shape), np.float64)))
-        values = declared.response(self._even_inputs(temperatures, met), **shape)
+        values = declared.response(self._inputs(False, temperatures, met), **shape)
         return self.of(np.broadcast_to(np.asarray(values, dtype=np.float64), self.kept.shape))
 
-    def _by_sample_inputs(
-        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
+    def _inputs(
+        self,
+        by_sample: bool,
+        temperatures: Mapping[str, FloatArray] | None,
+        constants: Mapping[str, float] | None,
     ) -> Inputs:
-        """Inputs at the samples."""
-        key = ("samples", *_key(temperatures, constants))
-        if key not in self.cache:
-            self.cache[key] = self._meeting(self.by_sample.inputs(self.even, temperatures), constants)
-        return self.cache[key].afresh()
+        """Inputs at the samples, or on the even rows; worked out once.
 
-    def _even_inputs(
-        self, temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
-    ) -> Inputs:
-        """Inputs on the even rows."""
-        key = ("even", *_key(temperatures, constants))
+        Arrays are kept with what they are told apart by, so that none takes another's place.
+        """
+        told = tuple((name, id(values)) for name, values in (temperatures or {}).items())
+        key = (by_sample, told, None if constants is None else tuple(constants.values()))
         if key not in self.cache:
-            inputs = self.even
-            if temperatures:
-                inputs = replace(inputs, temperatures={**inputs.temperatures, **temperatures}, cache={})
-            self.cache[key] = self._meeting(inputs, constants)
+            if by_sample:
+                inputs = self.by_sample.inputs(self.even, temperatures)
+            elif temperatures:
+                held = {**self.even.temperatures, **temperatures}
+                inputs = replace(self.even, temperatures=held, cache={})
+            else:
+                inputs = self.even
+            self.cache[key] = self._meeting(inputs, by_sample, constants)
         return self.cache[key].afresh()
 
     def samples(self, values: FloatArray) -> FloatArray:
         """Means of a series over the samples, shape (n,) to (m,)."""
         return self.of(self.by_sample.means(values))
 
-    def _meeting(self, inputs: Inputs, constants: Mapping[str, float] | None) -> Inputs:
+    def _meeting(self, inputs: Inputs, by_sample: bool, constants: Mapping[str, float] | None) -> Inputs:
         """Inputs with the output of the model without effects, and its slopes, at constants."""
         if constants is None:
             return inputs
         if self.own is not None:
-            by_sample = len(inputs.time) == len(self.by_sample.row)
             over = (lambda values: values) if by_sample else self.by_sample.means
             told = {name: over(slope) for name, slope in self.own.slopes(constants).items()}
             return replace(inputs, output=over(self.own.output(constants)), slopes=told)
-        from fogml.twin.nominal import NominalConstants, bias_deg_h, scale_factor_ppm, temperature_slopes
-
         nominal = NominalConstants(**dict(constants))
-        rate = inputs.input_rate_deg_h
-        output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * rate + bias_deg_h(inputs, nominal)
+        output = (1.0 + 1e-6 * scale_factor_ppm(inputs, nominal)) * inputs.input_rate_deg_h
+        output = output + bias_deg_h(inputs, nominal)
         return replace(inputs, output=np.asarray(output), slopes=temperature_slopes(inputs, nominal))
 
-    def changed_output(
+    def _changed_output(
         self, declared: Effect, shape: Mapping[str, float], amplitude: float, constants: Mapping[str, float]
     ) -> FloatArray:
         """What an effect that meets the output makes of it at an amplitude [deg/h], shape (m,)."""
@@ -178,13 +194,13 @@ class Rows:
             assert self.own is not None
             return self.samples(self.own.changed(declared.id, shape, amplitude, constants))
         assert isinstance(declared, LoopEffect)
-        inputs = self._by_sample_inputs(None, constants)
+        inputs = self._inputs(True, None, constants)
         output = np.asarray(inputs.output)
         return self.of(self.by_sample.means(declared.apply(output, inputs, amplitude) - output))
 
     def delayed(self, delay_s: float, constants: Mapping[str, float]) -> FloatArray:
         """What a delay of the output [s] makes of it [deg/h], shape (m,)."""
-        inputs = self._by_sample_inputs(None, constants)
+        inputs = self._inputs(True, None, constants)
         output = np.asarray(inputs.output)
         late = np.interp(inputs.time - delay_s, inputs.time, output)
         return self.of(self.by_sample.means(late - output))
@@ -209,10 +225,6 @@ class BySample:
         at = np.arange(len(total))
         return means if held.all() else np.where(held, means, np.interp(at, at[held], means[held]))
 
-    def means_of(self, columns: FloatArray) -> FloatArray:
-        """The same of columns side by side, shape (n, k) to (e, k)."""
-        return np.column_stack([self.means(c) for c in columns.T])
-
     def inputs(self, even: Inputs, temperatures: Mapping[str, FloatArray] | None) -> Inputs:
         """Inputs at the samples, with the even rows' temperatures."""
         held = {**even.temperatures, **(temperatures or {})}
@@ -226,20 +238,10 @@ class BySample:
         return self.cache[id(values)][1]
 
 
-def _key(
-    temperatures: Mapping[str, FloatArray] | None, constants: Mapping[str, float] | None
-) -> tuple[Any, ...]:
-    """What inputs are told apart by; the arrays are kept with them, so that none takes another's place."""
-    told = tuple((name, id(values)) for name, values in (temperatures or {}).items())
-    return told, None if constants is None else tuple(constants.values())
-
-
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:
     """Change of the nominal output with each temperature and with DeltaT, on the even rows."""
     if rows.own is not None:
         return {name: rows.by_sample.means(slope) for name, slope in rows.own.slopes(constants).items()}
-    from fogml.twin.nominal import NominalConstants, temperature_slopes
-
     return temperature_slopes(rows.even.afresh(), NominalConstants(**dict(constants)))
 
 

@@ -1,4 +1,4 @@
-"""Where causes sit: the temperatures that may drive them, and the lines that stand out of the gaps."""
+"""The runs of a diagnosis together, places where causes sit, lines that stand out, and what a family is."""
 
 from __future__ import annotations
 
@@ -11,23 +11,17 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from scipy.ndimage import median_filter
 
-from fogml.gap.rows import Rows
+from fogml.gap.grids import Grids
+from fogml.gap.rows import READ, Rows
 from fogml.runs.run import FloatArray
 from fogml.runs.steps import recorded_step
-from fogml.signals.recursions import lag_kernel
+from fogml.signals.bases import lag
 from fogml.twin.effect import Effect
+from fogml.twin.quantities import Grade
 from fogml.twin.twin import Twin
 
-MIXES = (0.5, 0.0, 1.0, -0.5)
-"""Shares of the outer face in a place's temperature: within, inner, outer, and beyond the inner one."""
-LAGS_S = (0.0, 600.0, 1800.0)
-"""Lags of a place behind that [s]."""
-DIRECTION_DEGC_MIN = 0.05
-"""Rates under this are no direction."""
-COARSE_STEP_DEGC = 0.0101
-"""Steps of a good sensor are no coarser: part of any recording."""
-SAME_DEGC = 0.3
-"""Places that stay this near to one before drive alike."""
+PLACES = {0.5: "middle of the coil", 0.0: "inner face", 1.0: "outer face", -0.5: "hub"}
+"""Places of the winding by the share of the outer face in their temperature."""
 
 
 class Place(NamedTuple):
@@ -36,18 +30,6 @@ class Place(NamedTuple):
     temperature: FloatArray
     weight: float
     name: str
-
-
-def lag(time: FloatArray, x: FloatArray, time_constant_s: float) -> FloatArray:
-    """First-order lag from rest, shape (n,)."""
-    if time_constant_s <= 0.0:
-        return x
-    return np.asarray(lag_kernel(time, x, np.array([time_constant_s]), np.nan, np.nan, np.nan)[0])
-
-
-def rate(time: FloatArray, x: FloatArray) -> FloatArray:
-    """Rate of a smooth course per minute, shape (n,)."""
-    return np.asarray(60.0 * np.gradient(x, time)) if len(x) > 1 else np.zeros(len(x))
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,21 +48,29 @@ class Scene:
         Frequencies that stand out of the fit runs.
     candidates
         What may be named, by id.
+    grids
+        How closely families look.
     cache
         What several families ask for.
     """
 
     runs: tuple[Rows, ...]
     fitted: int
-    grade: str
+    grade: Grade
     lines_hz: tuple[float, ...] = ()
     candidates: Mapping[str, Effect] = field(default_factory=dict)
+    grids: Grids = field(default_factory=Grids)
     cache: dict[Any, Any] = field(default_factory=dict)
+
+    @property
+    def fit(self) -> tuple[Rows, ...]:
+        """Fit runs."""
+        return self.runs[: self.fitted]
 
     @cached_property
     def range_degc(self) -> tuple[float, float]:
         """Least and greatest T of the fit runs."""
-        held = [r.temperature for r in self.runs[: self.fitted]]
+        held = [r.temperature for r in self.fit]
         return min(float(t.min()) for t in held), max(float(t.max()) for t in held)
 
     @property
@@ -92,12 +82,12 @@ class Scene:
     @cached_property
     def span_s(self) -> float:
         """The longest fit run [s]."""
-        return max(float(r.run.span_s) for r in self.runs[: self.fitted])
+        return max(float(r.run.span_s) for r in self.fit)
 
     @cached_property
     def row_s(self) -> float:
         """The longest row [s]."""
-        return max(r.row_s for r in self.runs[: self.fitted])
+        return max(r.row_s for r in self.fit)
 
     @cached_property
     def begun_s(self) -> tuple[float, ...]:
@@ -108,6 +98,11 @@ class Scene:
             return tuple(s.timestamp() - first for s in started)  # type: ignore[union-attr]
         edges = np.cumsum([0.0, *(float(r.run.span_s) + r.row_s for r in self.runs)])
         return tuple(float(e) - float(r.run.time[0]) for e, r in zip(edges, self.runs))
+
+    @property
+    def in_time(self) -> list[int]:
+        """Fit runs in the order in which they began."""
+        return sorted(range(self.fitted), key=lambda i: self.begun_s[i])
 
     @cached_property
     def order_known(self) -> bool:
@@ -122,85 +117,38 @@ class Scene:
         earlier = [(b, i) for i, b in enumerate(self.begun_s) if b < own]
         return tuple(self.runs[i] for _, i in sorted(earlier))
 
-    def coil(self, rows: Rows, mixes: Sequence[float] = (0.5, 0.0, 1.0)) -> list[Place]:
+    def coil(self, rows: Rows) -> list[Place]:
         """Places in the winding."""
-        return self._bank(rows, mixes, (0.0,))
+        return self._bank(rows, tuple(m for m in self.grids.mixes if m >= 0.0), (0.0,))
 
-    def optics(self, rows: Rows, mixes: Sequence[float] = MIXES) -> list[Place]:
+    def optics(self, rows: Rows, mixes: Sequence[float] | None = None) -> list[Place]:
         """Places of optics and electronics: the recorded one first, then lags behind the coil's faces."""
-        recorded = rows.even.temperatures.get("T_electronics") if "T_electronics" in rows.readings else None
-        bank = self._bank(rows, mixes, LAGS_S)
-        if recorded is None:
+        bank = self._bank(rows, tuple(self.grids.mixes if mixes is None else mixes), self.grids.place_lags_s)
+        if "T_electronics" not in rows.readings:
             # As the model's own plant has it, self-heating included.
             return [Place(rows.even.temperature("T_electronics"), 1.0, "electronics"), *bank]
+        recorded = rows.even.temperatures["T_electronics"]
         return [Place(recorded, float(len(bank)), "recorded electronics"), *bank]
 
-    def _bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
-        key = ("bank", id(rows), tuple(mixes), tuple(lags_s))
+    def _bank(self, rows: Rows, mixes: tuple[float, ...], lags_s: tuple[float, ...]) -> list[Place]:
+        """Places of mixes and lags; those left out that drive as the first mix does, on all runs."""
+        key = ("bank", id(rows), mixes, lags_s)
         if key not in self.cache:
-            self.cache[key] = self._made_bank(rows, mixes, lags_s)
+            faces = [(r.even.temperature("T_in"), r.even.temperature("T_out")) for r in self.runs]
+            apart = max(float(np.abs(outer - inner).max()) for inner, outer in faces)
+            near = self.grids.same_degc
+            inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
+            self.cache[key] = [
+                Place(
+                    lag(rows.even.time, (1.0 - m) * inner + m * outer, s),
+                    1.0,
+                    PLACES[m] + (f", {s:g} s late" if s else ""),
+                )
+                for i, m in enumerate(mixes)
+                if i == 0 or not abs(m - mixes[0]) * apart < near
+                for s in lags_s
+            ]
         return list(self.cache[key])
-
-    def _made_bank(self, rows: Rows, mixes: Sequence[float], lags_s: Sequence[float]) -> list[Place]:
-        inner, outer = rows.even.temperature("T_in"), rows.even.temperature("T_out")
-        mixed = [m for m, same in zip(mixes, self._same(mixes)) if not same]
-        time = rows.even.time
-        names = {0.5: "middle of the coil", 0.0: "inner face", 1.0: "outer face", -0.5: "hub"}
-        return [
-            Place(
-                lag(time, (1.0 - m) * inner + m * outer, s), 1.0, names[m] + (f", {s:g} s late" if s else "")
-            )
-            for m in mixed
-            for s in lags_s
-        ]
-
-    def _same(self, mixes: Sequence[float]) -> list[bool]:
-        """Which mixes drive as the first one does, on all runs."""
-        apart = max(
-            float(np.abs(r.even.temperature("T_out") - r.even.temperature("T_in")).max()) for r in self.runs
-        )
-        return [i > 0 and abs(m - mixes[0]) * apart < SAME_DEGC for i, m in enumerate(mixes)]
-
-
-def steps_are_coarse(scene: Scene, twin: Twin) -> bool:
-    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's.
-
-    Of those that the model is driven by: a chamber's set point goes in whole steps by itself.
-    """
-    usual = max(COARSE_STEP_DEGC, 1.01 * twin.sensors.common.resolution)
-    runs = scene.runs[: scene.fitted]
-    names = {n for r in runs for place in ("T", "T_in", "T_out") for n in r.run.sensors(place)}
-    steps = [recorded_step(r.run.columns[n]) for r in runs for n in names & set(r.run.columns)]
-    return max(steps, default=0.0) > usual
-
-
-SMOOTH_S = 3000.0
-"""What is slower than this is no line but drift, and taken out first [s]."""
-APART = 0.25
-"""Spacing of the frequencies in cycles over the longest run."""
-NEIGHBOURS = 41
-
-
-def outstanding_lines(scene: Scene, count: int) -> tuple[float, ...]:
-    """The frequencies [Hz] of most power over that of their neighbours, the most first."""
-    step = APART / scene.span_s
-    frequencies = np.arange(4.0 * step, 0.5 / scene.row_s, step)
-    if len(frequencies) < NEIGHBOURS:
-        return tuple(float(f) for f in frequencies[:count])
-    power = np.zeros(len(frequencies))
-    for rows in scene.runs[: scene.fitted]:
-        phase = np.pi * (rows.time_s - rows.time_s[0]) / max(rows.time_s[-1] - rows.time_s[0], 1.0)
-        order = max(int((rows.time_s[-1] - rows.time_s[0]) / SMOOTH_S), 1)
-        smooth = np.cos(phase[:, None] * np.arange(order + 1))
-        known = np.concatenate([smooth, rows.constants], axis=1)
-        known = known / np.maximum(np.linalg.norm(known, axis=0), 1e-300)
-        left = rows.gap - known @ np.linalg.lstsq(known, rows.gap, rcond=1e-10)[0]
-        waves = np.exp(-2j * np.pi * np.outer(frequencies, rows.time_s))
-        power += np.abs(waves @ left) ** 2 / max(float(left @ left), 1e-300)
-    power /= np.maximum(median_filter(power, NEIGHBOURS, mode="nearest"), 1e-300)
-    peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
-    best = peaks[np.argsort(-power[peaks])][:count]
-    return tuple(float(f) for f in frequencies[best])
 
 
 class Block(NamedTuple):
@@ -216,7 +164,8 @@ class Block(NamedTuple):
     positive: bool = False
 
 
-Build = Callable[[Rows, Scene, Mapping[str, float]], Iterator[Block]]
+Constants = Mapping[str, float]
+Build = Callable[[Rows, Scene, Constants], Iterator[Block]]
 """Blocks of one run, the same on every run of a scene, at the nominal constants."""
 
 
@@ -237,8 +186,6 @@ class Family:
         What it looks like, of an unknown.
     drawn_per_run
         Whether each run draws its coefficients anew.
-    place
-        Where it acts, for words.
     largest
         Usual most of a coefficient, in its unit, where no card says it.
     """
@@ -248,10 +195,43 @@ class Family:
     build: Build
     words: str = ""
     drawn_per_run: bool = False
-    place: str = ""
     largest: float = math.inf
 
 
-def column_block(*columns: FloatArray, positive: bool = False, **shape: Any) -> Block:
+def column_block(*columns: FloatArray, weight: float = 1.0, positive: bool = False, **shape: Any) -> Block:
     """A block of columns of shape (m,) each."""
-    return Block(np.column_stack(columns), shape, positive=positive)
+    return Block(np.column_stack(columns), shape, weight, positive)
+
+
+def steps_are_coarse(scene: Scene, twin: Twin) -> bool:
+    """Whether a sensor of the fit runs reads in coarser steps than a good one, and than the twin's.
+
+    Of those that the model is driven by: a chamber's set point goes in whole steps by itself.
+    """
+    usual = max(scene.grids.coarse_step_degc, 1.01 * twin.sensors.common.resolution)
+    names = {n for r in scene.fit for place in READ for n in r.run.sensors(place)}
+    steps = [recorded_step(r.run.columns[n]) for r in scene.fit for n in names & set(r.run.columns)]
+    return max(steps, default=0.0) > usual
+
+
+def outstanding_lines(scene: Scene) -> tuple[float, ...]:
+    """The frequencies [Hz] of most power over that of their neighbours, the most first."""
+    grids, count = scene.grids, scene.grids.outstanding_lines
+    step = grids.line_spacing / scene.span_s
+    frequencies = np.arange(4.0 * step, 0.5 / scene.row_s, step)
+    if len(frequencies) < grids.line_neighbours:
+        return tuple(float(f) for f in frequencies[:count])
+    power = np.zeros(len(frequencies))
+    for rows in scene.fit:
+        phase = np.pi * (rows.time_s - rows.time_s[0]) / max(rows.time_s[-1] - rows.time_s[0], 1.0)
+        order = max(int((rows.time_s[-1] - rows.time_s[0]) / grids.drift_s), 1)
+        smooth = np.cos(phase[:, None] * np.arange(order + 1))
+        known = np.concatenate([smooth, rows.constants], axis=1)
+        known = known / np.maximum(np.linalg.norm(known, axis=0), 1e-300)
+        left = rows.gap - known @ np.linalg.lstsq(known, rows.gap, rcond=1e-10)[0]
+        waves = np.exp(-2j * np.pi * np.outer(frequencies, rows.time_s))
+        power += np.abs(waves @ left) ** 2 / max(float(left @ left), 1e-300)
+    power /= np.maximum(median_filter(power, grids.line_neighbours, mode="nearest"), 1e-300)
+    peaks = np.flatnonzero((power[1:-1] >= power[:-2]) & (power[1:-1] > power[2:])) + 1
+    best = peaks[np.argsort(-power[peaks])][:count]
+    return tuple(float(f) for f in frequencies[best])

@@ -9,24 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from fogml.gap.blocks import Blocks
-from fogml.gap.frame import Field
+from fogml.gap.field import Blocks, Field, Member
 from fogml.gap.linear_gaussian import log_sum_exp
 from fogml.runs.run import FloatArray
-
-REFINED = 12
-"""Sets of each number of causes whose members are chosen again beside each other."""
-ALTERNATIVES = 3
-"""Sets without a name that each round asks what it could be instead."""
-
-
-@dataclass(frozen=True)
-class Member:
-    """A cause of an explanation: its family, the node and size that stand for it."""
-
-    family: int
-    node: int
-    size: float
 
 
 @dataclass(frozen=True)
@@ -67,11 +52,6 @@ class Explanation:
         evidence = log_sum_exp(np.array(self.by_noise)) if self.by_noise else self.log_evidence
         return self.log_prior + self.shared + evidence
 
-    @property
-    def nodes(self) -> list[tuple[int, float]]:
-        """Nodes with their sizes."""
-        return [(m.node, m.size) for m in self.members]
-
 
 @dataclass(frozen=True, eq=False)
 class _Held:
@@ -100,7 +80,7 @@ class Search:
         self.log_odds = self._log_odds()
         self._rows: dict[int, FloatArray] = {}
         self._across = held.base.basis.T @ held.white
-        self._fits = held.white.T @ held.base.data - self._across.T @ (held.base.basis.T @ held.base.data)
+        self._fits = self._fits_to(held.base.data)
         self.blocks = Blocks(held, self._across)
 
     def explanations(self) -> list[Explanation]:
@@ -111,18 +91,21 @@ class Search:
         """
         nothing = Explanation((), 0.0, self.field.base.log_evidence)
         found: dict[tuple[int, ...], Explanation] = {(): nothing}
+        candidates = [f for f in self.blocks.rows if self.families[f].kind != "left_out"]
         level, best = [nothing], nothing.score
         for count in range(1, self.priors.most_causes + 1):
             grown: dict[tuple[int, ...], Explanation] = {}
             for explanation in level:
-                for other in self._with_one_more(explanation):
+                joining = [f for f in candidates if self._may_join(explanation, f)]
+                for other in self._each_more(explanation, joining).values():
                     if other.key not in grown or other.score > grown[other.key].score:
                         grown[other.key] = other
             ranked = sorted(grown.values(), key=lambda e: -e.score)
             beam = self.priors.beam if count < 3 else max(self.priors.beam // 2, 1)
             if count > 1:
-                near = [e for e in ranked[:REFINED] if e.score > best - self.priors.hopeless]
-                near += [e for e in ranked[REFINED:] if not self.names(e)][: beam // 2]
+                most = self.priors.search.refined
+                near = [e for e in ranked[:most] if e.score > best - self.priors.hopeless]
+                near += [e for e in ranked[most:] if not self.names(e)][: beam // 2]
                 refined = {e.key: self._refined(e) for e in near}
                 ranked = sorted([refined.get(e.key, e) for e in ranked], key=lambda e: -e.score)
             found |= {e.key: e for e in ranked}
@@ -142,14 +125,21 @@ class Search:
 
     def alone(self) -> Mapping[int, float]:
         """Gain of each family over nothing, averaged over nodes and sizes [nats]."""
-        table = self.blocks.gains(*self._beside(self._held(()))) + self.blocks.prior
-        return {f: log_sum_exp(table[rows]) for f, rows in self.blocks.rows.items()}
+        return self._averaged_alone(self._fits)
 
     def alone_on(self, data: FloatArray) -> Mapping[int, float]:
         """Log posterior of each family alone on other whitened data, shape (n,); that of nothing is 0."""
-        fits = self.field.white.T @ data - self._across.T @ (self.field.base.basis.T @ data)
+        alone = self._averaged_alone(self._fits_to(data))
+        return {f: gain + self.log_odds[f] for f, gain in alone.items()}
+
+    def _averaged_alone(self, fits: FloatArray) -> dict[int, float]:
         table = self.blocks.gains(np.empty((0, len(fits))), fits) + self.blocks.prior
-        return {f: log_sum_exp(table[rows]) + self.log_odds[f] for f, rows in self.blocks.rows.items()}
+        return {f: log_sum_exp(table[rows]) for f, rows in self.blocks.rows.items()}
+
+    def _fits_to(self, data: FloatArray) -> FloatArray:
+        """Inner products of all columns with whitened data beside the constants, shape (columns,)."""
+        held = self.field
+        return np.asarray(held.white.T @ data - self._across.T @ (held.base.basis.T @ data))
 
     def best_members(self, beside: Sequence[Member]) -> dict[int, Member]:
         """The node and size that stand for each family beside members."""
@@ -162,7 +152,8 @@ class Search:
         forms = explanation.key.count(family)
         found = {}
         for f, grown in self._each_more(rest, self.families_of("known")).items():
-            if f in explanation.key or grown.score < self._alone(explanation) - 2.0 * self.priors.hopeless:
+            own = explanation.log_prior + explanation.log_evidence
+            if f in explanation.key or grown.score < own - 2.0 * self.priors.hopeless:
                 continue
             found[f] = self._refined(grown)
             if forms > 1 and self._forms(f) > 1:
@@ -179,7 +170,7 @@ class Search:
         for _ in range(2):
             start = sets[0]
             more = self._each_more(start, [f for f in others if self._may_join(start, f)])
-            ranked = sorted(more.values(), key=lambda e: -e.score)[:ALTERNATIVES]
+            ranked = sorted(more.values(), key=lambda e: -e.score)[: self.priors.search.alternatives]
             sets = sorted([*map(self._refined, ranked), *sets], key=lambda e: -e.score)
             if sets[0] is start:
                 break
@@ -199,10 +190,6 @@ class Search:
     def families_of(self, kind: str) -> list[int]:
         """Families of a kind that have blocks."""
         return [f for f in self.blocks.rows if self.families[f].kind == kind]
-
-    @staticmethod
-    def _alone(explanation: Explanation) -> float:
-        return explanation.log_prior + explanation.log_evidence
 
     def without(self, explanation: Explanation, families: set[int]) -> Explanation:
         """The set without some families, at the one noise."""
@@ -228,14 +215,6 @@ class Search:
     def _forms(self, f: int) -> int:
         """How many nodes a family has."""
         return self.blocks.rows[f].stop - self.blocks.rows[f].start
-
-    def _with_one_more(self, explanation: Explanation) -> list[Explanation]:
-        joining = [
-            f
-            for f in self.blocks.rows
-            if self.families[f].kind != "left_out" and self._may_join(explanation, f)
-        ]
-        return list(self._each_more(explanation, joining).values())
 
     def _each_more(self, explanation: Explanation, joining: Sequence[int]) -> dict[int, Explanation]:
         """The set with each of some families more."""

@@ -15,29 +15,18 @@ from itertools import product
 
 import numpy as np
 
-from fogml.gap.model import Candidate, amplitudes_about
+from fogml.gap.grids import STANDARD, Grids
 from fogml.runs.run import FloatArray
-from fogml.twin.quantities import Quantity
+from fogml.twin.effect import Effect
+from fogml.twin.quantities import Grade, Quantity
 
 Response = Callable[[Mapping[str, float]], FloatArray]
-NODES = {1: 9, 2: 5, 3: 4}
-"""Nodes for each parameter that needs a grid, by how many there are."""
-CYCLES_BETWEEN_NODES = 0.3
-"""Spacing of lines on a grid, in cycles over the longest run."""
-WHOLE = ("harmonic",)
-"""Parameters that are whole numbers."""
-NARROW, BEYOND = 3.0, 1.3
-"""A usual range of no more than the first factor is a rule of thumb: the grid of a candidate that hangs on it
-alone goes beyond it by the second."""
-MOST_LINES = 6000
 AT_AMPLITUDE = "at_amplitude"
 """Key of a node's shape: the amplitude about which a response that is not in proportion to it is taken."""
-PLACE_DEGC = 4.0
-"""Spacing of places on the temperature scale [degC]."""
 
 
 @dataclass(frozen=True)
-class Node:
+class GridNode:
     """A point of the grid: a stated shape, and the shapes whose responses span what it can do.
 
     Attributes
@@ -49,14 +38,11 @@ class Node:
         first, then one standard deviation along each of them.
     turns
         How many directions each of them is evaluated in.
-    frequency_hz
-        Of the line in time that the node is, if it is one.
     """
 
     shape: Mapping[str, float]
     draws: tuple[Mapping[str, float], ...]
     turns: int = 1
-    frequency_hz: float | None = None
 
     @property
     def mix(self) -> FloatArray:
@@ -70,8 +56,12 @@ class Node:
 
 
 def grid(
-    candidate: Candidate, grade: str, response: Response, spans: Mapping[str, float]
-) -> tuple[Node, ...]:
+    candidate: Effect,
+    grade: Grade,
+    response: Response,
+    spans: Mapping[str, float],
+    grids: Grids = STANDARD,
+) -> tuple[GridNode, ...]:
     """The nodes of a candidate.
 
     Parameters
@@ -84,47 +74,36 @@ def grid(
         Its response on some run [deg/h], for the test of proportionality.
     spans
         ``"s"``: longest run [s]; ``"degC"``: widest span of temperature [degC]; ``"sample"``: row [s].
+    grids
+        How close nodes are.
     """
-    amplitudes = amplitudes_about(candidate)
-    if amplitudes:
-        about = [{AT_AMPLITUDE: float(a)} for a in amplitudes]
-        nodes = _grid(candidate, grade, response, spans)
-        return tuple(
-            replace(node, shape={**node.shape, **at}, draws=tuple({**draw, **at} for draw in node.draws))
-            for node in nodes
-            for at in about
-        )
-    return _grid(candidate, grade, response, spans)
+    nodes = _grid(candidate, grade, response, spans, grids)
+    about = [{AT_AMPLITUDE: float(a)} for a in candidate.amplitudes] or [{}]
+    return tuple(
+        replace(node, shape={**node.shape, **at}, draws=tuple({**draw, **at} for draw in node.draws))
+        for node in nodes
+        for at in about
+    )
 
 
-def usual_shape(candidate: Candidate, grade: str) -> dict[str, float]:
-    """Shape parameters in the middle of a grade's ranges."""
-    return {q.name: q.typical(grade) for q in candidate.shape}  # type: ignore[arg-type]
-
-
-def corners(candidate: Candidate, grade: str) -> tuple[dict[str, float], ...]:
-    """Usual shapes: in the middle of their ranges, all at their lowest, all at their highest.
-
-    At the first of its amplitudes where a candidate has any.
-    """
-    amplitudes = amplitudes_about(candidate)
-    at = {AT_AMPLITUDE: float(amplitudes[0])} if amplitudes else {}
-    usual = usual_shape(candidate, grade)
-    ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))  # type: ignore[arg-type]
-    return tuple({**shape, **at} for shape in (usual, *ends))
+def usual_shapes(candidate: Effect, grade: Grade) -> tuple[dict[str, float], ...]:
+    """Usual shapes: in the middle of their ranges, all at their lowest, all at their highest."""
+    ends = ({q.name: q.range(grade)[i] for q in candidate.shape} for i in (0, 1))
+    return (candidate.default_shape(grade), *ends)
 
 
 def _grid(
-    candidate: Candidate, grade: str, response: Response, spans: Mapping[str, float]
-) -> tuple[Node, ...]:
+    candidate: Effect, grade: Grade, response: Response, spans: Mapping[str, float], grids: Grids
+) -> tuple[GridNode, ...]:
     if not candidate.shape:
-        return (Node({}, ({},)),)
-    usual = usual_shape(candidate, grade)
+        return (GridNode({}, ({},)),)
+    usual = candidate.default_shape(grade)
     turning = [q for q in candidate.shape if is_angle(q)]
     rest = [q for q in candidate.shape if q not in turning]
     linear = [q for q in rest if not is_line(q) and _in_proportion(q, grade, response, usual)]
     bent = [q for q in rest if q not in linear]
-    axes = [_axis(q, grade, NODES[min(len(bent), 3)], spans) for q in bent]
+    count = grids.grid_nodes[min(len(bent), 3) - 1]
+    axes = [_axis(q, grade, count, spans, grids) for q in bent]
     directions = {q.name: _directions(q, response, usual) for q in turning}
     points = _spread(linear, directions, grade)
     nodes = []
@@ -132,19 +111,8 @@ def _grid(
         shape = usual | {q.name: value for q, value in zip(bent, values)}
         draws = tuple(shape | more for more in points)
         turns = math.prod(map(len, directions.values()))
-        nodes.append(Node(shape, draws, turns, _frequency(bent, values)))
+        nodes.append(GridNode(shape, draws, turns))
     return tuple(nodes)
-
-
-def _frequency(bent: Sequence[Quantity], values: Sequence[float]) -> float | None:
-    for quantity, value in zip(bent, values):
-        if _is_in_time(quantity):
-            return 1.0 / value if quantity.unit == "s" else value
-    return None
-
-
-def _is_in_time(quantity: Quantity | None) -> bool:
-    return quantity is not None and is_line(quantity) and quantity.unit in ("s", "Hz")
 
 
 def is_angle(quantity: Quantity) -> bool:
@@ -158,31 +126,35 @@ def is_line(quantity: Quantity) -> bool:
     return "period" in quantity.name or "frequency" in quantity.name
 
 
-def _in_proportion(quantity: Quantity, grade: str, response: Response, usual: Mapping[str, float]) -> bool:
-    low, high = quantity.range(grade)  # type: ignore[arg-type]
+def _in_proportion(quantity: Quantity, grade: Grade, response: Response, usual: Mapping[str, float]) -> bool:
+    low, high = quantity.range(grade)
     a, m, b = (response({**usual, quantity.name: x}) for x in (low, 0.5 * (low + high), high))
     size = np.linalg.norm(a) + np.linalg.norm(b)
     return bool(np.linalg.norm(m - 0.5 * (a + b)) <= 1e-9 * size)
 
 
-def _axis(quantity: Quantity, grade: str, count: int, spans: Mapping[str, float]) -> Sequence[float]:
-    low, high = quantity.range(grade)  # type: ignore[arg-type]
+def _axis(
+    quantity: Quantity, grade: Grade, count: int, spans: Mapping[str, float], grids: Grids
+) -> Sequence[float]:
+    low, high = quantity.range(grade)
     if is_line(quantity):
-        return _lines(quantity, low, high, spans)
-    if quantity.name in WHOLE:
+        return _lines(quantity, low, high, spans, grids)
+    if quantity.name in grids.whole:
         return [float(x) for x in np.arange(math.ceil(low), math.floor(high) + 1)]
     if quantity.unit == "degC" and "temperature" in quantity.name:
         # A place on the temperature scale is told to a fraction of what happens there.
-        return [float(x) for x in np.arange(low, high + 1e-9, PLACE_DEGC)]
-    if low > 0.0 and high / low > NARROW:
+        return [float(x) for x in np.arange(low, high + 1e-9, grids.place_degc)]
+    if low > 0.0 and high / low > grids.narrow:
         return [float(x) for x in np.geomspace(low, high, count)]
-    if low > 0.0 and count == NODES[1]:
+    if low > 0.0 and count == grids.grid_nodes[0]:
         lowest, highest = quantity.limits
-        low, high, count = max(low / BEYOND, lowest), min(high * BEYOND, highest), count + 2
+        low, high, count = max(low / grids.beyond, lowest), min(high * grids.beyond, highest), count + 2
     return [float(x) for x in np.linspace(low, high, count)]
 
 
-def _lines(quantity: Quantity, low: float, high: float, spans: Mapping[str, float]) -> Sequence[float]:
+def _lines(
+    quantity: Quantity, low: float, high: float, spans: Mapping[str, float], grids: Grids
+) -> Sequence[float]:
     """Values of a period or a frequency, evenly spaced in frequency."""
     is_period = "period" in quantity.name
     first, last = (1.0 / high, 1.0 / low) if is_period else (low, high)
@@ -190,10 +162,10 @@ def _lines(quantity: Quantity, low: float, high: float, spans: Mapping[str, floa
     if not quantity.unit.startswith("degC") and quantity.unit in ("s", "Hz"):
         last = min(last, 0.5 / spans["sample"])
     elif quantity.unit not in ("s", "Hz", "degC"):
-        span = (10.0 if is_period else 1.0) * CYCLES_BETWEEN_NODES * 8.0 / max(last - first, 1e-12)
+        span = (10.0 if is_period else 1.0) * grids.line_cycles * 8.0 / max(last - first, 1e-12)
     if last <= first:
         return [high if is_period else low]
-    count = int(np.clip(math.ceil((last - first) * span / CYCLES_BETWEEN_NODES) + 1, 2, MOST_LINES))
+    count = int(np.clip(math.ceil((last - first) * span / grids.line_cycles) + 1, 2, grids.most_lines))
     frequencies = np.linspace(first, last, count)
     return [float(x) for x in (1.0 / frequencies if is_period else frequencies)]
 
@@ -211,12 +183,12 @@ def _directions(quantity: Quantity, response: Response, usual: Mapping[str, floa
 
 
 def _spread(
-    linear: Sequence[Quantity], directions: Mapping[str, Sequence[float]], grade: str
+    linear: Sequence[Quantity], directions: Mapping[str, Sequence[float]], grade: Grade
 ) -> list[dict[str, float]]:
     """The middle of linear parameters and a standard deviation along each, in all directions of angles."""
     middles, spreads = {}, {}
     for quantity in linear:
-        low, high = quantity.range(grade)  # type: ignore[arg-type]
+        low, high = quantity.range(grade)
         middles[quantity.name] = 0.5 * (low + high)
         spreads[quantity.name] = (high - low) / math.sqrt(12.0)
     points = [middles, *(middles | {name: middles[name] + spreads[name]} for name in spreads)]

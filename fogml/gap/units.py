@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from fogml.errors import InputError
-from fogml.gap.diagnosis import LISTED, answered, inferred
+from fogml.gap.diagnosis import answered, inferred
 from fogml.gap.inference import Inference, Progress
 from fogml.gap.model import AnyModel
 from fogml.gap.result import Diagnosis, Estimate
@@ -102,7 +102,7 @@ def diagnose_units(
     cost_of_false_name: float = 1.0,
     progress: Progress | None = None,
 ) -> UnitsDiagnosis:
-    """Diagnose several units of one kind together; arguments as `fogml.gap.diagnosis.diagnose`.
+    """Diagnose several units of one kind together; arguments as `fogml.gap.diagnose`.
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def _shared(by_unit: dict[str, Diagnosis], told: Sequence[_Told]) -> tuple[Share
         odds = np.log(max(acts, 1e-12)) - np.log(max(1.0 - acts, 1e-12))
         probability = priors.believed(float(odds))
         sizes = {u: f.amplitude for u, d in by_unit.items() for f in d.found if f.effect == id}
-        if probability < LISTED or not sizes:
+        if probability < priors.reported.listed or not sizes:
             continue
         unit = next(iter(sizes.values())).unit
         causes.append(SharedCause(id, probability, sizes, *_going_over(sizes, unit), unit))

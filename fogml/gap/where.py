@@ -1,37 +1,25 @@
-"""Averages of a run's rows, at the averaging time that figures are told at."""
+"""Where the structural gap lies: by stage, regime, temperature, time scale and segment.
+
+What is significant is judged against the noise model: a mean square of averages of noise has a
+known expectation and scatter.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fogml.gap.noise import Noise
 from fogml.gap.result_parts import GapSegment, Share, TemperatureExcess, TimescaleExcess, Where
+from fogml.gap.rows import Rows
+from fogml.gap.settings import STANDARD, Reported
 from fogml.intervals import Z90
 from fogml.runs.regimes import Regimes
-from fogml.runs.run import FloatArray, Run
+from fogml.runs.run import FloatArray
 from fogml.signals.noise_expectation import expected_mean_square
-
-AVERAGING_S = 100.0
-
-
-class InRows(Protocol):
-    """A run as rows of equal averaging time."""
-
-    def __len__(self) -> int: ...
-
-    @property
-    def row_s(self) -> float:
-        """Averaging time of a row [s]."""
-
-    @property
-    def time(self) -> FloatArray:
-        """Mean time of each row [s], shape (m,)."""
+from fogml.signals.noise_model import NoiseModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,73 +29,53 @@ class Averages:
     starts: np.ndarray
     window_s: float
     time: FloatArray
+    full: np.ndarray
 
     def of(self, rows: FloatArray) -> FloatArray:
         """Averages of a series of rows, shape (m,) to (k,)."""
         counts = np.diff(self.starts, append=len(rows))
         return np.asarray((np.add.reduceat(rows, self.starts) / counts)[self.full])
 
-    full: np.ndarray
 
-
-def averages(o: InRows, averaging_s: float = AVERAGING_S) -> Averages:
+def averages(rows: Rows, averaging_s: float = Reported.averaging_s) -> Averages:
     """Windows of about `averaging_s` over a run's rows; one row each where rows are longer."""
-    width = max(1, round(averaging_s / o.row_s))
-    breaks = np.flatnonzero(np.diff(o.time) > 2.5 * o.row_s) + 1
-    edges = [0, *breaks.tolist(), len(o)]
+    width = max(1, round(averaging_s / rows.row_s))
+    breaks = np.flatnonzero(np.diff(rows.time_s) > 2.5 * rows.row_s) + 1
+    edges = [0, *breaks.tolist(), len(rows)]
     starts = np.concatenate([np.arange(a, b, width) for a, b in pairwise(edges)])
-    counts = np.diff(starts, append=len(o))
+    counts = np.diff(starts, append=len(rows))
     full = counts == width
     if not full.any():
         full = counts > 0
-    time = np.add.reduceat(o.time, starts) / counts
-    return Averages(starts, width * o.row_s, time[full], full)
-
-
-SHORTEST_SEGMENT_S = 600.0
-BIN_DEGC = 10.0
-_Z_SIGNIFICANT = 2.6
-
-
-class RunInRows(InRows, Protocol):
-    """A run as rows, with what tells them apart."""
-
-    @property
-    def run(self) -> Run:
-        """As recorded."""
-
-    @property
-    def temperature(self) -> FloatArray:
-        """T of each row [degC], shape (m,)."""
-
-    @property
-    def regime(self) -> NDArray[np.int8]:
-        """Regime of each row."""
+    time = np.add.reduceat(rows.time_s, starts) / counts
+    return Averages(starts, width * rows.row_s, time[full], full)
 
 
 @dataclass(frozen=True, eq=False)
 class GapOnRun:
-    """The structural gap of a fit run.
+    """The structural gap of a fit run, shape (m,) [deg/h] each.
 
     Attributes
     ----------
-    observation
+    rows
         The run.
     gap
-        Recorded less recalibrated replay, shape (m,) [deg/h].
+        Recorded less recalibrated replay.
     systematic
-        The part of it that effects found and the unknown make up, noise-free, shape (m,).
-    taken
-        Mean square of what the fitted constants take up of the noise [(deg/h)^2].
+        The part of it that effects found and the unknown make up, noise-free.
     """
 
-    observation: RunInRows
+    rows: Rows
     gap: FloatArray
     systematic: FloatArray
-    taken: float = 0.0
 
 
-def where(gaps: Sequence[GapOnRun], stages: Mapping[str, float], noise: Noise) -> Where:
+def where(
+    gaps: Sequence[GapOnRun],
+    stages: Mapping[str, float],
+    noise: NoiseModel,
+    settings: Reported = STANDARD.reported,
+) -> Where:
     """Locate the structural gap.
 
     Parameters
@@ -118,24 +86,18 @@ def where(gaps: Sequence[GapOnRun], stages: Mapping[str, float], noise: Noise) -
         Energy of the systematic part by stage [(deg/h)^2], of any scale.
     noise
         The noise.
+    settings
+        From when on an excess is one.
     """
-    held = [_Averaged.of(g, noise) for g in gaps]
+    held = [_Averaged.of(g, noise, settings) for g in gaps]
     total = sum(stages.values())
-    by_stage = (
-        tuple(
-            Share(name, energy / total)
-            for name, energy in sorted(stages.items(), key=lambda x: -x[1])
-            if energy
-        )
-        if total > 0.0
-        else ()
-    )
+    shared = sorted(stages.items(), key=lambda x: -x[1]) if total > 0.0 else []
     return Where(
-        stage=by_stage,
-        regime=_regimes(held),
-        temperature=_temperatures(held),
-        timescale=_timescales(gaps, noise),
-        segments=tuple(s for h in held for s in _segments(h)),
+        stage=tuple(Share(name, energy / total) for name, energy in shared if energy),
+        regime=_regimes(held, settings.significant),
+        temperature=_temperatures(held, settings),
+        timescale=_timescales(gaps, noise, settings.significant),
+        segments=tuple(s for h in held for s in _segments(h, settings.segment_s)),
     )
 
 
@@ -147,25 +109,24 @@ class _Averaged:
     windows: Averages
     gap: FloatArray
     systematic: FloatArray
-    floor: float
+    floor: FloatArray
     regime: FloatArray
     temperature: FloatArray
     rising: FloatArray
 
     @classmethod
-    def of(cls, g: GapOnRun, noise: Noise) -> _Averaged:
-        o = g.observation
-        windows = averages(o)
-        temperature = windows.of(o.temperature)
-        white = 3600.0 * noise.fit.model.N**2 / windows.window_s
-        floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s) - g.taken
+    def of(cls, g: GapOnRun, noise: NoiseModel, settings: Reported) -> _Averaged:
+        windows = averages(g.rows, settings.averaging_s)
+        temperature, gap = windows.of(g.rows.temperature), windows.of(g.gap)
+        white = 3600.0 * noise.N**2 / windows.window_s
+        floor = max(expected_mean_square(noise, windows.time, windows.window_s), white)
         return cls(
-            o.run.name,
+            g.rows.run.name,
             windows,
-            windows.of(g.gap),
+            gap,
             windows.of(g.systematic),
-            max(floor, white),
-            o.regime[windows.starts[windows.full]].astype(np.float64),
+            np.full(len(gap), floor),
+            g.rows.regime[windows.starts[windows.full]].astype(np.float64),
             temperature,
             np.gradient(temperature) if len(temperature) > 1 else np.zeros(len(temperature)),
         )
@@ -173,46 +134,52 @@ class _Averaged:
 
 def _excess(values: FloatArray, floors: FloatArray) -> tuple[float, float]:
     """Mean square over the floor's, and its standard deviation if there were noise alone."""
-    count = max(len(values), 1)
-    level = float(np.mean(floors)) if len(floors) else 0.0
-    # Neighbouring averages of coloured noise are not independent: half as many count.
-    return float(np.mean(values**2)) - level, level * float(np.sqrt(2.0 / max(0.5 * count, 1.0)))
+    level = float(np.mean(floors))
+    return float(np.mean(values**2)) - level, level * _scatter(len(values))
 
 
-def _regimes(held: Sequence[_Averaged]) -> tuple[Share, ...]:
-    names, rows = Regimes.names, []
-    for index, name in enumerate(names):
-        picked = [(h.gap[h.regime == index], h.floor) for h in held]
-        values = np.concatenate([v for v, _ in picked])
-        if len(values) == 0:
-            continue
-        floors = np.concatenate([np.full(len(v), f) for v, f in picked])
-        excess, deviation = _excess(values, floors)
-        rows.append((name, len(values), excess, deviation))
+def _scatter(count: int) -> float:
+    """Relative standard deviation of a mean square of so many averages of coloured noise.
+
+    Neighbours are not independent: half as many count.
+    """
+    return float(np.sqrt(2.0 / max(0.5 * count, 1.0)))
+
+
+def _regimes(held: Sequence[_Averaged], significant: float) -> tuple[Share, ...]:
+    rows = []
+    for index, name in enumerate(Regimes.names):
+        values = np.concatenate([h.gap[h.regime == index] for h in held])
+        if len(values):
+            floors = np.concatenate([h.floor[h.regime == index] for h in held])
+            rows.append((name, len(values), *_excess(values, floors)))
     total = sum(max(e, 0.0) * n for _, n, e, _ in rows)
+
+    def share(excess: float, count: int) -> float:
+        return float(np.clip(max(excess, 0.0) * count / total, 0.0, 1.0)) if total > 0.0 else 0.0
+
     shares = []
     for name, count, excess, deviation in rows:
         low, high = excess - Z90 * deviation, excess + Z90 * deviation
-        part = lambda e, n=count: float(np.clip(max(e, 0.0) * n / total, 0.0, 1.0)) if total > 0.0 else 0.0  # noqa: E731
         shares.append(
             Share(
                 name,
-                part(excess),
-                (part(low), part(high)),
+                share(excess, count),
+                (share(low, count), share(high, count)),
                 _root(excess),
                 (_root(low), _root(high)),
-                excess > _Z_SIGNIFICANT * deviation,
+                excess > significant * deviation,
             )
         )
     return tuple(shares)
 
 
-def _temperatures(held: Sequence[_Averaged]) -> tuple[TemperatureExcess, ...]:
-    every = np.concatenate([h.temperature for h in held])
-    edges = np.arange(BIN_DEGC * np.floor(every.min() / BIN_DEGC), every.max() + BIN_DEGC, BIN_DEGC)
-    gap = np.concatenate([h.gap for h in held])
-    floors = np.concatenate([np.full(len(h.gap), h.floor) for h in held])
-    rising = np.concatenate([h.rising for h in held])
+def _temperatures(held: Sequence[_Averaged], settings: Reported) -> tuple[TemperatureExcess, ...]:
+    every, gap, floors, rising = (
+        np.concatenate([getattr(h, name) for h in held]) for name in ("temperature", "gap", "floor", "rising")
+    )
+    step = settings.bin_degc
+    edges = np.arange(step * np.floor(every.min() / step), every.max() + step, step)
     bins = []
     for low, high in pairwise(edges):
         inside = (every >= low) & (every < high)
@@ -225,7 +192,7 @@ def _temperatures(held: Sequence[_Averaged]) -> tuple[TemperatureExcess, ...]:
                 float(low),
                 float(high),
                 _root(excess),
-                excess > _Z_SIGNIFICANT * deviation,
+                excess > settings.significant * deviation,
                 float(gap[up].mean()) if up.sum() >= 3 else None,
                 float(gap[down].mean()) if down.sum() >= 3 else None,
             )
@@ -233,30 +200,29 @@ def _temperatures(held: Sequence[_Averaged]) -> tuple[TemperatureExcess, ...]:
     return tuple(bins)
 
 
-def _timescales(gaps: Sequence[GapOnRun], noise: Noise) -> tuple[TimescaleExcess, ...]:
-    first = max(g.observation.row_s for g in gaps)
-    longest = min(float(g.observation.run.span_s) for g in gaps) / 8.0
-    scales = [
-        t for t in (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0) if first <= t <= max(longest, first)
-    ]
+def _timescales(
+    gaps: Sequence[GapOnRun], noise: NoiseModel, significant: float
+) -> tuple[TimescaleExcess, ...]:
+    first = max(g.rows.row_s for g in gaps)
+    longest = max(min(float(g.rows.run.span_s) for g in gaps) / 8.0, first)
+    scales = [t for t in (10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0, 10000.0) if first <= t <= longest]
     found = []
     for tau in scales or [first]:
-        ratios, weights, counts = [], [], 0
+        ratios, weights = [], []
         for g in gaps:
-            windows = averages(g.observation, tau)
+            windows = averages(g.rows, tau)
             values = windows.of(g.gap)
-            floor = expected_mean_square(noise.fit.model, windows.time, windows.window_s)
+            floor = expected_mean_square(noise, windows.time, windows.window_s)
             ratios.append(float(np.mean(values**2)) / floor)
             weights.append(len(values))
-            counts += len(values)
         ratio = float(np.average(ratios, weights=weights))
-        spread = float(np.sqrt(2.0 / max(0.5 * counts, 1.0)))
+        spread = _scatter(sum(weights))
         interval = (max(ratio * (1.0 - Z90 * spread), 0.0) ** 0.5, (ratio * (1.0 + Z90 * spread)) ** 0.5)
-        found.append(TimescaleExcess(tau, ratio**0.5, interval, ratio - 1.0 > _Z_SIGNIFICANT * spread))
+        found.append(TimescaleExcess(tau, ratio**0.5, interval, ratio - 1.0 > significant * spread))
     return tuple(found)
 
 
-def _segments(h: _Averaged) -> list[GapSegment]:
+def _segments(h: _Averaged, shortest_s: float) -> list[GapSegment]:
     """Stretches in which the systematic part's averages exceed the floor."""
     over = np.abs(h.systematic) > h.floor**0.5
     if not over.any():
@@ -266,8 +232,8 @@ def _segments(h: _Averaged) -> list[GapSegment]:
     segments = []
     for first, last in zip(edges[::2], edges[1::2]):
         start, end = h.windows.time[first] - 0.5 * step, h.windows.time[last - 1] + 0.5 * step
-        if end - start >= SHORTEST_SEGMENT_S:
-            excess = float(np.mean(h.gap[first:last] ** 2)) - h.floor
+        if end - start >= shortest_s:
+            excess = float(np.mean(h.gap[first:last] ** 2)) - h.floor[0]
             segments.append(GapSegment(h.run, float(start), float(end), _root(excess)))
     return segments
 

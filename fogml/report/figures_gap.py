@@ -10,8 +10,8 @@ import plotly.graph_objects as go
 from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
-from fogml.gap.result import Diagnosis, RunSeries
-from fogml.gap.result_parts import GapSegment, HowFar, TemperatureExcess
+from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import GapSegment, HowFar, RunSeries, TemperatureExcess
 from fogml.report import style
 from fogml.report.figures_judgement import STEADY_DEG_C_PER_MIN
 from fogml.report.page import Drawing

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from fogml.blind.folders import CaseFiles
 from fogml.blind.methods import diagnosis
-from fogml.gap.result import Diagnosis, RunSeries
+from fogml.gap.result import Diagnosis
+from fogml.gap.result_parts import RunSeries
 from fogml.report import figures_gap, figures_gap_evidence, figures_gap_where, gap_tables, gap_tables_ahead
 from fogml.report.gap_tiles import error_sentences, headline_tiles, warnings
 from fogml.report.gap_words import (

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from fogml.gap.causes import DISAGREE, GROWS, _agree, _grows, _step
+from fogml.gap.causes import _step, agree, growth
 from fogml.gap.result import RunAmplitude
+from fogml.gap.settings import STANDARD
 from fogml.runs.steps import to_steps
 
 
@@ -15,29 +16,29 @@ def _sizes(*values, se=0.1):
     return tuple(RunAmplitude(f"r{i}", value, se) for i, value in enumerate(values))
 
 
-def _found(days):
+def _scene(days):
     runs = [SimpleNamespace(run=SimpleNamespace(name=f"r{i}")) for i in range(len(days))]
-    scene = SimpleNamespace(runs=runs, begun_s=tuple(86400.0 * d for d in days), order_known=True)
-    return SimpleNamespace(setting=SimpleNamespace(scene=scene))
+    return SimpleNamespace(runs=runs, begun_s=tuple(86400.0 * d for d in days), order_known=True)
 
 
 def test_sizes_disagree_from_the_chance_that_is_stated_on():
-    apart = np.sqrt(2.0 * chi2.isf(DISAGREE, 1)) * 0.1
-    assert _agree(_sizes(1.0, 1.0 + 0.99 * apart))
-    assert not _agree(_sizes(1.0, 1.0 + 1.01 * apart))
-    assert _agree(_sizes(1.0))
+    apart = np.sqrt(2.0 * chi2.isf(STANDARD.reported.disagree, 1)) * 0.1
+    assert agree(_sizes(1.0, 1.0 + 0.99 * apart))
+    assert not agree(_sizes(1.0, 1.0 + 1.01 * apart))
+    assert agree(_sizes(1.0))
 
 
 def test_growth_is_the_slope_of_least_squares():
     days, values = [0.0, 10.0, 20.0, 40.0], [1.0, 1.5, 2.1, 2.9]
     expected = np.polyfit(days, values, 1)[0]
-    assert _grows(_found(days), _sizes(*values)) == pytest.approx(expected)
+    assert growth(_scene(days), _sizes(*values)) == pytest.approx(expected)
 
 
 def test_a_slope_within_its_error_is_no_growth():
     error = 0.1 / np.sqrt(2.0) / 5.0  # of the slope of two sizes ten days apart
-    assert _grows(_found([0.0, 10.0]), _sizes(1.0, 1.0 + 0.99 * GROWS * 10.0 * error)) is None
-    assert _grows(_found([0.0, 10.0]), _sizes(1.0, 1.0 + 1.01 * GROWS * 10.0 * error)) is not None
+    least = STANDARD.reported.grows * 10.0 * error
+    assert growth(_scene([0.0, 10.0]), _sizes(1.0, 1.0 + 0.99 * least)) is None
+    assert growth(_scene([0.0, 10.0]), _sizes(1.0, 1.0 + 1.01 * least)) is not None
 
 
 def test_a_step_of_the_sensors_is_read_off_their_records():

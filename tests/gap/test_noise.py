@@ -9,7 +9,8 @@ import pytest
 
 from fogml.errors import InputError
 from fogml.gap.model import TwinModel
-from fogml.gap.noise import UNIT_FACTOR, prior_of
+from fogml.gap.noise import prior_of
+from fogml.gap.settings import STANDARD
 from fogml.runs.run import Run
 from fogml.signals.noise_model import NoiseModel
 from fogml.signals.whitening import Whitener
@@ -37,7 +38,7 @@ def test_a_static_run_tells_the_noise_whatever_was_expected():
         assert pytest.approx(noise.N, rel=0.05) == prior.centre.N
         assert 0.5 < prior.centre.B / noise.B < 2.0
         # A unit's noise differs from run to run by more than a static run's own error.
-        assert min(prior.factor) >= UNIT_FACTOR
+        assert min(prior.factor) >= STANDARD.noise.unit_factor
 
 
 def test_without_a_static_run_the_prior_is_the_models():

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from fogml.errors import InputError
-from fogml.gap.frame import LONGEST_RUNS
 from fogml.gap.planning.fisher import information, merit, responses, unknowns
 from fogml.gap.planning.plan import plan_runs
 from fogml.gap.planning.plan_json import plan_values
 from fogml.gap.planning.programme_design import Design
 from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.rehearsal import FINE_S, Rehearsal, Together, stage
+from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.replay import Replayer
@@ -55,7 +55,8 @@ def test_information_is_that_of_the_replay_and_the_dense_covariance(rehearsed):
         step[i] = 1e-3 * p.scale
         slopes.append((output(at + step) - output(at - step)) / 2e-3)
     span = rows.end_s[-1] - rows.end_s[0] + rows.row_s
-    dense = NOISE.covariance(rows.end_s, rows.row_s, NOISE.ladder(rows.row_s, LONGEST_RUNS * span))
+    ladder = NOISE.ladder(rows.row_s, STANDARD.noise.longest_runs * span)
+    dense = NOISE.covariance(rows.end_s, rows.row_s, ladder)
     slopes = np.array(slopes)
     expected = slopes @ np.linalg.solve(dense, slopes.T)
     size = np.sqrt(np.diag(expected))

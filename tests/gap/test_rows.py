@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fogml.gap.frame import Columns
-from fogml.gap.inference import _setting
+from fogml.gap.catalogue import power_cycles
+from fogml.gap.field import Columns
+from fogml.gap.frame import setting_of
 from fogml.gap.model import TwinModel
-from fogml.gap.other_families import power_cycles
 from fogml.gap.reading import rows_of
 from fogml.gap.reports import assumed
 from fogml.gap.scene import Family, Scene, steps_are_coarse
@@ -47,7 +47,7 @@ def test_spikes_and_a_limit_of_the_output_are_masked():
 def test_a_constant_far_off_is_said_and_fitted_all_the_same():
     scene = _scene(_cycle(offset=-40.0))
     twin = load_twin("nominal")
-    setting = _setting(TwinModel(twin), twin, scene, Priors(), NOISE)
+    setting = setting_of(TwinModel(twin), twin, scene, Priors(), NOISE)
     assert setting.values["b0"] == pytest.approx(-40.0, abs=0.1)
     assert setting.widened["b0"] == pytest.approx(2.0 * 40.0 / 5.0, rel=0.05)
     found = SimpleNamespace(setting=setting, points=SimpleNamespace(source="-"))

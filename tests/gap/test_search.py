@@ -6,18 +6,19 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.gap.families.test_answer import _run
+from tests.gap.test_answer import _run
 
-from fogml.gap.causes import _onset, cards_of
+from fogml.gap.causes import cards_of, onset
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import infer
 from fogml.gap.model import TwinModel
 from fogml.gap.planning import next_run as ahead
 from fogml.gap.posterior import _likeliest, judge
 from fogml.gap.scene import Scene
-from fogml.gap.settings import Priors
-from fogml.gap.unknown import _decay, unknown_families
+from fogml.gap.settings import STANDARD, Priors
+from fogml.gap.unknown import unknown_families
 from fogml.runs.epochs import with_epoch
+from fogml.signals.bases import decayed
 from fogml.twin.twin_file import load_twin
 
 
@@ -69,15 +70,15 @@ def test_a_cause_acts_since_it_left_a_trace(found):
     best = found.explanations[0]
     every = Foretold.of(found, best.members, best.members)
     (cause,) = judge(found).causes
-    assert _onset(found, every, cause) is None
+    assert onset(found, every, cause) is None
     courses = [sum(every.of_member(i, m) for m in cause.members) for i in range(2)]
     half = len(courses[1]) // 2
     courses[1] = np.where(np.arange(len(courses[1])) < half, courses[1], 0.0)
     later = copy.copy(found.field)
     later.base = replace(later.base, data=later.base.data - later.whitening.stacked(courses))
-    onset = _onset(SimpleNamespace(setting=found.setting, field=later), every, cause)
-    assert onset.run == found.setting.scene.runs[1].run.name
-    assert onset.time_s == pytest.approx(found.setting.scene.runs[1].time_s[half], abs=300.0)
+    begun = onset(SimpleNamespace(setting=found.setting, field=later), every, cause)
+    assert begun.run == found.setting.scene.runs[1].run.name
+    assert begun.time_s == pytest.approx(found.setting.scene.runs[1].time_s[half], abs=300.0)
 
 
 def test_a_name_among_several_that_are_alike_counts_for_all(found):
@@ -119,7 +120,7 @@ def test_what_an_event_leaves_heals_in_its_time():
     time = np.arange(0.0, 5000.0, 50.0)
     kicks = np.zeros((len(time), 2))
     kicks[10], kicks[40, 1] = (1.0, 2.0), -1.0
-    left = _decay(time, kicks, 900.0)
+    left = decayed(time, kicks, 900.0)
     since = np.maximum(time - time[10], 0.0)
     assert left[10:, 0] == pytest.approx(np.exp(-since[10:] / 900.0))
     assert left[-1, 1] == pytest.approx(2.0 * left[-1, 0] - np.exp(-(time[-1] - time[40]) / 900.0))
@@ -127,7 +128,7 @@ def test_what_an_event_leaves_heals_in_its_time():
 
 def test_each_unknown_gives_the_same_blocks_on_every_run(found):
     scene: Scene = found.setting.scene
-    for family in unknown_families():
+    for family in unknown_families(STANDARD.grids):
         widths = [
             [b.columns.shape[1] for b in family.build(r, scene, found.setting.values)] for r in scene.runs
         ]

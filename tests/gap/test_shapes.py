@@ -39,8 +39,14 @@ def rippled(shape):
 SHAPES = {bend: (PLACE, WIDTH), mixture: (SHARE,), line: (PERIOD, PHASE), rippled: (PERIOD, PHASE)}
 
 
+def declared(*shape):
+    """What a grid asks of an effect."""
+    usual = {q.name: q.typical("tactical") for q in shape}
+    return SimpleNamespace(shape=shape, amplitudes=(), default_shape=lambda grade: usual)
+
+
 def grid_of(response, spans=SPANS):
-    return grid(SimpleNamespace(shape=SHAPES[response]), "tactical", response, spans)
+    return grid(declared(*SHAPES[response]), "tactical", response, spans)
 
 
 def cosine(a, b):
@@ -61,8 +67,7 @@ def test_a_narrow_range_has_soft_ends():
 
     def reached(low, high, lowest):
         tau = Quantity("time_constant", "s", (low, high), (low, high), limits=(lowest, 1e6))
-        tail = SimpleNamespace(shape=(tau,))
-        nodes = grid(tail, "tactical", lambda s: np.exp(-TIME / s["time_constant"]), SPANS)
+        nodes = grid(declared(tau), "tactical", lambda s: np.exp(-TIME / s["time_constant"]), SPANS)
         values = np.sort([n.shape["time_constant"] for n in nodes])
         return values[0], values[-1], np.diff(values).max()
 

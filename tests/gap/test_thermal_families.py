@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fogml.gap.thermal_families import DENSITY_BUMPS, RELAYS, bumps, preisach, relays
+from fogml.signals.bases import bumps, preisach, relays
 from fogml.signals.recursions import play_kernel
 from fogml.signals.smoothing import smoothed, window_difference
 
@@ -28,9 +28,9 @@ def test_relays_switch_as_relays_do():
 
 def test_a_plane_is_the_sum_of_its_relays():
     x, half = _course(), 3.0
-    centres = np.linspace(-20.0 - half, 20.0 + half, RELAYS)
-    density = bumps(centres, -20.0 - half, 20.0 + half, DENSITY_BUMPS) / RELAYS
-    expected = sum(np.outer(relays(x, centres[j : j + 1], half)[:, 0], density[j]) for j in range(RELAYS))
+    centres = np.linspace(-20.0 - half, 20.0 + half, 48)
+    density = bumps(centres, -20.0 - half, 20.0 + half, 5) / 48
+    expected = sum(np.outer(relays(x, centres[j : j + 1], half)[:, 0], density[j]) for j in range(48))
     np.testing.assert_allclose(preisach(x, -20.0, 20.0, half), expected, atol=1e-12)
 
 

@@ -9,7 +9,7 @@ import pytest
 
 from fogml.gap.model import EffectValue, NoisePrior, TwinModel
 from fogml.gap.where import averages
-from fogml.twin.twin_file import load_twin
+from fogml.twin.twin_file import load_twin, save_twin
 
 TWIN = load_twin("nominal").with_nominal(b0=1.0, e0=100.0)
 VALUES = {"b0": 1.0, "e0": 100.0}
@@ -19,7 +19,7 @@ def test_the_twin_that_is_written_has_what_was_found(tmp_path):
     values = (EffectValue("thermal_hysteresis", 0.2, {"half_width": 6.0}),)
     path = tmp_path / "twin.yaml"
     noise = NoisePrior(0.004, 0.02, 0.006, 1.1, 1.5, 2.0)
-    TwinModel(TWIN).write(path, VALUES, values, noise, {"b0": 0.01, "e0": 2.0})
+    save_twin(TwinModel(TWIN).diagnosed(VALUES, values, noise, {"b0": 0.01, "e0": 2.0}), path)
     again = TwinModel(load_twin(path))
     setting = again.twin.settings["thermal_hysteresis"]
     assert (setting.amplitude, dict(setting.shape)) == (0.2, {"half_width": 6.0})
@@ -31,20 +31,20 @@ def test_the_twin_that_is_written_has_what_was_found(tmp_path):
 def test_values_beyond_what_is_physical_are_written_within_it(tmp_path):
     path = tmp_path / "twin.yaml"
     wild = (EffectValue("thermal_hysteresis", 0.1, {"half_width": -3.0}),)
-    TwinModel(TWIN).write(path, VALUES, wild, NoisePrior(0.004, 0.02, 0.006), {})
+    save_twin(TwinModel(TWIN).diagnosed(VALUES, wild, NoisePrior(0.004, 0.02, 0.006), {}), path)
     assert load_twin(path).settings["thermal_hysteresis"].shape["half_width"] > 0.0
 
 
 class Parted(SimpleNamespace):
     def __len__(self):
-        return len(self.time)
+        return len(self.time_s)
 
 
 def test_windows_keep_off_gaps_and_are_whole():
     kept = np.concatenate([np.arange(0, 103), np.arange(160, 400)])
-    parted = Parted(time=20.0 * kept, row_s=20.0)
+    parted = Parted(time_s=20.0 * kept, row_s=20.0)
     windows = averages(parted)
-    rows = np.where(parted.time < 3000.0, 0.0, 1.0)
+    rows = np.where(parted.time_s < 3000.0, 0.0, 1.0)
     assert set(windows.of(rows)) == {0.0, 1.0}
     assert len(windows.time) == 103 // 5 + 240 // 5
     assert windows.window_s == 100.0

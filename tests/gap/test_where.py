@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fogml.gap.noise import Noise
-from fogml.gap.where import SHORTEST_SEGMENT_S, GapOnRun, where
+from fogml.gap.settings import STANDARD
+from fogml.gap.where import GapOnRun, where
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
-from fogml.signals.noise_fit import NoiseFit, NoisePrior
 from fogml.signals.noise_model import NoiseModel
 
 NOISE = NoiseModel(0.02, 0.03, 0.05)
-KNOWN = Noise(NOISE, NoiseFit(NOISE, np.diag([1e-4, 1e-3, 1e-2]), NoisePrior(NOISE), 0.0, 1), "known")
 TIME = 10.0 * np.arange(1000)
 TEMPERATURE = np.interp(TIME, [0.0, 0.5 * TIME[-1], TIME[-1]], [0.0, 40.0, 0.0])
 RUN = Run.from_columns("a", time=TIME, gyro=np.zeros(1000), T=TEMPERATURE)
@@ -23,7 +21,7 @@ ROOT = np.linalg.cholesky(NOISE.covariance(TIME, 10.0, NOISE.ladder(10.0, 30.0 *
 class Rows:
     """The run, a row a sample."""
 
-    run, time, row_s, temperature = RUN, TIME, 10.0, TEMPERATURE
+    run, time_s, row_s, temperature = RUN, TIME, 10.0, TEMPERATURE
     regime = regimes(RUN).labels
 
     def __len__(self):
@@ -33,7 +31,7 @@ class Rows:
 def located(added, seed=0, systematic=None, stages=None):
     gap = added + ROOT @ np.random.default_rng(seed).standard_normal(len(RUN))
     part = GapOnRun(Rows(), gap, added if systematic is None else systematic)
-    return where([part], {"bias": 1.0} if stages is None else stages, KNOWN)
+    return where([part], {"bias": 1.0} if stages is None else stages, NOISE)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +62,7 @@ def test_segments_are_where_it_was_and_not_shorter_than_ten_minutes(bump):
     assert segment.run == "a"
     assert segment.from_s == pytest.approx(2000.0, abs=100.0)
     assert segment.to_s == pytest.approx(4000.0, abs=100.0)
-    assert segment.to_s - segment.from_s >= SHORTEST_SEGMENT_S
+    assert segment.to_s - segment.from_s >= STANDARD.reported.segment_s
     assert segment.excess_rms == pytest.approx(0.5, abs=0.15)
 
 

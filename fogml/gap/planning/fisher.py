@@ -16,7 +16,6 @@ import numpy as np
 from fogml.errors import InputError
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
-from fogml.gap.shapes import usual_shape
 from fogml.intervals import Z90
 from fogml.runs.run import FloatArray
 from fogml.twin.effect import Effect, NoiseEffect
@@ -146,7 +145,7 @@ def usual_value(on: Stage, id: str, constants: Sequence[str] | set[str] = ()) ->
 def stated_or_usual(on: Stage, declared: Effect) -> EffectValue:
     """An effect as the twin states it, else at the usual size and shape of its grade."""
     held, grade = on.model.twin.settings.get(declared.id), on.model.grade
-    shape = usual_shape(declared, grade)
+    shape = declared.default_shape(grade)
     if held is None:
         return EffectValue(declared.id, declared.amplitude.typical(grade), shape)
     return EffectValue(declared.id, held.amplitude, {name: held.shape[name] for name in shape})

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fogml.gap.causes import card_of
-from fogml.gap.frame import Field
 from fogml.gap.how_far import Foretold
 from fogml.gap.inference import Inference
 from fogml.gap.model import EffectValue, TwinModel
@@ -22,19 +20,41 @@ from fogml.gap.result import NAMED, Found, SeparatingRun
 from fogml.gap.result_parts import Rehearsed
 from fogml.gap.rows import Rows
 from fogml.gap.search import Search
-from fogml.gap.shapes import corners
+from fogml.gap.shapes import usual_shapes
 from fogml.runs.run import FloatArray
+from fogml.signals.bases import corners
 from fogml.twin.effect import NoiseEffect
 from fogml.twin.programme import Programme, programme_from
 
-LATER_H = (1.0, 2.0, 4.0)
-"""How much later than the power the chamber's programme may begin [h]."""
-SETTLED_DEGC = 1.0
-"""A course of temperature is straight between corners to this."""
-OFF_H = 1.0
-"""How long the power is off before, so that the unit is cold [h]."""
-MOST_STEPS = 60
-TOLD = ("temperature", "power-on", "time")
+
+@dataclass(frozen=True)
+class RepeatSettings:
+    """How a repeat run is made.
+
+    Attributes
+    ----------
+    later_h
+        How much later than the power the chamber's programme may begin [h].
+    settled_degc
+        A course of temperature is straight between corners to this.
+    off_h
+        How long the power is off before, so that the unit is cold [h].
+    most_steps
+        Steps of the programme at most: more are straightened.
+    most_members
+        Members of a class that a programme is looked for: more are hardly ever told apart by one.
+    """
+
+    later_h: tuple[float, ...] = (1.0, 2.0, 4.0)
+    settled_degc: float = 1.0
+    off_h: float = 1.0
+    most_steps: int = 60
+    most_members: int = 4
+
+
+REPEAT = RepeatSettings()
+FORMS = ("usual", "low", "high")
+"""Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
 
 
 def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
@@ -50,48 +70,44 @@ def repeat_run(found: Inference, every: Foretold) -> SeparatingRun | None:
     every
         All causes of the likeliest set.
     """
-    scene = found.setting.scene
-    unknown = [m for m in every.members if found.columns.families[m.family].kind == "unknown"]
+    scene = found.scene
+    unknown = [m for m in every.members if found.kind(m) == "unknown"]
     if not unknown:
         return None
     courses = [np.sum([every.of_member(i, m) for m in unknown], axis=0) for i in range(scene.fitted)]
     lengths = [_length(found, i, course) for i, course in enumerate(courses)]
     run = int(np.argmax(lengths))
     rows, course = scene.runs[run], courses[run]
-    best: tuple[float, float] | None = None
-    for hours in LATER_H:
+    distances = []
+    for hours in REPEAT.later_h:
         late = np.interp(rows.time_s - 3600.0 * hours, rows.time_s, course)
-        apart = min(_length(found, run, late - course), _length(found, run, late), lengths[run])
-        if best is None or apart > best[0]:
-            best = apart, hours
-    assert best is not None
-    distance, hours = best
+        distances.append(min(_length(found, run, late - course), _length(found, run, late), lengths[run]))
+    distance, hours = max(distances), REPEAT.later_h[int(np.argmax(distances))]
     if distance < LEAST_DISTANCE:
         return None
-    soak = f"soak at {_start(rows):g} degC for"
+    start = _start(rows)
+    soak = f"soak at {start:g} degC for"
     course_again, fastest = _steps_again(rows)
-    steps = [f"{soak} {OFF_H:g} h", {f"{soak} {hours:g} h": ["power on"]}, *course_again]
     values: dict[str, Any] = {
         "schema": "fogml.programme/1",
         "name": "repeat-run",
-        "start_temperature": f"{_start(rows):g} degC",
+        "start_temperature": f"{start:g} degC",
         "power": "off",
-        "steps": steps,
+        "steps": [f"{soak} {REPEAT.off_h:g} h", {f"{soak} {hours:g} h": ["power on"]}, *course_again],
     }
     if fastest > Programme.fastest_rate:
         values["fastest_rate"] = f"{fastest:.3g} degC/min"
     programme = programme_from(values, "repeat-run")
-    total = OFF_H + hours + float(rows.run.span_s) / 3600.0
-    told = (f"{soak} {OFF_H:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
-    return SeparatingRun(TOLD, programme.as_yaml(), float(distance), total, told)
+    total = REPEAT.off_h + hours + float(rows.run.span_s) / 3600.0
+    told = (f"{soak} {REPEAT.off_h:g} h, power off", f"{soak} {hours:g} h, power on", *course_again)
+    separates = ("temperature", "power-on", "time")
+    return SeparatingRun(separates, programme.as_yaml(), float(distance), total, told)
 
 
 def _length(found: Inference, run: int, course: FloatArray) -> float:
     """Whitened length beside the constants of a course on one run."""
-    scene, base = found.setting.scene, found.field.base
-    parts = [course if i == run else np.zeros(len(scene.runs[i])) for i in range(scene.fitted)]
-    white = found.field.whitening.stacked(parts)
-    return math.sqrt(max(float(white @ white) - float(np.sum((base.basis.T @ white) ** 2)), 0.0))
+    parts = [course if i == run else np.zeros(len(rows)) for i, rows in enumerate(found.scene.fit)]
+    return found.field.base.length(found.field.whitening.stacked(parts))
 
 
 def _course(rows: Rows) -> tuple[FloatArray, FloatArray]:
@@ -107,14 +123,14 @@ def _start(rows: Rows) -> float:
 def _steps_again(rows: Rows) -> tuple[list[str], float]:
     """The recorded course in sentences: soaks, and ramps from corner to corner; its fastest [degC/min]."""
     time, x = _course(rows)
-    corners = _corners(time, x, SETTLED_DEGC)
-    wider = SETTLED_DEGC
-    while len(corners) > MOST_STEPS:
+    wider = REPEAT.settled_degc
+    turns = corners(time, x, wider)
+    while len(turns) > REPEAT.most_steps:
         wider *= 1.5
-        corners = _corners(time, x, wider)
+        turns = corners(time, x, wider)
     said: list[str] = []
     at, soaked, fastest = _start(rows), 0.0, 0.0
-    for one, other in pairwise(corners):
+    for one, other in pairwise(turns):
         minutes, to = float(time[other] - time[one]) / 60.0, float(round(float(x[other]), 1))
         if abs(to - at) < wider:
             soaked += minutes
@@ -126,30 +142,6 @@ def _steps_again(rows: Rows) -> tuple[list[str], float]:
         said.append(f"ramp to {to:g} degC at {speed:g} degC/min")
         at, soaked = to, 0.0
     return [*said, f"soak at {at:g} degC for {max(soaked, 1.0):.0f} min"], fastest
-
-
-def _corners(time: FloatArray, x: FloatArray, within: float) -> Sequence[int]:
-    """Corners of a line that stays near a course (D. Douglas and T. Peucker, Cartographica 10 (1973) 112)."""
-    kept: NDArray[np.bool_] = np.zeros(len(x), dtype=np.bool_)
-    kept[[0, -1]] = True
-    todo = [(0, len(x) - 1)]
-    while todo:
-        low, high = todo.pop()
-        if high - low < 2:
-            continue
-        line = np.interp(time[low : high + 1], time[[low, high]], x[[low, high]])
-        off = np.abs(x[low : high + 1] - line)
-        far = int(np.argmax(off))
-        if off[far] > within:
-            kept[low + far] = True
-            todo += [(low, low + far), (low + far, high)]
-    return np.flatnonzero(kept).tolist()
-
-
-MOST_MEMBERS = 4
-"""Members of a class that a programme is looked for."""
-FORMS = ("usual", "low", "high")
-"""Shapes in the middle of their ranges, all at the low ends, all at the high ones."""
 
 
 def next_run(
@@ -167,7 +159,6 @@ def next_run(
     else the one that shows what these runs could not. None where there is nothing to tell, no programme does,
     or the model can't simulate one.
     """
-    setting = found.setting
     several = any(f.named and len(f.members) > 1 for f in items)
     if unknown and not several:
         repeat = repeat_run(found, Foretold.of(found, judged.best.members, judged.best.members))
@@ -176,19 +167,19 @@ def next_run(
     if not isinstance(found.model, TwinModel):
         return None
     twin, noise = found.model.twin, found.field.whitening.noise
-    facts = setting.scene.runs[0].run.facts
+    facts, values = found.scene.runs[0].run.facts, found.setting.values
     open_ = next((f for f in items if f.named and len(f.members) > 1), None)
     if open_ is None:
         if not undetectable:
             return None
-        return showing_run(twin, noise, setting.values, undetectable, seed=seed, progress=tell, facts=facts)
+        return showing_run(twin, noise, values, undetectable, seed=seed, progress=tell, facts=facts)
     members = _members(found, judged, open_)
     if len(members) < 2:
         return None
     return separating_run(
         twin,
         noise,
-        setting.values,
+        values,
         members,
         seed=seed,
         progress=tell,
@@ -201,13 +192,13 @@ def _members(found: Inference, judged: Judgement, item: Found) -> list[EffectVal
     """Members of a class as each would be in the other's place."""
     cause = next(c for c in judged.causes if c.ids[0] == item.effect)
     others = [m for m in judged.best.members if m not in cause.members]
-    beside = found.field.beside([(m.node, m.size) for m in others])
+    beside = found.field.beside(others)
     best = {found.columns.families[f].id: m for f, m in found.search.best_members(others).items()}
     values = []
-    for id in item.members[:MOST_MEMBERS]:
+    for id in item.members[: REPEAT.most_members]:
         if id in best:
             shape = found.columns.nodes[best[id].node].shape
-            values.append(card_of(id, found.setting, found.field, beside, shape).value)
+            values.append(card_of(id, found.field, beside, shape).value)
     return [v for v in values if v.amplitude != 0.0]
 
 
@@ -228,10 +219,10 @@ def rehearse(
         declared = setting.scene.candidates[search.families[f].id]
         if isinstance(declared, NoiseEffect) and not declared.steady:
             continue
-        usual = declared.amplitude.typical(grade)  # type: ignore[arg-type]
+        usual = declared.amplitude.typical(grade)
         asked = [("usual", usual)] + ([("found", sizes[declared.id])] if declared.id in sizes else [])
-        for form, shape in zip(FORMS, corners(declared, grade)):
-            response = _response(search.field, declared.id, shape)
+        for form, shape in zip(FORMS, usual_shapes(declared, grade)):
+            response = search.field.response(declared, shape)
             for size, amplitude in asked:
                 rows.append(_judged(search, f, form, size, amplitude * response, cost_of_false_name))
             if not declared.shape:
@@ -239,19 +230,8 @@ def rehearse(
     return tuple(rows)
 
 
-def _response(held: Field, id: str, shape: dict[str, float]) -> FloatArray:
-    """Whitened response of an effect to a unit of its amplitude on the fit runs."""
-    scene, values = held.setting.scene, held.setting.values
-    declared = scene.candidates[id]
-    bare = {name: value for name, value in shape.items() if name in {q.name for q in declared.shape}}
-    parts = [r.response(declared, bare, None, values) for r in scene.runs[: scene.fitted]]
-    return held.whitening.stacked(parts)
-
-
 def _judged(search: Search, family: int, form: str, size: str, data: FloatArray, cost: float) -> Rehearsed:
     priors, families = search.priors, search.families
-    basis = search.field.base.basis
-    length = math.sqrt(max(float(data @ data) - float(np.sum((basis.T @ data) ** 2)), 0.0))
     scores = search.alone_on(data)
     known = {f: s for f, s in scores.items() if families[f].kind == "known"}
     best = max(known, key=known.__getitem__)
@@ -269,4 +249,6 @@ def _judged(search: Search, family: int, form: str, size: str, data: FloatArray,
     named = probability >= NAMED
     outcome = "missed" if not named else "named" if family in alike else "mistaken"
     members = tuple(families[f].id for f in alike) if named else ()
-    return Rehearsed(families[family].id, form, size, length, outcome, members, probability)
+    return Rehearsed(
+        families[family].id, form, size, search.field.base.length(data), outcome, members, probability
+    )

@@ -40,7 +40,7 @@ from fogml.gap.planning.rehearsal import (
 )
 from fogml.gap.planning.separating import Member, distances, least_distance, log_distance, members_of
 from fogml.gap.result_parts import Rehearsed
-from fogml.gap.settings import Priors
+from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.signals.noise_model import NoiseModel
 from fogml.twin.noise import NoiseConstants
@@ -206,7 +206,7 @@ def _rehearsed(
         ).run
         for i, p in enumerate(planned)
     ]  # fmt: skip
-    return rehearse(foreseen(TwinModel(quiet), runs, noise, Priors()))
+    return rehearse(foreseen(TwinModel(quiet), runs, noise, STANDARD))
 
 
 def _next_run(

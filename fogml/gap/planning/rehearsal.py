@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from fogml.gap.frame import fixed_columns, whitener_of
+from fogml.gap.frame import Setting, fixed_columns, whitener_of
 from fogml.gap.linear_gaussian import LinearGaussian
 from fogml.gap.model import TwinModel
 from fogml.gap.planning.programme_design import Design
@@ -17,8 +17,7 @@ from fogml.gap.planning.programme_family import Family
 from fogml.gap.reading import rows_of
 from fogml.gap.rows import Rows, slopes
 from fogml.gap.scene import Scene
-from fogml.gap.settings import Priors
-from fogml.gap.shapes import AT_AMPLITUDE
+from fogml.gap.settings import STANDARD
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
@@ -161,8 +160,9 @@ class Rehearsal(ExpectedRuns):
         self._whitener = whitener_of(on.noise, rows)
         reading = _reading_noise(rows, on.sensors, on.values)
         self._weights = 1.0 / np.sqrt(1.0 + (reading / self._whitener.deviation) ** 2)
-        scene, none = Scene((rows,), 1, on.model.grade), dict[str, float]()
-        fixed = fixed_columns(rows, 0, scene, model.twin, model.constants, none, on.values, Priors())
+        scene = Scene((rows,), 1, on.model.grade)
+        setting = Setting(scene, model.constants, STANDARD, (), on.values)
+        fixed = fixed_columns(setting, 0, model.twin)
         white, count = self._whiten(fixed), len(model.constants)
         super().__init__(on, white[:, :count], white[:, count:])
 
@@ -175,12 +175,7 @@ class Rehearsal(ExpectedRuns):
 
     def response(self, id: str, shape: Mapping[str, float]) -> FloatArray:
         """An effect's response to a unit of its amplitude [deg/h], shape (m,)."""
-        declared = effect(id)
-        if AT_AMPLITUDE not in shape:
-            return self.rows.response(declared, shape, None, self._values)
-        about = shape[AT_AMPLITUDE]
-        bare = {name: value for name, value in shape.items() if name != AT_AMPLITUDE}
-        return self.rows.changed_output(declared, bare, about, self._values) / about
+        return self.rows.response(effect(id), shape, None, self._values)
 
 
 class Together(ExpectedRuns):

@@ -26,7 +26,7 @@ from fogml.gap.planning.programme_family import Family
 from fogml.gap.planning.programme_search import MOST_RUNS, Tried, finely, search
 from fogml.gap.planning.rehearsal import FINE_S, ExpectedRuns, Rehearsal, Stage, stage
 from fogml.gap.result import SeparatingRun
-from fogml.gap.shapes import Node, grid, usual_shape
+from fogml.gap.shapes import GridNode, grid
 from fogml.runs.facts import Facts
 from fogml.runs.run import FloatArray
 from fogml.signals.noise_model import NoiseModel
@@ -50,7 +50,7 @@ class Member:
 
     value: EffectValue
     candidate: Effect
-    nodes: tuple[Node, ...]
+    nodes: tuple[GridNode, ...]
 
 
 def separating_run(
@@ -175,11 +175,11 @@ def members_of(on: Stage, family: Family, members: Sequence[EffectValue]) -> tup
         candidate = effect(value.id)
         if value.amplitude == 0.0:
             raise InputError(f"effect '{value.id}' has a size of 0; give the size that is to be told")
-        usual = usual_shape(candidate, on.model.grade)
+        usual = candidate.default_shape(on.model.grade)
         shape = usual | {name: number for name, number in value.shape.items() if name in usual}
         nodes = grid(candidate, on.model.grade, partial(rehearsal.response, value.id), spans)
         kept = [nodes[i] for i in _thinned(len(nodes))]
-        own = Node(shape, (shape,))
+        own = GridNode(shape, (shape,))
         found.append(Member(EffectValue(value.id, value.amplitude, shape), candidate, (*kept, own)))
     return tuple(found)
 
@@ -262,7 +262,7 @@ def _gain(gram: FloatArray, fit: FloatArray, candidate: Effect) -> float:
     return float(np.sum(along**2 / values[keep]))
 
 
-def _refined(rehearsal: ExpectedRuns, true: FloatArray, member: Member, node: Node, gain: float) -> float:
+def _refined(rehearsal: ExpectedRuns, true: FloatArray, member: Member, node: GridNode, gain: float) -> float:
     """The gain with the shape fitted from a node on, where it is free there."""
     from scipy.optimize import minimize
 
