@@ -6,7 +6,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from tests.gap.test_answer import _run
 
 from fogml.gap.causes import cards_of, onset
 from fogml.gap.how_far import Foretold
@@ -20,6 +19,7 @@ from fogml.gap.unknown import unknown_families
 from fogml.runs.epochs import with_epoch
 from fogml.signals.bases import decayed
 from fogml.twin.twin_file import load_twin
+from tests.gap.test_answer import _run
 
 
 @pytest.fixture(scope="module")
