@@ -139,12 +139,10 @@ class Field:
             held = held.beside(self.block(m.node), m.size)
         return held
 
-    def response(self, declared: Effect, shape: Mapping[str, float]) -> FloatArray:
-        """Whitened response of an effect to a unit of its amplitude on the fit runs, shape (n,)."""
-        values = self.setting.values
-        return self.whitening.stacked(
-            [r.response(declared, shape, None, values) for r in self.setting.scene.fit]
-        )
+    def response(self, declared: Effect, shape: Mapping[str, float], amplitude: float = 1.0) -> FloatArray:
+        """Whitened response of the fit runs to an effect of an amplitude, shape (n,)."""
+        values, runs = self.setting.values, self.setting.scene.fit
+        return self.whitening.stacked([amplitude * r.response(declared, shape, None, values) for r in runs])
 
 
 @dataclass(frozen=True, eq=False)

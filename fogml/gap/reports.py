@@ -58,8 +58,8 @@ def usual_length(found: Inference, declared: Effect) -> float:
     if isinstance(declared, NoiseEffect) and not declared.steady:
         return float(found.setting.priors.least_detectable)
     grade = found.scene.grade
-    response = found.field.response(declared, declared.default_shape(grade))
-    return found.field.base.length(declared.amplitude.typical(grade) * response)
+    usual = declared.amplitude.typical(grade)
+    return found.field.base.length(found.field.response(declared, declared.default_shape(grade), usual))
 
 
 def stage_energies(found: Inference, energies: Mapping[Member, float]) -> dict[str, float]:
