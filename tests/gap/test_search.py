@@ -34,7 +34,7 @@ def test_evidence_by_inner_products_is_that_of_the_data(found):
     search = found.search
     for explanation in found.explanations[:5]:
         held = search._held(explanation.members).log_evidence
-        assert held == pytest.approx(search.field.beside(explanation.nodes).log_evidence, rel=1e-9)
+        assert held == pytest.approx(search.field.beside(explanation.members).log_evidence, rel=1e-9)
 
 
 def test_what_stands_in_for_a_name_has_none_of_its_class(found):
