@@ -11,10 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.linalg import solveh_banded
 
-from fogml.runs.run import FloatArray
+FloatArray = NDArray[np.float64]
 
 PENALTIES = np.geomspace(1e-3, 1e8, 23)
 LEAST_PASSED = 0.1
