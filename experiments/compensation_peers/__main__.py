@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from experiments.benchmarks import accuracy
 from experiments.cold_start.__main__ import AVERAGING_S as COLD_AVERAGING_S
 from experiments.cold_start.__main__ import PAIRINGS
 from experiments.compensation_peers.variance import NAMES, intervals, shares
@@ -38,6 +39,7 @@ from fogml.runs.shipped import shipped_run
 from fogml.validation.compare import compare
 
 HERE = Path(__file__).parent
+BENCHMARKS = Path(accuracy.__file__).parent
 Row = dict[str, Any]
 MODELS: dict[str, Callable[[], DriftModel]] = {
     "mean": partial(make_model, "mean"),
@@ -137,18 +139,13 @@ def _of_features(features: Features | None, sample_s: float) -> int:
 
 def page(values: Mapping[str, Any]) -> str:
     """``results.md`` of what ``results.json`` holds."""
-    y, places = _outcome(values["rows"])
-    parts, (low, high) = shares(y, places), intervals(y, places)
-    explained = "\n".join(
-        f"| {name} | {100 * part:.0f} % | {100 * a:.0f} … {100 * b:.0f} % |"
-        for name, part, a, b in zip(NAMES, parts, low, high)
-    )
     return f"""# Models of others on all real pairings and simulated strata
 
 Data: legs of the shipped thermal cycle against each other (27 pairings) and thirds of the shipped cold start
 (27), both of **MEMS** units; **synthetic** tactical units of six strata (`experiments/strata`: one to three
-cycles in training, {len(SEEDS)} units each, 36 cases). No fibre-optic gyro. All models of a case are judged
-on the same rows. fogml {__version__}; `python -m experiments.compensation_peers`.
+cycles in training, {len(SEEDS)} units each, 36 cases), as far as they have a column. No fibre-optic gyro.
+All models of a case are judged on the same rows. fogml {__version__};
+`python -m experiments.compensation_peers`.
 
 The cubics follow their autopilots' rules: fitted to the one run that warms up furthest, from its coldest
 sample on, by 24 °C (PX4) or 10 °C (ArduPilot) at least, held beyond the range so seen, and else the mean
@@ -157,23 +154,49 @@ averages. Nothing was tuned on these cases. `auto` was developed with the therma
 
 Rms / no compensation, geometric means; *worse* than none beyond the noise floor; coverage of the stated 90 %
 intervals by averages, where a model states any (a network's are those of its training residuals). Bytes are
-numbers in float32, operations a sample with those of the features, of a fit to one leg (y, up).
+numbers in float32, operations a sample with those of the features, of a fit to one leg (y, up), where told.
 
 {_table(values)}
 
 ## What explains the outcome
 
-Of the sum of squares of log(rms / no compensation) over {y.shape[0]} cases in {len({p[0] for p in places})}
-data sets (three axes of the cycle, three of the start, six strata) and {y.shape[1]} models; 95 % intervals by
-drawing data sets. The mean is left out of the models: it is what no compensation is. Recordings have one seed
-each, so the seed is that of the synthetic units.
+Of the sum of squares of log(rms / no compensation); 95 % intervals by drawing data sets, which are the axes
+of each recording, the strata or the programmes. No compensation itself is no model here. Recordings have one
+seed.
 
-| source | share | interval |
-|---|---:|---:|
-{explained}
+{chr(10).join(_explained(words, *outcome) for words, outcome in _outcomes(values["rows"]))}
 
 {_seeds(values)}
 """
+
+
+def _explained(words: str, y: Any, places: list[tuple[str, str]]) -> str:
+    parts, (low, high) = shares(y, places), intervals(y, places)
+    lines = [
+        f"| {name} | {100 * part:.0f} % | {100 * a:.0f} … {100 * b:.0f} % |"
+        for name, part, a, b in zip(NAMES, parts, low, high)
+        if part > 1e-9
+    ]
+    told = (
+        f"{words}: {y.shape[0]} cases, {len({place[0] for place in places})} data sets, {y.shape[1]} models."
+    )
+    return "\n".join([told, "", "| source | share | interval |", "|---|---:|---:|", *lines, ""])
+
+
+def _outcomes(rows: Sequence[Row]) -> list[tuple[str, tuple[Any, list[tuple[str, str]]]]]:
+    """The peers of ``experiments/benchmarks`` on recordings and the twin, and the cases here."""
+    studies = json.loads((BENCHMARKS / "results.json").read_text(encoding="utf-8"))["studies"]
+    cases: dict[tuple[str, str], dict[str, float]] = {}
+    for study in studies:
+        if study["name"] in ("accuracy-real", "accuracy-twin"):
+            for row in study["rows"]:
+                of_set = f"{row['group']} {row.get('axis') or row['programme']}"
+                protocol = f"{of_set} {row.get('train') or row.get('trained')} {row['test']}"
+                cases.setdefault((of_set, protocol), {})[row["model"]] = float(row["rms"])
+    names = [name for name in next(iter(cases.values())) if name != "no model"]
+    y = [[np.log(own[name] / own["no model"]) for name in names] for own in cases.values()]
+    words = "Peers of `experiments/benchmarks` on legs, thirds and twin runs"
+    return [(words, (np.array(y), list(cases))), ("The cases above", _outcome(rows))]
 
 
 def _outcome(rows: Sequence[Row]) -> tuple[Any, list[tuple[str, str]]]:
@@ -194,22 +217,24 @@ def _cases(rows: Sequence[Row]) -> dict[tuple[Any, ...], dict[str, Row]]:
 
 def _table(values: Mapping[str, Any]) -> str:
     cases = _cases(values["rows"])
-    heads = [f"{group} ({sum(key[0] == group for key in cases)})" for group in GROUPS]
+    groups = [group for group in GROUPS if any(key[0] == group for key in cases)]
+    heads = [f"{group} ({sum(key[0] == group for key in cases)})" for group in groups]
     lines = [
         f"| model | bytes | operations | {' | '.join(heads)} | worse | at most | coverage |",
-        "|---|" + "---:|" * (len(GROUPS) + 5),
+        "|---|" + "---:|" * (len(groups) + 5),
     ]
     for name in MODELS:
         cells = []
-        for group in GROUPS:
+        for group in groups:
             own = [c[name]["rms"] / c["mean"]["rms"] for key, c in cases.items() if key[0] == group]
-            cells.append(f"{np.exp(np.mean(np.log(own))):.2f}" if own else "–")
+            cells.append(f"{np.exp(np.mean(np.log(own))):.2f}")
         worse = sum(c[name]["rms"] > c["mean"]["rms"] + c[name]["floor"] for c in cases.values())
         most = max(c[name]["rms"] / c["mean"]["rms"] for c in cases.values())
         covered = [c[name]["coverage"] for c in cases.values()]
         told = f"{np.mean(covered):.2f}" if any(covered) else "–"
-        size = values["sizes"][name]
-        head = f"| {name} | {size['bytes']:,} | {size['operations']:,} | {' | '.join(cells)} |"
+        size = values["sizes"].get(name)
+        told_size = f"{size['bytes']:,} | {size['operations']:,}" if size else "– | –"
+        head = f"| {name} | {told_size} | {' | '.join(cells)} |"
         lines.append(f"{head} {worse} of {len(cases)} | × {most:.1f} | {told} |")
     return "\n".join(lines)
 
@@ -230,6 +255,8 @@ def weight_seeds() -> dict[str, float]:
 
 
 def _seeds(values: Mapping[str, Any]) -> str:
+    if not values["weight_seeds"]:
+        return ""
     told = ", ".join(f"{name} {100 * (np.exp(sd) - 1):.0f} %" for name, sd in values["weight_seeds"].items())
     return (
         f"Another seed of a network's weights alone changes its rms by (a standard deviation over three "
@@ -241,14 +268,18 @@ def main() -> None:
     """Compute and write the results."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--data", action="append", choices=GROUPS, help="this group alone; may be repeated")
-    chosen = parser.parse_args().data or list(GROUPS)
+    parser.add_argument("--quick", action="store_true", help="without fits for sizes and seeds: as they were")
+    given = parser.parse_args()
+    chosen = given.data or list(GROUPS)
     path = HERE / "results.json"
-    before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {"rows": []}
-    rows = [row for row in before["rows"] if row["group"] not in chosen]
+    before = json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    rows = [row for row in before.get("rows", []) if row["group"] not in chosen]
     makers = {"thermal cycle": thermal_cycle, "cold start": cold_start, "strata": strata}
     for group in chosen:
         rows += makers[group]()
-    values = {"rows": rows, "sizes": sizes(), "weight_seeds": weight_seeds()}
+    fits = {"sizes": sizes, "weight_seeds": weight_seeds}
+    again = {name: before.get(name, {}) if given.quick else made() for name, made in fits.items()}
+    values = {"rows": rows, **again}
     write_results(HERE, values, page(values))
 
 

@@ -157,10 +157,11 @@ def summary(rows: list[dict]) -> str:
             ratios = [case[label]["rms"] / case["mean"]["rms"] for case in cases.values()]
             best = [case[label]["rms"] / min(r["rms"] for r in case.values()) for case in cases.values()]
             worse = sum(c[label]["rms"] > c["mean"]["rms"] + c[label]["floor"] for c in cases.values())
-            coverage = np.mean([case[label]["coverage"] for case in cases.values()])
+            covered = [case[label]["coverage"] for case in cases.values()]
+            coverage = f"{np.mean(covered):.2f}" if any(covered) else "–"
             lines.append(
                 f"| {told} | {label} | {_geometric_mean(ratios):.2f} | {_geometric_mean(best):.2f} | "
-                f"{worse} of {len(cases)} (at most × {max(ratios):.1f}) | {coverage:.2f} |"
+                f"{worse} of {len(cases)} (at most × {max(ratios):.1f}) | {coverage} |"
             )
     return "\n".join(lines)
 
@@ -173,10 +174,12 @@ def page(rows: list[dict]) -> str:
 Data: the shipped thermal cycle of a **MEMS** unit (no fibre-optic gyro), 52 → −17.6 → 74 → 36 °C, legs
 `down`, `up` and `last down`, three axes. Each model is fitted on one leg, or on two, and judged on another.
 Averages over {ROWS_PER_AVERAGE} rows ({averaging_s:.1f} s); all in deg/h. Earth rate is not known here, so
-biases are relative to the training legs' mean, and no compensation gives the same figures as `mean`. All
-models of a line are judged on the same rows. `auto` and `mixed effects` were developed with these legs in
-view, first x and y, then all: that a rate needs a run both ways, and that gains and skill count beyond their
-standard error, was set on the nine pairings of two legs. fogml {__version__};
+biases are relative to the training legs' mean, and no compensation gives the same figures as `mean`. The
+autopilots' cubics follow their own rules: fitted to a warm-up of 24 °C (PX4) or 10 °C (ArduPilot) at least,
+held beyond its range, else nothing, as on every leg down; they state no interval. All models of a line are
+judged on the same rows. `auto` and `mixed effects` were developed with these legs in view, first x and y,
+then all: that a rate needs a run both ways, and that gains and skill count beyond their standard error, was
+set on the nine pairings of two legs. fogml {__version__};
 `python -m experiments.thermal_cycle`.
 
 ## In short
