@@ -61,6 +61,16 @@ def npz(path: Path, hours: float) -> None:
     np.savez(path, **{"time [s]": seconds, "gyro [deg/h]": gyro(seconds), "T [degC]": 20.0 + seconds / 1e4})
 
 
+def mat(path: Path, hours: float) -> None:
+    """Three variables of version 5."""
+    from scipy.io import savemat
+
+    seconds = np.concatenate(list(blocks(hours)))
+    units = {"time": "s", "gyro": "deg/h", "T": "degC"}
+    columns = {"time": seconds, "gyro": gyro(seconds), "T": 20.0 + seconds / 1e4}
+    savemat(path, {**columns, "units": units}, do_compression=True)
+
+
 def tdms(path: Path, hours: float) -> None:
     """A channel of gyro and one of temperature, a segment a block."""
     import nptdms
@@ -136,6 +146,11 @@ def rosbag(path: Path, hours: float, ros1: bool = True) -> Path:
         for seconds in blocks(hours):
             _write(bag.write, connection, np.frombuffer(first, layout), seconds)
     return path if ros1 else next(folder.glob("*.db3"))
+
+
+def rosbag2(path: Path, hours: float) -> Path:
+    """As `rosbag`, of ROS 2 in its database."""
+    return rosbag(path, hours, ros1=False)
 
 
 def mcap(path: Path, hours: float) -> None:

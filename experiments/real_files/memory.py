@@ -18,6 +18,7 @@ from fogml.readers import READERS
 
 HOURS = {
     "npz": (24.0,),
+    "mat": (1.0, 4.0),
     "workbook": (1e6 / 3600.0 / long_logs.RATE_HZ,),
     "tdms": (24.0,),
     "mdf": (24.0,),
@@ -25,6 +26,7 @@ HOURS = {
     "ulog": (24.0,),
     "dataflash": (24.0,),
     "rosbag": (0.25, 1.0),
+    "rosbag2": (0.05, 0.15),
     "mcap": (1.0, 4.0),
 }
 """Lengths of each format's logs [h]: a worksheet ends at 1,048,576 rows, ROS takes long to write. Where 24 h
@@ -50,10 +52,10 @@ def section(quick: bool, most_hours: float = math.inf, formats: Sequence[str] = 
             continue
         for hours in sorted({min(length, most_hours) for length in lengths}):
             with tempfile.TemporaryDirectory(dir="/tmp") as folder:
-                suffix = next(reader.suffixes[0] for reader in READERS if reader.name == kind)
+                suffix = next((reader.suffixes[0] for reader in READERS if reader.name == kind), ".db3")
                 path = Path(folder) / f"log{suffix}"
-                getattr(long_logs, kind)(path, QUICK_HOURS if quick else hours)
-                found = _measured(path)
+                written = getattr(long_logs, kind)(path, QUICK_HOURS if quick else hours)
+                found = _measured(written or path)
             print(kind, hours, found, file=sys.stderr, flush=True)
             data.append({"format": kind, "hours": QUICK_HOURS if quick else hours, **found})
     order = list(HOURS)

@@ -6,6 +6,7 @@ Each format is a class with `arrays`, `told` (what the parent hears of them) and
 from __future__ import annotations
 
 import tempfile
+import weakref
 from collections.abc import Iterator, Mapping
 from typing import Any, Literal
 
@@ -176,7 +177,7 @@ class Mat:
 
     @staticmethod
     def array(value: Any) -> Any:
-        return value if is_dataset(value) else np.asarray(value)
+        return value if is_dataset(value) or isinstance(value, PutAway) else np.asarray(value)
 
     def close(self) -> None:
         self.arrays.clear()
@@ -184,17 +185,27 @@ class Mat:
             self.opened.close()
 
 
+class PutAway:
+    """An array of numbers in a temporary file; what is read of it is held no longer than it is used."""
+
+    def __init__(self, values: np.ndarray[Any, Any]) -> None:
+        self.ndim, self.shape, self.dtype = values.ndim, values.shape, values.dtype
+        # Column by column, as they are read.
+        self.order: Literal["F", "C"] = "F" if values.flags.f_contiguous else "C"
+        self.file = tempfile.TemporaryFile(prefix="fogml-")  # noqa: SIM115  closed with the object
+        weakref.finalize(self, self.file.close)
+        values.ravel(self.order).tofile(self.file)
+
+    def __getitem__(self, part: Any) -> np.ndarray[Any, Any]:
+        return np.array(np.memmap(self.file, self.dtype, "r", shape=self.shape, order=self.order)[part])
+
+
 def put_away(value: Any) -> Any:
     """A variable whose long arrays of numbers lie in temporary files."""
     if isinstance(value, dict):
         return {name: put_away(item) for name, item in value.items()}
-    if not isinstance(value, np.ndarray) or value.dtype.kind not in "fiub" or value.nbytes < _LONG_BYTES:
-        return value
-    with tempfile.TemporaryFile(prefix="fogml-") as file:
-        # Column by column, as they are read.
-        order: Literal["F", "C"] = "F" if value.flags.f_contiguous else "C"
-        value.ravel(order).tofile(file)
-        return np.memmap(file, value.dtype, "r", shape=value.shape, order=order)
+    is_long = isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and value.nbytes >= _LONG_BYTES
+    return PutAway(value) if is_long else value
 
 
 class MatrixColumn:
