@@ -17,7 +17,7 @@ from fogml.readers.columns import MOST_COLUMNS
 _PLAIN_FILTERS = frozenset({1, 2, 3, 4, 5, 6, 32000})  # deflate ... scale-offset, and h5py's own lzf
 MOST_NAMES = 10_000
 _MOST_TEXT = 1 << 20
-_LONG_BYTES = 1 << 20
+_LONG_BYTES = 1 << 20  # of an array that is put away; a file of shorter ones takes little memory
 _DEEPEST = 4  # of groups that HDF5 makes of a unit with slashes
 _HDF5_MAGIC = b"\x89HDF\r\n\x1a\n"
 _USER_BLOCK = 512

@@ -14,6 +14,7 @@ from fogml.runs.stamps import stamp_form
 SEPARATORS = (",", ";", "\t")
 _MOST_TITLE_LINES = 100
 _LINES_BELOW = 5
+"""Looked at below a header for numbers, and that its cells may go on over: a row of units, blank ones."""
 _SEPARATOR_LINE = re.compile(r'\s*"?sep\s*=\s*(\S|\t)"?\s*\Z', re.IGNORECASE)
 _NUMBER_LIKE = re.compile(r"\s*[+-]?[\d.,' ]*\d[\d.,' ]*([eE][+-]?\d+)?\s*\Z")
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 JOURNAL = "study.journal"
 _SECOND_TRIES_S = (0.2, 0.5, 1.0, 2.0)
+"""Waits until workers that began at once have made the tables of a database [s]."""
 
 
 def open_storage(url: str | None, folder: str | Path) -> BaseStorage:

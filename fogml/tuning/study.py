@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 IDENTITY, WORKER, BEAT = "fogml_identity", "worker", "beat"
 _SILENT_BEATS = 3
+"""Heartbeats that a worker may miss: one may be lost to a busy machine, two to one that writes a journal."""
 _HOLDING = ("RUNNING", "COMPLETE", "PRUNED")
 
 

@@ -16,9 +16,6 @@ from fogml.tuning.worker import score_of
 if TYPE_CHECKING:
     from optuna.trial import FrozenTrial
 
-_TREES = 200
-_LEAST_TRIALS = 10
-
 
 def complete(trials: Sequence[FrozenTrial]) -> list[FrozenTrial]:
     """The trials that went through every fold, by place."""
@@ -131,23 +128,36 @@ def command_line(
     return shlex.join(words)
 
 
-def importance(trials: Sequence[FrozenTrial], seed: int = 0) -> dict[str, float]:
+def importance(
+    trials: Sequence[FrozenTrial], seed: int = 0, *, trees: int = 200, least_trials: int = 10
+) -> dict[str, float]:
     """Share of each parameter in what the logarithm of the error varies by, the largest first.
 
     By a random forest of the complete trials, and how much worse it gets when a parameter's values
     are exchanged among trials (L. Breiman, Machine Learning 45 (2001) 5). Parameters that a trial
-    did not need count as a value of their own. Empty where there are fewer than ten trials.
+    did not need count as a value of their own.
+
+    Parameters
+    ----------
+    trials
+        Of a study; those that are complete count.
+    seed
+        Of the forest and the exchange.
+    trees
+        Of the forest.
+    least_trials
+        Complete trials below which nothing is told.
     """
     found = complete(trials)
     names = sorted({name for trial in found for name in trial.params})
     errors = np.log([max(figure(trial, "rms"), 1e-300) for trial in found])
-    if len(found) < _LEAST_TRIALS or not names or np.ptp(errors) == 0.0:
+    if len(found) < least_trials or not names or np.ptp(errors) == 0.0:
         return {}
     from sklearn.ensemble import RandomForestRegressor
     from sklearn.inspection import permutation_importance
 
     columns = np.column_stack([_numbers([trial.params.get(name) for trial in found]) for name in names])
-    forest = RandomForestRegressor(_TREES, random_state=seed, n_jobs=1).fit(columns, errors)
+    forest = RandomForestRegressor(trees, random_state=seed, n_jobs=1).fit(columns, errors)
     worse = permutation_importance(forest, columns, errors, n_repeats=10, random_state=seed, n_jobs=1)
     shares = np.maximum(worse.importances_mean, 0.0)
     if not shares.sum() > 0.0:
