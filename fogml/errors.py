@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 import reprlib
+from collections.abc import Iterable
+from difflib import get_close_matches
 
 LONGEST_QUOTED = 60
 """Characters of a value that a message quotes; more tells nobody anything."""
@@ -50,6 +52,14 @@ def quoted(value: object) -> str:
     if isinstance(value, str):
         return f"'{printable(value.replace(chr(10), ' '))}'"
     return printable(_brief.repr(value).replace("\n", " "))
+
+
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
+    """``did you mean 'x'? `` where known names look like this one or hold it, else nothing."""
+    known = list(known)
+    near = get_close_matches(name, known, n=most, cutoff=0.6 if most == 1 else 0.5)
+    near += [one for one in known if name and name in one and one not in near][: most - len(near)]
+    return f"did you mean {' or '.join(repr(one) for one in near)}? " if near else ""
 
 
 def counted(count: int, word: str, words: str | None = None) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from fogml.errors import LONGEST_MESSAGE, LONGEST_QUOTED, InputError, listed, quoted
+from fogml.errors import LONGEST_MESSAGE, LONGEST_QUOTED, InputError, did_you_mean, listed, quoted
+from fogml.runs.shipped import shipped_run
+from fogml.twin.programme import load_programme
+from fogml.twin.twin_file import load_twin
 
 NESTED: list = [1]
 for _ in range(50):
@@ -41,3 +44,29 @@ def test_no_message_writes_on_the_terminal_or_fills_it():
     text = str(InputError("a\x1b[2J\n  ^" + "b" * 10**6))
     assert text.startswith("a\N{REPLACEMENT CHARACTER}[2J\n  ^b")
     assert len(text) <= LONGEST_MESSAGE
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "told"),
+    [
+        ("trian", 1, "did you mean 'train'? "),
+        ("train-run", 2, "did you mean 'train-runs' or 'train'? "),
+        ("xyzzy", 3, ""),
+        ("", 3, ""),
+    ],
+)
+def test_names_that_look_alike_are_offered(name: str, most: int, told: str) -> None:
+    assert did_you_mean(name, ["inspect", "train", "train-runs"], most) == told
+
+
+@pytest.mark.parametrize(
+    ("ask", "name", "meant"),
+    [
+        (load_programme, "four-position", "four-positions"),
+        (load_twin, "tactcal", "tactical"),
+        (shipped_run, "ring-laser-zz", "ring-laser-z"),
+    ],
+)
+def test_what_ships_is_offered_where_a_name_looks_like_it(ask, name: str, meant: str) -> None:
+    with pytest.raises(InputError, match=f"{name}.* did you mean '{meant}'"):
+        ask(name)

@@ -20,7 +20,7 @@ from fogml.lab.misalignment_segments import from_samples
 from fogml.lab.misalignment_simulation import TableUnit, measurements, samples
 from fogml.outputs import whole_file
 from fogml.report import style
-from fogml.report.static_svg import Curve, line_figure
+from fogml.static_svg import Curve, line_figure
 from fogml.yaml_text import read_yaml
 
 HERE = Path(__file__).parent

@@ -26,7 +26,7 @@ from fogml.lab.navigation_cost import HOURS, navigation_costs
 from fogml.models.names import make_model
 from fogml.outputs import whole_file
 from fogml.report import style
-from fogml.report.static_svg import Curve, line_figure
+from fogml.static_svg import Curve, line_figure
 from fogml.twin.simulate import simulate
 from fogml.validation.judge import judge
 from fogml.yaml_text import read_yaml

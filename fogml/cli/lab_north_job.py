@@ -115,9 +115,8 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
             "se of noise, rms [deg]",
         ]
         terminal.table(f"Ways to spend {duration(values['duration_s'])}", header, rows)
-    quiet, worst = (
-        ", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) or "none" for k in ("quiet", "worst")
-    )
-    terminal.say(f"quiet azimuths {quiet} deg; worst {worst} deg")
+    azimuths = [", ".join(f"{a:.2f}" for a in values[f"{k}_azimuth_deg"]) for k in ("quiet", "worst")]
+    quiet, worst = (f"{told} deg" if told else "none" for told in azimuths)
+    terminal.say(f"quiet azimuths {quiet}; worst {worst}")
     for note in values["notes"]:
         terminal.say(note)

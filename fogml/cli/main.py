@@ -15,7 +15,7 @@ import click
 
 from fogml import __version__
 from fogml.cli.given import HELP_NAMES, load
-from fogml.errors import FogmlError, printable
+from fogml.errors import FogmlError, did_you_mean, printable
 from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
 from fogml.processes import end_as_interrupted, quiet_libraries
@@ -137,11 +137,8 @@ class Group(click.Group):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         if args and not args[0].startswith("-") and args[0] not in self.known:
-            from difflib import get_close_matches
-
-            near = get_close_matches(args[0], self.known, n=1)
-            hint = f" Did you mean '{near[0]}'?" if near else f" Commands are {', '.join(self.known)}."
-            fail(f"no such command '{args[0]}'.{hint}")
+            hint = did_you_mean(args[0], self.known).rstrip() or f"commands are {', '.join(self.known)}"
+            fail(f"no such command '{args[0]}'; {hint}")
         return super().resolve_command(ctx, args)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from difflib import get_close_matches
 from inspect import get_annotations
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
@@ -13,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 
 from fogml import __version__
 from fogml.cli.given import Given, option
-from fogml.errors import InputError, listed, quoted
+from fogml.errors import InputError, did_you_mean, listed, quoted
 from fogml.outputs import check_is_no_folder, sole_writer, whole_file
 from fogml.yaml_text import read_yaml, yaml_text
 
@@ -183,8 +182,7 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
         return f"{source}: unknown key {quoted(within)}"
     if first["type"] == "extra_forbidden":
         known = [field.alias or name for name, field in settings.model_fields.items()]
-        near = get_close_matches(key, known, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
+        hint = did_you_mean(key, known)
         return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":

@@ -202,5 +202,10 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
 
 
 def number(value: float | None) -> str:
-    """A figure for a table: four significant digits; a dash where there is none."""
-    return "–" if value is None else f"{value:.4g}"
+    """A figure for a table: four significant digits; a dash where there is none.
+
+    Powers of ten only below 1e-4 and from 1e7 on.
+    """
+    if value is None:
+        return "–"
+    return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
-from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, column_spec, is_temperature
+from fogml.errors import InputError, did_you_mean
+from fogml.runs.columns import KNOWN, REPLAYED, TIME_ON, coil_sensor_number, column_spec, is_temperature
 from fogml.runs.run import Run
 
 FloatArray = NDArray[np.float64]
 
-TIME_ON = "time_on"
-"""Time since power-on [s]: a column of that name, else from the fact ``powered_on``."""
 NOT_INPUTS = ("time", "gyro", REPLAYED)
 """Columns that no feature may be made of."""
 _ORDER = ["T", *(name for name in KNOWN if name != "T")]
@@ -188,11 +186,8 @@ def input_of(run: Run, name: str) -> FloatArray:
         raise InputError(
             f"{run.name}: time since power-on is not known; state 'powered_on' [s] in the side file"
         )
-    from difflib import get_close_matches
-
     held = [column for column in run.columns if column not in NOT_INPUTS]
-    near = get_close_matches(name, held, n=1)
-    hint = f"did you mean '{near[0]}'?" if near else f"the run holds {', '.join(held) or 'none'}"
+    hint = did_you_mean(name, held).rstrip() or f"the run holds {', '.join(held) or 'none'}"
     raise InputError(f"{run.name}: no column '{name}'; {hint}")
 
 

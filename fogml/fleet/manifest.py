@@ -7,11 +7,10 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, did_you_mean, quoted
 from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
@@ -126,11 +125,9 @@ def _check_keys(keys: Iterable[str], place: str) -> None:
     keys = list(keys)
     for key in keys:
         if key not in COLUMNS and not (key.startswith(COVARIATE) and _COVARIATE_NAME.fullmatch(key)):
-            near = get_close_matches(key, COLUMNS, n=1)
-            hint = f"did you mean '{near[0]}'? " if near else ""
             raise InputError(
-                f"{place}: unknown column {quoted(key)}; {hint}known are {', '.join(COLUMNS)}, and those of "
-                f"production such as {COVARIATE}coil_lot"
+                f"{place}: unknown column {quoted(key)}; {did_you_mean(key, COLUMNS)}known are "
+                f"{', '.join(COLUMNS)}, and those of production such as {COVARIATE}coil_lot"
             )
     for key in ("unit", "train"):
         if key not in keys:

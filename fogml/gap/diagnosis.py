@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.gap.better_twin import counterfactuals, joint_uncertainty
 from fogml.gap.causes import cards_of, energy, fitted_values, found_cause
 from fogml.gap.compensation import compensation_of
@@ -109,7 +109,8 @@ def inferred(
     model, without = TwinModel(model) if isinstance(model, Twin) else model, tuple(without)
     for id in without:
         if id not in candidates_of(model) and id not in effects():
-            raise InputError(f"--without {id}: there is no such effect; `fogml effects` lists them")
+            hint = did_you_mean(id, effects(), most=3)
+            raise InputError(f"--without {id}: there is no such effect; {hint}`fogml effects` lists them")
     check_runs(fit, held_out, noise)
     # The unit ages from its first run on, whichever it is.
     fit, held_out, _ = with_epoch(fit, held_out, [noise] if noise else [])

@@ -22,6 +22,7 @@ from fogml.gap.result_parts import (
     WhatIf,
     Where,
 )
+from fogml.pictures import Panel, Pictured
 from fogml.runs.run import Run
 from fogml.twin.uncertainty import Uncertainty
 
@@ -183,7 +184,7 @@ class CandidateEvidence:
 
 
 @dataclass(frozen=True, eq=False)
-class Diagnosis:
+class Diagnosis(Pictured):
     """The result of `fogml.gap.diagnose`.
 
     Attributes
@@ -300,3 +301,9 @@ class Diagnosis:
     def as_dict(self) -> dict[str, Any]:
         """The content of ``gap.json``."""
         return gap_values(self)
+
+    def _heading(self) -> Sequence[str]:
+        return self.headline or (self.verdict,)
+
+    def _panels(self) -> Sequence[Panel]:
+        return [one.panel() for one in self.series]

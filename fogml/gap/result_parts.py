@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.pictures import AFTER, BEFORE, Panel, in_time
 from fogml.runs.run import FloatArray
 
 
@@ -299,3 +300,9 @@ class RunSeries:
     gyro: str | None = None
     axis: str | None = None
     note: str = ""
+
+    def panel(self) -> Panel:
+        """The gap over time, before and after what was found."""
+        before = in_time(self.time_s, self.gap_recalibrated, "gap, recalibrated", BEFORE)
+        after = in_time(self.time_s, self.gap_after, "with what was found", AFTER)
+        return Panel([before, after], "time [h]", f"{self.run} [deg/h]")

@@ -21,6 +21,7 @@ from fogml.models.compact import Compact
 from fogml.models.intervals import Intervals
 from fogml.runs.plausible import refuse_twice
 from fogml.runs.run import BoolArray, FloatArray, Run
+from fogml.signals.averages import block_averages
 
 GOOD, OUTSIDE, NOT_FULL = 0, 1, 2
 """Flags of a compensated sample."""
@@ -258,6 +259,40 @@ class DriftModel(BaseEstimator, ABC):
     def compensate(self, run: Run) -> Compensation:
         """Subtract the drift; flag what is outside the trained box or has no full window."""
         return compensation_of(run, self.evaluate(run))
+
+    def score(self, runs: Run | Sequence[Run], averaging_s: float = 100.0) -> float:
+        """R² of the drift on averages: the share of the error's variance that the model tells; 1 is all.
+
+        The error's mean is part of what is to be told, so that another offset lowers it. Greater is better,
+        as `GridSearchCV` and `cross_validate` expect; the noise of the averages keeps it below 1.
+
+        Parameters
+        ----------
+        runs
+            Runs the model was not fitted to.
+        averaging_s
+            Length of the averages [s].
+
+        Raises
+        ------
+        InputError
+            If a run lacks what the model needs, or no run fills one average.
+        """
+        pairs = []
+        for run in [runs] if isinstance(runs, Run) else runs:
+            means = block_averages(run.time, run.error_deg_h, self.predict(run), window_s=averaging_s)
+            pairs.append(np.array(means.values))
+        error, drift = np.concatenate(pairs, axis=1) if pairs else np.empty((2, 0))
+        if not len(error):
+            raise InputError(f"score: no run fills one average of {averaging_s:g} s")
+        spread = np.sum((error - error.mean()) ** 2)
+        return float(1.0 - np.sum((error - drift) ** 2) / spread) if spread > 0.0 else float("nan")
+
+    def __sklearn_tags__(self) -> Any:
+        tags = super().__sklearn_tags__()
+        tags.estimator_type = "regressor"
+        tags.target_tags.required = False
+        return tags
 
     def check_applies(self, run: Run, any_unit: bool = False) -> tuple[str, ...]:
         """Notes on using the model on a run.

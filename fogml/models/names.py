@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -159,11 +159,7 @@ def _understood(features: str) -> str:
 
 
 def _unknown(name: str) -> str:
-    from difflib import get_close_matches
-
-    near = get_close_matches(name, MODEL_NAMES, n=1)
-    hint = f"did you mean '{near[0]}'? " if near else ""
     return (
-        f"model '{name}' is not known; {hint}known are {', '.join(MODEL_NAMES)}, "
+        f"model '{name}' is not known; {did_you_mean(name, MODEL_NAMES)}known are {', '.join(MODEL_NAMES)}, "
         "or a scikit-learn regressor by its dotted name, e.g. sklearn.svm.SVR"
     )

@@ -10,14 +10,13 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Iterator, Mapping
-from difflib import get_close_matches
 from numbers import Integral, Real
 from typing import Any
 
 import numpy as np
 from sklearn.utils._param_validation import make_constraint
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, did_you_mean, quoted
 
 
 class WholeNumbers:
@@ -83,9 +82,7 @@ def check_parameters(kind: type, given: Mapping[str, Any], name: str | None = No
     constraints: Mapping[str, Any] = getattr(kind, "_parameter_constraints", {})
     for parameter, value in given.items():
         if parameter not in known:
-            near = get_close_matches(str(parameter), known, n=1)
-            hint = f"did you mean '{near[0]}'? " if near else ""
-            told = f"{hint}parameters are {', '.join(known)}"
+            told = f"{did_you_mean(str(parameter), known)}parameters are {', '.join(known)}"
             raise InputError(f"{name}: no parameter {quoted(str(parameter))}; {told}")
         allowed = constraints.get(parameter, "no_validation")
         accepted = [] if isinstance(allowed, str) else [_constraint(one) for one in allowed]

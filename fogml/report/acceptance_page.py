@@ -10,9 +10,9 @@ from markupsafe import Markup
 
 from fogml.report import style
 from fogml.report.page import Tile, render
-from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table
 from fogml.report.words import MISSING, listed, number, percent, plural, stated
+from fogml.static_svg import Curve, line_figure
 
 VERDICTS = {
     "accepted": ("met", "✓", "Accepted"),

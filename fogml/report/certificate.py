@@ -12,8 +12,6 @@ from markupsafe import Markup
 from fogml.intervals import Z90
 from fogml.report import style
 from fogml.report.page import render
-from fogml.report.reduce import drawn
-from fogml.report.static_svg import Curve, line_figure
 from fogml.report.style import time_unit
 from fogml.report.tables import Row, Table, reference_of
 from fogml.report.verdict import (
@@ -26,6 +24,8 @@ from fogml.report.verdict import (
     worst_run,
 )
 from fogml.report.words import averages, listed, number, percent, unit_of
+from fogml.signals.drawn import drawn
+from fogml.static_svg import Curve, line_figure
 from fogml.validation.advice import advice_on
 from fogml.validation.certified import held_constant, of_10_s, over_temperature
 from fogml.validation.results import Judgement, LimitOutcome, RunJudgement

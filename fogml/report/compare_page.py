@@ -11,12 +11,12 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, render
-from fogml.report.reduce import drawn, gap_starts
 from fogml.report.shading import segments_of, shade
 from fogml.report.style import log_axis, time_unit
 from fogml.report.tables import Row, Table
 from fogml.report.verdict import floor_told, own_noise, stated_limits, unseen, worst_run
 from fogml.report.words import MISSING, averages, listed, number, percent
+from fogml.signals.drawn import drawn, gap_starts
 from fogml.validation.results import Judgement, RunJudgement
 
 CHOOSER = "auto"

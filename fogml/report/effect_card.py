@@ -11,11 +11,11 @@ from markupsafe import Markup
 
 from fogml.report import style
 from fogml.report.page import render
-from fogml.report.reduce import min_max_indices
-from fogml.report.static_svg import Curve, line_figure
 from fogml.report.tables import Row, Table
 from fogml.report.words import number
 from fogml.runs.run import FloatArray
+from fogml.signals.drawn import min_max_indices
+from fogml.static_svg import Curve, line_figure
 from fogml.twin.pictures import RATE_DEGC, AllanCurve, Picture, RateCurve
 
 _POINTS = 600

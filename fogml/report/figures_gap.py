@@ -15,11 +15,11 @@ from fogml.gap.result_parts import GapSegment, HowFar, RunSeries, TemperatureExc
 from fogml.report import style
 from fogml.report.figures_judgement import STEADY_DEG_C_PER_MIN
 from fogml.report.page import Drawing
-from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.report.shading import regime_word, segments_of, shade
 from fogml.report.style import log_axis, time_unit
 from fogml.report.words import averages, listed, number, plural
 from fogml.runs.regimes import Regimes
+from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 
 _RECALIBRATED = style.BLUE
 _STAGES = (

@@ -12,10 +12,10 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing
-from fogml.report.reduce import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.report.shading import in_order, regime_word, segments_of, shade
 from fogml.report.style import log_axis, time_unit
 from fogml.report.words import averages, number, percent
+from fogml.signals.drawn import DRAWN_POINTS, drawn, gap_starts, min_max_indices
 from fogml.validation.results import AveragedSeries, RunJudgement
 
 STEADY_DEG_C_PER_MIN = 0.05

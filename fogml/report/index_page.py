@@ -13,10 +13,10 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, render
-from fogml.report.reduce import DRAWN_POINTS, min_max_indices
 from fogml.report.tables import Row, Table
 from fogml.report.verdict import advice_words, worst_run
 from fogml.report.words import MISSING, averages, listed, number
+from fogml.signals.drawn import DRAWN_POINTS, min_max_indices
 from fogml.validation.advice import advice_on
 from fogml.validation.results import AveragedSeries, Judgement
 

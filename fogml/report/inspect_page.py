@@ -13,7 +13,6 @@ from plotly.subplots import make_subplots
 
 from fogml.report import style
 from fogml.report.page import Drawing, Tile, render
-from fogml.report.reduce import drawn
 from fogml.report.shading import Segment, in_order, regime_word, shade
 from fogml.report.style import rounded_up, time_unit
 from fogml.report.tables import Noticed, Row, Table, noticed
@@ -22,6 +21,7 @@ from fogml.runs.regimes import regimes
 from fogml.runs.run import Run
 from fogml.signals import large
 from fogml.signals.averages import block_averages
+from fogml.signals.drawn import drawn
 from fogml.validation.inspection import inspection_json
 
 _REGIMES_LISTED = 40

@@ -12,7 +12,7 @@ from typing import Any
 from markupsafe import Markup
 
 import fogml
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.escaping import markup
 from fogml.report.page import render
 
@@ -70,13 +70,9 @@ def page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) ->
     InputError
         If there is no such page; names those there are.
     """
-    from difflib import get_close_matches
-
     names = page_names(folder)
     if name not in names:
-        near = get_close_matches(name, names, n=1)
-        hint = f"did you mean '{near[0]}'? " if near else ""
-        raise InputError(f"no page '{name}'; {hint}pages are {', '.join(names)}")
+        raise InputError(f"no page '{name}'; {did_you_mean(name, names)}pages are {', '.join(names)}")
     written = (folder / f"{name}.md").read_text(encoding="utf-8")
     plain = re.sub(r"^```\{[a-z-]+\}.*?^```\n", "", written, flags=re.MULTILINE | re.DOTALL)
     return plain + (made or {}).get(name, "")

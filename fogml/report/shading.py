@@ -8,8 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from numpy.typing import ArrayLike, NDArray
 
-from fogml.report.reduce import gap_starts
 from fogml.report.style import REGIME_TINTS, REGIME_WORDS
+from fogml.signals.drawn import gap_starts
 
 Segment = tuple[str, float, float]
 """Name of the regime, and where it starts and stops on the time axis."""

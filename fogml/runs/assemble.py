@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fogml.errors import InputError
 from fogml.runs.arrival_times import burst_ends, sampling_times
 from fogml.runs.clock_order import in_order
-from fogml.runs.columns import column_spec, conversion, parse_header
+from fogml.runs.columns import TIME_ON, column_spec, conversion, parse_header
 from fogml.runs.facts import Facts, read_side_file
 from fogml.runs.findings import Finding
 from fogml.runs.other_rate import on_gyro_rows
@@ -251,7 +251,7 @@ def _internal_columns(
             gyro_unit = "count"
         if name == "time":
             tick_s = factor
-        if column_spec(name) is None:
+        if column_spec(name) is None and name != TIME_ON:
             unknown.append(name)
     if axes := axes_of(columns):
         raise SeveralAxes(table.file, axes)
@@ -265,7 +265,7 @@ def _internal_columns(
             )
     notes = []
     if unknown:
-        message = f"kept and not used by models: {_listed(unknown)}"
+        message = f"kept, and used only by features that name it: {_listed(unknown)}"
         stated = dict(parse_header(cell) for cell in table.cells)
         if any(stated[name] in ("degC", "K") for name in unknown):
             message += "; a temperature is used once it is called T, T_in, T_out, T1 … or T_case"

@@ -43,6 +43,8 @@ _GYRO = {
 _SIMULATED = {unit: scale for unit, scale in _GYRO.items() if unit != "count"}
 REPLAYED = "replayed"
 """The column that a simulator's output stands in."""
+TIME_ON = "time_on"
+"""Time since power-on [s]: a column that a simulated run may hold, else from the fact ``powered_on``."""
 _TEMPERATURE = {"degC": (1.0, 0.0), "K": (1.0, -273.15)}
 _RATE = {"deg/s": (1.0, 0.0), "deg/h": (1.0 / 3600.0, 0.0), "rad/s": (_DEGREE_PER_RADIAN, 0.0)}
 _ANGLE = {"deg": (1.0, 0.0), "rad": (_DEGREE_PER_RADIAN, 0.0)}

@@ -17,6 +17,7 @@ from fogml.errors import InputError
 from fogml.runs.arrival_times import sampling_times
 from fogml.runs.columns import coil_sensor_number, is_temperature
 from fogml.runs.dropouts import RULE, DropoutRule, Reading, last_reading, read_thermometer
+from fogml.runs.exchange import Exchange
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding, first_of_all
 from fogml.runs.possible import as_vector, check_columns
@@ -28,7 +29,7 @@ BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class Run(Exchange):
     """One recording: columns of float64 in internal units, in time order, and facts.
 
     Columns are read-only; slices and stretches are views on the same memory.

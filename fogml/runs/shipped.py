@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.runs.findings import Finding
 from fogml.runs.logger_text import LoggerTable
 from fogml.runs.profile_schema import ImportProfile, load_profile
@@ -49,7 +49,8 @@ def shipped_run(name: str) -> Run:
         If no run of that name ships.
     """
     if name not in _index():
-        raise InputError(f"'{name}': no such recording ships; there are {', '.join(shipped_names())}")
+        hint = did_you_mean(name, shipped_names(), most=3)
+        raise InputError(f"'{name}': no such recording ships; {hint}there are {', '.join(shipped_names())}")
     return _runs(_index()[name])[name]
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import Effect
 from fogml.twin.noise import NoiseConstants, generator
 from fogml.twin.nominal import NAMES, NominalConstants
@@ -78,7 +78,8 @@ def moved(twin: Twin, name: str, by: float) -> Twin:
     """
     values = parameter_values(twin)
     if name not in values:
-        raise InputError(f"uncertainty: the twin has no parameter '{name}'; it has {', '.join(values)}")
+        hint = did_you_mean(name, values)
+        raise InputError(f"uncertainty: the twin has no parameter '{name}'; {hint}it has {', '.join(values)}")
     value = values[name] + by
     section, _, rest = name.partition(".")
     if section == "nominal":

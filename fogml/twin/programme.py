@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, did_you_mean, quoted
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.schedule import Schedule, schedule
 from fogml.twin.sentences import parse_action, parse_quantity, parse_step
@@ -141,7 +141,8 @@ def load_programme(source: str | Path | Mapping[str, Any] | Sequence[Any]) -> Pr
     path = PROGRAMME_FOLDER / f"{text}.yaml" if text in programme_names() else Path(text)
     if not path.is_file():
         raise InputError(
-            f"{text}: no such programme; give a YAML file or one of {', '.join(programme_names())}"
+            f"{text}: no such programme; {did_you_mean(text, programme_names())}give a YAML file or one of "
+            f"{', '.join(programme_names())}"
         )
     return programme_from(read_yaml(path), path.name)
 

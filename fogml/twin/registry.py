@@ -7,7 +7,6 @@ CamelCase; they are found by being there. Another package adds its effects by th
 
 from __future__ import annotations
 
-import difflib
 import pkgutil
 import re
 from collections.abc import Iterator
@@ -16,7 +15,7 @@ from importlib.metadata import entry_points
 from inspect import isabstract
 from typing import Any, TypeVar
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import STAGES, Effect
 from fogml.twin.quantities import Quantity
 
@@ -58,7 +57,8 @@ def effect(id: str) -> Effect:
     """
     _discover()
     if id not in _catalogue:
-        raise InputError(f"there is no effect '{id}'{_near(id)}; `fogml effects` lists them")
+        hint = did_you_mean(id, _catalogue, most=3)
+        raise InputError(f"there is no effect '{id}'; {hint}`fogml effects` lists them")
     return _catalogue[id]
 
 
@@ -148,9 +148,3 @@ def _add(declared: Any, origin: str) -> None:
     if declared.id in _catalogue:
         raise InputError(f"{origin}: there is an effect '{declared.id}' already; unregister it first")
     _catalogue[declared.id] = declared
-
-
-def _near(id: str) -> str:
-    near = difflib.get_close_matches(id, _catalogue, n=3, cutoff=0.5)
-    near += [name for name in _catalogue if id and id in name and name not in near][: 3 - len(near)]
-    return f"; did you mean {' or '.join(repr(name) for name in near)}?" if near else ""

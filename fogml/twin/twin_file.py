@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.outputs import whole_file
 from fogml.runs.columns import KNOWN, is_temperature
 from fogml.twin.draws import moved
@@ -44,7 +44,6 @@ from fogml.twin.twin_schema import (
     TWIN_FILE,
     Stated,
     message,
-    near,
 )
 from fogml.twin.uncertainty import Suspected, Uncertainty
 from fogml.yaml_text import read_yaml, yaml_text
@@ -73,7 +72,8 @@ def load_twin(source: str | Path | Mapping[str, Any]) -> Twin:
     text = str(source)
     path = TWIN_FOLDER / f"{text}.yaml" if text in twin_names() else Path(text)
     if not path.is_file():
-        raise InputError(f"{text}: no such twin; give a YAML file or one of {', '.join(twin_names())}")
+        hint = did_you_mean(text, twin_names())
+        raise InputError(f"{text}: no such twin; {hint}give a YAML file or one of {', '.join(twin_names())}")
     return twin_from(read_yaml(path), path.name)
 
 
@@ -261,7 +261,8 @@ def _setting(source: str, id: str, entry: Mapping[str, Stated], section: str = "
     for name, held in entry.items():
         if name not in known:
             raise InputError(
-                f"unknown key '{section}.{id}.{name}'{near(name, known)}; known keys are {', '.join(known)}"
+                f"unknown key '{section}.{id}.{name}'; {did_you_mean(name, known)}known keys are "
+                f"{', '.join(known)}"
             )
         values[name] = _value(source, f"{section}.{id}.{name}", held, known[name])
     amplitude, shape = declared.checked(values)

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
-from fogml.errors import quoted
+from fogml.errors import did_you_mean, quoted
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.optics import Winding
@@ -150,8 +149,8 @@ def message(error: ValidationError, source: str) -> str:
     key = ".".join(words) or "?"
     if first["type"] == "extra_forbidden":
         known = _known_keys(words[:-1])
-        hint = near(words[-1], known)
-        return f"{source}: unknown key {quoted(key)}{hint}; known keys are {', '.join(known)}"
+        hint = did_you_mean(words[-1], known)
+        return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
     if first["type"] == "missing":
         return f"{source}: nothing is given for '{key}'"
     reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
@@ -176,9 +175,3 @@ def _model_in(annotation: Any) -> Any:
         return annotation
     found = [_model_in(part) for part in getattr(annotation, "__args__", ())]
     return next((part for part in found if part is not None), None)
-
-
-def near(key: str, known: Iterable[str]) -> str:
-    """``; did you mean ...?`` where a known key looks like this one, else nothing."""
-    found = difflib.get_close_matches(key, list(known), n=1)
-    return f"; did you mean '{found[0]}'?" if found else ""

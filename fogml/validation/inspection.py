@@ -55,12 +55,20 @@ def _column(run: Run, name: str, values: FloatArray) -> dict[str, Any]:
     return {
         "name": name,
         "unit": unit,
-        "meaning": spec.meaning if spec else "not a column of the run format; kept, ignored by the models",
+        "meaning": spec.meaning
+        if spec
+        else "not a column of the run format; features that name it alone use it",
         "least": float(values.min()),
         "greatest": float(values.max()),
-        "mean": float(values.mean()),
+        "mean": _mean(values),
         "standard_deviation": large.standard_deviation(values),
     }
+
+
+def _mean(values: FloatArray) -> float:
+    """The mean, and 0 rather than what rounding leaves where values cancel."""
+    mean, largest = float(values.mean()), float(max(-values.min(), values.max()))
+    return 0.0 if abs(mean) <= np.finfo(np.float64).eps * largest else mean
 
 
 def _temperature(run: Run, name: str) -> dict[str, Any]:

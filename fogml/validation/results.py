@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.pictures import AFTER, BEFORE, Panel, Pictured, in_time
 from fogml.runs.facts import Facts
 from fogml.runs.findings import Finding
 
@@ -146,7 +147,7 @@ class LimitOutcome:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class Judgement(Pictured):
     """A model judged: what ``report.json`` says, and the series that its page draws."""
 
     model: dict[str, Any]  # kind, features, parameters, bytes, and what the model tells of itself
@@ -164,3 +165,20 @@ class Judgement:
         """Whether the design index and every stated limit are met."""
         stated = [*self.limits, *([self.design_index] if self.design_index else [])]
         return all(outcome.met for outcome in stated)
+
+    def _heading(self) -> Sequence[str]:
+        lines = [
+            f"{run.run}: rms {run.before.rms:.3g} → {run.after.rms:.3g} deg/h, noise floor {run.floor:.3g}"
+            for run in self.test
+        ]
+        return [f"{self.model['kind']}, judged on runs it was not trained on", *lines]
+
+    def _panels(self) -> Sequence[Panel]:
+        panels = []
+        for run in self.test:
+            series, order = run.series, np.argsort(run.series.time)
+            time, before, after = (x[order] for x in (series.time, series.before, series.after))
+            curves = [in_time(time, before, "before", BEFORE), in_time(time, after, "after", AFTER)]
+            if len(time):
+                panels.append(Panel(curves, "time [h]", f"{run.run} [deg/h]"))
+        return panels

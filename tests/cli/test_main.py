@@ -160,10 +160,10 @@ def test_help_loads_nothing_heavy():
 def test_an_unknown_command_names_the_nearest():
     result = runner.invoke(main.app, ["trian"])
     assert result.exit_code == 2
-    assert "Did you mean 'train'?" in result.stderr
+    assert "did you mean 'train'?" in result.stderr
     result = runner.invoke(main.app, ["sing"])
     assert result.exit_code == 2
-    assert "Commands are demo" in result.stderr
+    assert "commands are demo" in result.stderr
 
 
 def test_an_unknown_option_is_a_usage_error():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, number
 
 WAYS = [
     ["drift-observing", "26.25", "-1.234e-07", "1.909e-06", "1.348e-07", "0.5363"],
@@ -40,3 +40,11 @@ def test_a_table_without_names_has_no_head(capsys) -> None:
         ["weights", "72", "bytes"],
         [],
     ]
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [(None, "–"), (0.11182, "0.1118"), (79341.3, "79341"), (-3.602e5, "-360200"), (2.5e8, "2.5e+08")],
+)
+def test_seconds_of_a_day_have_no_exponent(value: float | None, told: str) -> None:
+    assert number(value) == told

@@ -9,6 +9,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+from fogml.report.static_svg import Curve, line_figure
 
 from experiments.results import html_page
 from fogml.benchmark.diagnosis_score import diagnosis_figures
@@ -22,7 +23,6 @@ from fogml.report.benchmark_page import benchmark_page
 from fogml.report.effect_card import catalogue_page, effect_page
 from fogml.report.manual import manual_folder, manual_page
 from fogml.report.plan_page import plan_page
-from fogml.report.static_svg import Curve, line_figure
 from fogml.report.sweep_page import sweep_page
 from fogml.runs.run import Run
 from fogml.twin.card import card_values

@@ -21,8 +21,8 @@ from fogml.report.index_page import loop_between
 from fogml.report.inspect_page import temperature_rates
 from fogml.report.page import Drawing
 from fogml.report.shading import segments_of, shade
-from fogml.report.static_svg import Curve, line_figure
 from fogml.runs.run import Run
+from fogml.static_svg import Curve, line_figure
 from tests.report.judgements import FLOOR, judged_run, judgement
 
 

@@ -15,10 +15,10 @@ import pytest
 from fogml.report import compare_page, index_page, inspect_page, noise_page, train_page
 from fogml.report.compare_page import ranked
 from fogml.report.page import Drawing, _Drawings
-from fogml.report.reduce import DRAWN_POINTS
 from fogml.report.words import number
 from fogml.runs.findings import Finding
 from fogml.runs.run import Run
+from fogml.signals.drawn import DRAWN_POINTS
 from tests.report.judgements import judged_run, judgement, linear_judgement
 from tests.report.pages import Page, every_page, noise_values, recorded_run
 

@@ -10,9 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fogml.report import words
-from fogml.report.static_svg import ticks
 from fogml.report.style import log_axis, rounded_up, time_unit
 from fogml.report.tables import Table, coefficients_table
+from fogml.static_svg import ticks
 
 
 @pytest.mark.parametrize(

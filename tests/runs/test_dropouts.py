@@ -110,3 +110,11 @@ def test_what_is_told_of_a_run_counts_no_dropout():
     assert next(c for c in told["columns"] if c["name"] == "T")["least"] == temperature["least"]
     still = Run("s.csv", {**columns, "T": np.where(np.isin(np.arange(ROWS), BAD), -127.0, 25.0)})
     assert moving_temperatures(still) == {}
+
+
+def test_a_mean_that_cancels_is_nothing_rather_than_rounding() -> None:
+    turns = np.tile([0.1, 0.3, -0.3, -0.1], 25)
+    assert turns.mean() != 0.0
+    run = Run.from_columns(time=np.arange(100.0), gyro=1.0 + turns, rate=turns)
+    told = {column["name"]: column["mean"] for column in inspection_json([run])["runs"][0]["columns"]}
+    assert told["rate"] == 0.0 and told["gyro"] == pytest.approx(1.0)

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 from fogml.gap.model import EffectValue
 from fogml.gap.planning.rehearsal import ExpectedRuns, Stage
 from fogml.intervals import Z90
@@ -115,7 +115,7 @@ def unknowns(on: Stage, names: Sequence[str]) -> Unknowns:
             own = [key.partition(".")[2] for key in known if key.startswith(f"{name.partition('.')[0]}.")]
             raise InputError(
                 f"--want {name}: effect '{name.partition('.')[0]}' has no such parameter; "
-                f"it has {', '.join(own)}"
+                f"{did_you_mean(name.partition('.')[2], own)}it has {', '.join(own)}"
             )
         wanted |= dict.fromkeys(places)
     return Unknowns(tuple(parameters), tuple(effects), tuple(sorted(wanted)))

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from fogml.report.reduce import drawn, gap_starts, min_max_indices
+from fogml.signals.drawn import drawn, gap_starts, min_max_indices
 
 VALUES = arrays(np.float64, st.integers(1, 3000), elements=st.floats(-1e6, 1e6))
 

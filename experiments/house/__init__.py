@@ -1,0 +1,1 @@
+"""What the house measures, beside what it measured before it was tidied."""

@@ -1,0 +1,152 @@
+"""The axes of a demonstration side by side: the loop in temperature, and what is left of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import plotly.graph_objects as go
+from numpy.typing import NDArray
+from plotly.subplots import make_subplots
+
+from fogml.report import style
+from fogml.report.page import Drawing
+from fogml.report.words import number
+from fogml.signals.drawn import DRAWN_POINTS, min_max_indices
+from fogml.validation.results import AveragedSeries, Judgement
+
+_BINS = 40
+_IN_BIN = 6
+_LEAST_IN_BIN = 3
+
+
+@dataclass(frozen=True)
+class Loop:
+    """How far two runs are apart at equal temperature [deg/h]."""
+
+    widest: float
+    at_deg_c: float
+    rms: float
+
+
+def loop_between(first: AveragedSeries, second: AveragedSeries) -> Loop | None:
+    """The distance of the drift of two runs at equal temperature, in bins of temperature.
+
+    A function of temperature alone has one value there, so at least half of the distance is
+    left in one of the runs whatever the function. None where they share no temperatures.
+    """
+    low = max(float(np.min(first.temperature)), float(np.min(second.temperature)))
+    high = min(float(np.max(first.temperature)), float(np.max(second.temperature)))
+    if not high > low:
+        return None
+    fewest = min(int(np.sum((t >= low) & (t <= high))) for t in (first.temperature, second.temperature))
+    edges = np.linspace(low, high, int(np.clip(fewest // _IN_BIN, 1, _BINS)) + 1)
+    means, counts = zip(*(_binned(series, edges) for series in (first, second)), strict=True)
+    shared = np.minimum(*counts) >= _LEAST_IN_BIN
+    if not shared.any():
+        return None
+    apart = np.abs(means[0] - means[1])[shared]
+    middle = 0.5 * (edges[1:] + edges[:-1])[shared]
+    widest = int(np.argmax(apart))
+    return Loop(float(apart[widest]), float(middle[widest]), float(np.sqrt(np.mean(apart**2))))
+
+
+def _binned(
+    series: AveragedSeries, edges: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    counts = np.histogram(series.temperature, edges)[0].astype(np.float64)
+    sums = np.histogram(series.temperature, edges, weights=series.before)[0]
+    return sums / np.maximum(counts, 1.0), counts
+
+
+def loops(judgements: Mapping[str, Judgement]) -> Drawing:
+    """Per axis, drift against temperature of training and test run, and what the model leaves."""
+    axes = list(judgements)
+    figure = make_subplots(
+        rows=2,
+        cols=len(axes),
+        shared_xaxes=True,
+        vertical_spacing=0.07,
+        horizontal_spacing=0.08,
+        column_titles=[f"axis {axis}" for axis in axes],
+    )
+    told = []
+    for column, (axis, judgement) in enumerate(judgements.items(), start=1):
+        train, test = judgement.train[0], judgement.test[0]
+        _points(figure, column, train.series, f"training: {train.run}", style.WARMING, "triangle-up")
+        _points(figure, column, test.series, f"test: {test.run}", style.COOLING, "triangle-down")
+        kept = min_max_indices(test.series.after, DRAWN_POINTS // 2)
+        model = (test.series.before - test.series.after)[kept]
+        _line(figure, 1, column, test.series.temperature[kept], model, "model on the test run", style.BLACK)
+        marker = {"color": style.AFTER, "symbol": "circle", "size": 4.5, "opacity": 0.8}
+        figure.add_trace(
+            go.Scatter(
+                x=test.series.temperature[kept],
+                y=test.series.after[kept],
+                mode="markers",
+                marker=marker,
+                name="left on the test run",
+                legendgroup="left",
+                showlegend=column == 1,
+            ),
+            row=2,
+            col=column,
+        )
+        for value in (test.floor, -test.floor):
+            figure.add_hline(y=value, row=2, col=column, line=style.FLOOR_LINE)
+        figure.update_xaxes(title_text="T [°C]", row=2, col=column)
+        loop = loop_between(train.series, test.series)
+        if loop is not None:
+            told.append(f"axis {axis} up to {number(loop.widest)} deg/h, at {number(loop.at_deg_c)} °C")
+    figure.add_trace(style.floor_in_legend(), row=2, col=1)
+    figure.update_yaxes(title_text="drift [deg/h]", row=1, col=1)
+    figure.update_yaxes(title_text="left [deg/h]", row=2, col=1)
+    style.styled(figure, 620, legend={"y": 1.06}, margin={"t": 78})
+    distance = f" At equal temperature the two runs differ: {'; '.join(told)}." if told else ""
+    bound = (
+        " A curve in T alone has one value at each temperature: whatever its degree, it leaves at least "
+        "half of that distance in one of the runs."
+    )
+    return Drawing(
+        figure,
+        alt=f"Drift against temperature for {len(axes)} axes, training and test run.{distance}",
+        caption=(
+            f"Top: drift against temperature.{distance}{bound if told else ''} "
+            "Bottom, on its own scale: what the model leaves; dashed, the noise floor."
+        ),
+    )
+
+
+def _points(
+    figure: go.Figure, column: int, series: AveragedSeries, name: str, colour: str, symbol: str
+) -> None:
+    kept = min_max_indices(series.before, DRAWN_POINTS // 2)
+    figure.add_trace(
+        go.Scatter(
+            x=series.temperature[kept],
+            y=series.before[kept],
+            mode="markers",
+            marker={"color": colour, "symbol": symbol, "size": 4.5, "opacity": 0.7},
+            name=name.split(":")[0] + " run",
+            hovertext=name,
+            legendgroup=name.split(":")[0],
+            showlegend=column == 1,
+        ),
+        row=1,
+        col=column,
+    )
+
+
+def _line(
+    figure: go.Figure,
+    row: int,
+    column: int,
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    name: str,
+    colour: str,
+) -> None:
+    line = {"color": colour, "width": 1.8}
+    trace = go.Scatter(x=x, y=y, mode="lines", line=line, name=name, legendgroup=name, showlegend=column == 1)
+    figure.add_trace(trace, row=row, col=column)

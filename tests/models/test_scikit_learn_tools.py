@@ -1,0 +1,64 @@
+"""Drift models and bare regressors in scikit-learn's own tools, without a scorer of one's own."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+import sklearn
+from sklearn.base import is_regressor
+from sklearn.model_selection import GridSearchCV, KFold, LeaveOneGroupOut, cross_validate
+
+from fogml.errors import InputError
+from fogml.models.linear import LinearRegressor
+from fogml.models.names import make_model
+from fogml.runs.run import Run
+
+TIME = np.arange(0.0, 7200.0, 4.0)
+
+
+def run(seed: int, curved: float = 0.01) -> Run:
+    noise = np.random.default_rng(seed).normal(0.0, 1.0, TIME.size)
+    temperature = 30.0 - 25.0 * np.cos(2 * np.pi * TIME / 7200.0 + 0.3 * seed)
+    drift = 2.0 + 0.1 * temperature + curved * temperature**2
+    return Run.from_columns(f"{seed}.csv", time=TIME, gyro=drift + noise, T=temperature)
+
+
+def test_the_score_is_the_share_of_the_variance_that_is_told() -> None:
+    model, other = make_model("polynomial", "T^1..2").fit(run(0)), run(1)
+    # 100 s averages of noise of 1 deg/h each 4 s have a variance of 1/25.
+    spread = np.var(other.gyro) - 1.0
+    assert is_regressor(model)
+    assert model.score(other) == pytest.approx(1.0 - (1 / 25) / (spread + 1 / 25), abs=2e-3)
+    assert make_model("mean").fit(run(0)).score(run(0)) == pytest.approx(0.0, abs=1e-3)
+    assert model.score([other, run(2)]) < 1.0 and model.score(other, 4.0) < model.score(other)
+    with pytest.raises(InputError, match="no run fills one average of 100000 s"):
+        model.score(other, 1e5)
+
+
+def test_a_grid_search_over_runs_finds_the_form() -> None:
+    runs = [run(seed) for seed in range(4)]
+    search = GridSearchCV(make_model("polynomial"), {"features": ["T", "T^1..2"]}, cv=KFold(2)).fit(runs)
+    assert search.best_params_ == {"features": "T^1..2"}
+    assert search.best_estimator_.score(run(9)) > 0.9
+
+
+def test_runs_of_a_group_stay_together() -> None:
+    # The second unit curves the other way: each judges the other badly.
+    runs = [run(0), run(1), run(2, -0.01), run(3, -0.01)]
+    model = make_model("polynomial", "T^1..2")
+    told = cross_validate(model, runs, cv=LeaveOneGroupOut(), groups=[0, 0, 1, 1])["test_score"]
+    assert told.shape == (2,) and np.all(told < 0.0)
+
+
+def test_a_regressor_takes_frames_and_routed_folds() -> None:
+    rows = np.arange(60.0)
+    frame = pd.DataFrame({"T": np.sin(rows), "dT": np.cos(rows)})
+    values = pd.Series(3.0 * frame["T"] - frame["dT"])
+    fitted = LinearRegressor().fit(frame, values)
+    assert list(fitted.feature_names_in_) == ["T", "dT"]
+    assert fitted.score(frame, values) == pytest.approx(1.0)
+    with sklearn.config_context(enable_metadata_routing=True):
+        asked = LinearRegressor("auto").set_fit_request(folds=True)
+        folds = {"folds": np.arange(60) // 12}
+        assert cross_validate(asked, frame, values, params=folds)["test_score"] == pytest.approx(1.0)

@@ -1,0 +1,88 @@
+"""Runs as pandas frames, pickled and shown, with nothing lost on the way."""
+
+from __future__ import annotations
+
+import pickle
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from fogml.errors import InputError
+from fogml.runs.facts import Facts
+from fogml.runs.run import Run
+
+TIME = np.arange(600.0)
+
+
+def run() -> Run:
+    facts = Facts(unit="F-1", axis="x")
+    return Run.from_columns(
+        "a.csv", facts, time=TIME, gyro=np.sin(TIME), T_in=20.0 + TIME / 100.0, dial=TIME % 7
+    )
+
+
+def test_a_run_comes_back_from_its_frame() -> None:
+    frame = run().to_pandas()
+    assert list(frame) == ["time [s]", "gyro [deg/h]", "T_in [degC]", "dial"]
+    back = Run.from_pandas(frame, "a.csv", run().facts)
+    assert back.hash == run().hash and back.facts == run().facts
+    frame.iloc[0, 1] = 99.0
+    assert run().gyro[0] == 0.0
+
+
+def test_units_of_a_frame_are_converted() -> None:
+    frame = pd.DataFrame({"gyro [deg/s]": [1.0, 2.0], "T [K]": [273.15, 283.15]}, index=[0.0, 0.5])
+    made = Run.from_pandas(frame)
+    np.testing.assert_allclose(made.gyro, [3600.0, 7200.0])
+    np.testing.assert_allclose(made.columns["T"], [0.0, 10.0])
+    np.testing.assert_allclose(made.time, [0.0, 0.5])
+    assert Run.from_pandas(pd.DataFrame({"time": [0, 1], "gyro [count]": [5, 6]})).gyro_unit == "count"
+
+
+@pytest.mark.parametrize(
+    "index", [pd.date_range("2026-01-01", periods=3, freq="500ms"), pd.to_timedelta([0, 0.5, 1], "s")]
+)
+def test_an_index_of_times_is_the_time(index: pd.Index) -> None:
+    made = Run.from_pandas(pd.DataFrame({"gyro": [1.0, 2.0, 3.0]}, index=index))
+    np.testing.assert_allclose(made.time, [0.0, 0.5, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("columns", "told"),
+    [
+        ({"gyro [furlong]": [1.0, 2.0]}, "column 'gyro' has unit 'furlong', not accepted"),
+        ({"gyro": [1.0, 2.0], "gyro [deg/s]": [1.0, 2.0]}, "column 'gyro' is there twice"),
+        ({"T": [1.0, 2.0]}, "no column 'gyro'"),
+        ({"gyro": ["a", "b"]}, "gyro"),
+        ({"time": [0.0, 0.0], "gyro": [1.0, 2.0]}, "time"),
+    ],
+)
+def test_a_frame_that_is_no_run_is_refused(columns: dict, told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        Run.from_pandas(pd.DataFrame(columns))
+
+
+def test_a_pickled_run_is_the_run() -> None:
+    first = run()
+    assert first.clock is not None and first.temperature().size  # worked out, and not to be kept
+    data = pickle.dumps(first)
+    back = pickle.loads(data)
+    assert back.hash == first.hash and back.facts == first.facts and back.name == first.name
+    assert len(data) < 1.2 * 8 * 4 * len(TIME)
+    with pytest.raises(ValueError, match="read-only"):
+        back.gyro[0] = 1.0
+    assert len(pickle.loads(pickle.dumps(first[:100]))) == 100
+
+
+def test_a_run_shows_itself() -> None:
+    named = Run.from_columns("<b>a</b>", time=TIME, gyro=np.sin(TIME), T=TIME / 100.0)
+    page = ElementTree.fromstring(named._repr_html_().replace("<br>", "<br/>"))
+    assert "<b>a</b>" in "".join(page.itertext())
+    assert len(page.findall(".//{http://www.w3.org/2000/svg}svg")) == 2
+    figure = named.plot()
+    assert [trace.name for trace in figure.data] == ["gyro", "T"]
+    assert max(figure.data[1].y) == pytest.approx(5.99)
+    assert "<b>" not in figure.layout.title.text
+    assert len(run()[:0]._repr_html_()) > 0 and not run()[:0].plot().data
