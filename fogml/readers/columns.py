@@ -82,11 +82,6 @@ class Container:
         """A field of a table, or the rows of a plain one, with what turns the values into numbers."""
         self.add(group, name, unit, Column(rows.count, lambda a, b: change(rows.read(field, a, b))))
 
-    def add_values(self, group: str, name: str, unit: str | None, values: Any) -> None:
-        """A column that is held."""
-        held = np.asarray(values)
-        self.add(group, name, unit, Column(len(held), lambda start, stop: held[start:stop]))
-
     def close(self) -> None:
         """Let go of what is open."""
         self.arrays.clear()

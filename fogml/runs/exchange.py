@@ -59,10 +59,9 @@ class Exchange(Pictured):
                 unit_of_gyro = "count"
             columns[column] = values
         if "time" not in columns:
-            index = frame.index
-            if index.dtype.kind == "m":
-                index = index / np.timedelta64(1, "s")
-            columns = {"time": index.to_numpy(), **columns}
+            index = frame.index.to_numpy()
+            seconds = index / np.timedelta64(1, "s") if index.dtype.kind == "m" else index
+            columns = {"time": seconds, **columns}
         return cls(name, columns, facts or Facts(), unit_of_gyro)  # type: ignore[call-arg]
 
     def to_pandas(self) -> pd.DataFrame:
