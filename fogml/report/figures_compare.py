@@ -9,9 +9,9 @@ import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
 from fogml.report import style
-from fogml.report.axes import log_axis, time_unit
 from fogml.report.page import Drawing
 from fogml.report.shading import segments_of, shade
+from fogml.report.style import log_axis, time_unit
 from fogml.report.words import averages, listed, number
 from fogml.signals.drawn import drawn, gap_starts
 from fogml.validation.results import Judgement, RunJudgement

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from plotly.subplots import make_subplots
 
 from fogml.report import style
-from fogml.report.axes import rounded_up, time_unit
 from fogml.report.page import Drawing
 from fogml.report.shading import Segment, regime_word, shade
+from fogml.report.style import rounded_up, time_unit
 from fogml.report.words import duration, listed, number, plural
 from fogml.runs.regimes import regimes
 from fogml.runs.run import Run

@@ -25,6 +25,7 @@ from fogml.report.manual import manual_folder, manual_page
 from fogml.report.plan_page import plan_page
 from fogml.report.sweep_page import sweep_page
 from fogml.runs.run import Run
+from fogml.static_svg import Curve, line_figure
 from fogml.twin.card import card_values
 from fogml.twin.pictures import allan_curve, pictures, rate_curves
 from fogml.twin.registry import effects
