@@ -9,7 +9,6 @@ import json
 from pathlib import Path
 
 import numpy as np
-from fogml.report.static_svg import Curve, line_figure
 
 from experiments.results import html_page
 from fogml.benchmark.diagnosis_score import diagnosis_figures
