@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.blind.frame.reality import Reality
 from fogml.blind.truth import KINDS, Kind
-from fogml.errors import InputError
+from fogml.errors import InputError, did_you_mean
 
 FIRST = "first"
 """What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
@@ -39,8 +39,9 @@ def chosen(name: str) -> tuple[str, ...]:
     if name == MIX:
         return REALITIES
     if name not in (*REALITIES, SAME_TWIN):
-        choices = ", ".join((*REALITIES, MIX, SAME_TWIN))
-        raise InputError(f"there is no reality '{name}'; choose one of {choices}")
+        choices = (*REALITIES, MIX, SAME_TWIN)
+        hint = did_you_mean(name, choices)
+        raise InputError(f"there is no reality '{name}'; {hint}choose one of {', '.join(choices)}")
     return (name,)
 
 
