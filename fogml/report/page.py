@@ -115,8 +115,14 @@ def _environment() -> Environment:
     environment.filters["stated"] = words.stated
     environment.filters["percent"] = words.percent
     environment.filters["plural"] = words.plural
+    environment.filters["breakable"] = _breakable
     environment.globals["label"] = words.label
     return environment
+
+
+def _breakable(cell: object) -> Markup:
+    """A cell's text; names such as effects' may break after an underscore rather than within a word."""
+    return Markup(str(markup(cell)).replace("_", "_<wbr>"))
 
 
 def template_text(name: str) -> Markup:

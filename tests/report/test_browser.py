@@ -125,14 +125,14 @@ def test_what_is_cut_or_covered_would_be_noticed(browser) -> None:
 def test_headings_sort_and_names_lead_to_the_units_pages(browser) -> None:
     opened = browser(pages()["batch"])
     first = opened.tell(
-        'var head = document.querySelectorAll(".sortable th button")[2]; head.click(); head.click();'
+        'var head = document.querySelectorAll(".sortable th [role=button]")[2]; head.click(); head.click();'
         'document.querySelector(".sortable tbody td.figure").textContent'
     )
     assert first == f"{number(max(batch_biases(), key=abs))} ✗"
     opened.close()
     opened = browser(pages()["fleet"])
     links = opened.tell(
-        'document.querySelectorAll(".sortable th button")[4].click();'
+        'document.querySelectorAll(".sortable th [role=button]")[4].click();'
         'Array.from(document.querySelectorAll(".sortable tbody tr")).slice(0, 200).map(function (row) {'
         ' var a = row.querySelector("a"); return a ? a.getAttribute("href") : ""; })'
     )
