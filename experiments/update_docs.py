@@ -16,6 +16,7 @@ SECTIONS = {
     "thermal-cycle-short": ("thermal_cycle/results.md", "## In short"),
     "cold-start": ("cold_start/results.md", "# A real cold start"),
     "leakage": ("leakage/results.md", "# What a random split promises"),
+    "diagnosis-peers": ("diagnosis_peers/results.md", "# Ways to diagnose"),
     "compensation-peers": ("compensation_peers/results.md", "# Models of others"),
     "compensation-variance": ("compensation_peers/results.md", "## What explains the outcome"),
     "strata": ("strata/results.md", "# `auto` beside a fit"),

@@ -22,7 +22,7 @@ from tests.cli.conftest import csv_text
 from tests.fleet.units import write_fleet
 
 FLEET = ("--model", "polynomial", "--features", "T", "--averaging", "40", "--workers", "1", "--quiet")
-UNIT_KIB = 4800
+UNIT_KIB = 1570
 """What a unit's results take, nearly all of it the page's."""
 
 
