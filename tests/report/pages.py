@@ -24,7 +24,7 @@ from fogml.runs.run import Run
 from tests.report.diagnoses import diagnosis, with_courses
 from tests.report.judgements import judgement
 
-VOID = {"meta", "link", "br", "img", "hr", "input", "path", "rect"}
+VOID = {"meta", "link", "br", "wbr", "img", "hr", "input", "path", "rect"}
 
 
 def noise_values(*, moving: bool = False) -> dict[str, Any]:
