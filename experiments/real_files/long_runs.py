@@ -1,11 +1,15 @@
-"""What commands take on a long run: ``python -m experiments.real_files.long_runs [HOURS]``.
+"""What commands take on a long run: ``python -m experiments.real_files.long_runs [HOURS] [--limit GB]``.
 
 Writes a synthetic run at 400 Hz (white noise, a thermal cycle) as Parquet and CSV where temporary files lie,
-and prints the most resident memory and the processor time of each command in a process of its own.
+and prints the most resident memory and the processor time of each command in a process of its own. With a
+limit all that follows the writing runs in a control group of so much memory, pages of files among it (root,
+version 1): what does not fit is killed.
 """
 
 from __future__ import annotations
 
+import argparse
+import os
 import resource
 import subprocess
 import sys
@@ -47,13 +51,29 @@ def measured(*arguments: str) -> tuple[float, float]:
     return after.ru_maxrss * 1024 / 1e9, spent
 
 
-def main(hours: float) -> None:
+GROUP = Path("/sys/fs/cgroup/memory/fogml-long-runs")
+
+
+def limit_to(memory_gb: float) -> None:
+    """Put this process, and those that it starts, into a control group of so much memory."""
+    GROUP.mkdir(exist_ok=True)
+    (GROUP / "memory.limit_in_bytes").write_text(str(round(1e9 * memory_gb)))
+    (GROUP / "cgroup.procs").write_text(str(os.getpid()))
+
+
+def main() -> None:
     """Write, measure, print: memory of the commands so far, the most of them."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("hours", type=float, nargs="?", default=24.0, help="length of the run (24)")
+    parser.add_argument("--limit", type=float, metavar="GB", help="memory that there is")
+    given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         (folder / "profile.yaml").write_text(PROFILE)
         for suffix in ("csv", "parquet"):
-            write(folder / f"run.{suffix}", hours)
+            write(folder / f"run.{suffix}", given.hours)
+        if given.limit is not None:
+            limit_to(given.limit)
         run = str(folder / "run.parquet")
         profile = ("--profile", str(folder / "profile.yaml"))
         commands = {
@@ -67,4 +87,4 @@ def main(hours: float) -> None:
 
 
 if __name__ == "__main__":
-    main(float(sys.argv[1]) if len(sys.argv) > 1 else 24.0)
+    main()
