@@ -127,7 +127,7 @@ class FolderStore(Store):
                     "fogml monitor: choose another --store, and give the runs again"
                 )
             rows = max((max(array.shape) for array in stored.arrays), default=0)
-            columns: dict[str, Any] = {name: stored.marks(arrays[name]).tolist() for name in TEXTS}
+            columns: dict[str, Any] = {name: stored.marks(arrays[name], most=rows).tolist() for name in TEXTS}
             columns |= {name: stored.read(arrays[name], 0, rows).tolist() for name in NUMBERS}
         return [
             RunRecord(**dict(zip(columns, row, strict=True))) for row in zip(*columns.values(), strict=True)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.readers.stored import MOST_NAMES, Refused, text_of
+from fogml.readers.stored import Refused, text_of
 
 _BUFFER_BYTES = 1 << 20  # read at once from a column's chunk
 _BATCH_ROWS = 1 << 16
@@ -105,8 +105,8 @@ class ParquetColumn:
             at += len(piece)
         return found
 
-    def marks(self) -> tuple[list[str], np.ndarray[Any, Any]]:
-        """The different texts of a column of marks, and the place of each row's among them."""
+    def marks(self, most: int) -> tuple[list[str], np.ndarray[Any, Any]]:
+        """The different texts of a column, at most so many, and the place of each row's among them."""
         found: dict[str, int] = {}
         codes = np.empty(self.shape[0])
         at = 0
@@ -114,6 +114,6 @@ class ParquetColumn:
             for value in piece.to_pylist():
                 codes[at] = found.setdefault(text_of(value)[:_LONGEST_MARK], len(found))
                 at += 1
-            if len(found) > MOST_NAMES:
-                raise Refused(f"more than {MOST_NAMES} different marks")
+            if len(found) > most:
+                raise Refused(f"more than {most} different marks")
         return list(found), codes

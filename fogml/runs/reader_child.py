@@ -86,7 +86,7 @@ def answer(request: dict[str, Any], files: dict[int, Any]) -> tuple[dict[str, An
         part = array.text(request["start"], request["stop"])
         return {"count": len(part), "names": names}, part.data
     if request["do"] == "marks":
-        names, found = array.marks()
+        names, found = array.marks(request["most"])
     else:
         found = reader("fogml.readers.stored:samples", "numpy")(array, request["start"], request["stop"])
     return {"count": len(found), "names": names}, found.data.cast("B") if len(found) else b""

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from fogml.errors import InputError, printable
 from fogml.readers import extra_hint, reader_of
+from fogml.readers.stored import MOST_NAMES
 from fogml.runs.reading_limits import DEFAULT_LIMITS, ReadingLimits
 
 __all__ = [
@@ -87,8 +88,8 @@ class StoredFile:
         self.ask({"do": "read", "array": array.index, "start": start, "stop": stop}, values)
         return values
 
-    def marks(self, array: StoredArray) -> NDArray[np.str_]:
-        """The texts of a column of marks, shape (n,).
+    def marks(self, array: StoredArray, most: int = MOST_NAMES) -> NDArray[np.str_]:
+        """The texts of a column of marks, shape (n,), of which at most so many differ.
 
         Raises
         ------
@@ -96,7 +97,7 @@ class StoredFile:
             If the file is damaged there.
         """
         codes = np.empty(max(array.shape), dtype=np.float64)
-        names = self.ask({"do": "marks", "array": array.index}, codes)["names"]
+        names = self.ask({"do": "marks", "array": array.index, "most": most}, codes)["names"]
         return np.array(names, dtype=np.str_)[codes.astype(np.intp)] if len(codes) else np.empty(0, np.str_)
 
     def text(self, array: StoredArray, block: int = 1 << 20) -> Iterator[bytes]:

@@ -80,6 +80,15 @@ def test_many_stations_write_at_once(tmp_path, kind):
     same(open_store(place).records(), others(10))
 
 
+@pytest.mark.parametrize("kind", [0, 1])
+def test_a_store_holds_the_runs_of_years(tmp_path, kind):
+    """Every run has a key and a name of its own: more than a run file may have different marks."""
+    place = places(tmp_path)[kind]
+    assert open_store(place).add(others(12_000)) == 12_000
+    assert open_store(place).add([*others(1), replace(RECORD, key="b" * 64)]) == 1
+    assert len(open_store(place).records()) == 12_001
+
+
 def test_a_database_of_several_stations(database):  # noqa: F811
     first, second = open_store(database), open_store(database)
     assert first.add(others(3)) == 3
