@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fogml.benchmark.rounds import RoundDesign
+from fogml.benchmark.design import RoundDesign
 from fogml.blind.folders import BlindFolder, case_files
 from fogml.blind.make import make_cases
 from fogml.blind.plan import MIX

@@ -11,14 +11,13 @@ from pathlib import Path
 from typing import Any
 
 import fogml
+from fogml.benchmark.design import DESIGN, RoundDesign
 from fogml.benchmark.drift_cases import DriftCase, real_cases, synthetic_cases, write_case
 from fogml.benchmark.rounds import (
-    DESIGN,
     RULES,
     SCHEMA,
     SEED,
     TRACKS,
-    RoundDesign,
     Track,
     TrackFolder,
     commitment,

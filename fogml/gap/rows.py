@@ -28,7 +28,7 @@ from fogml.twin.nominal import (
 
 READ_GROUPS = (("T", "T_in"), ("T_out",))
 """Temperatures that drive the model, by the sensors that err together."""
-READ = ("T", "T_in", "T_out")
+READ = tuple(name for group in READ_GROUPS for name in group)
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from experiments.results import html_page
+from fogml.benchmark.design import DESIGN
 from fogml.benchmark.diagnosis_score import diagnosis_figures
 from fogml.benchmark.drift_score import DriftMark, drift_figures
-from fogml.benchmark.rounds import DESIGN, RULES
+from fogml.benchmark.rounds import RULES
 from fogml.blind.scoring.values import score_values
 from fogml.cli.options_page import options_page
 from fogml.report import blind_page
