@@ -17,7 +17,7 @@ from experiments.benchmarks.needs import needs
 FloatArray = NDArray[np.float64]
 Deviations = tuple[FloatArray, FloatArray]
 _QUICK = 50_000
-LEAST_RATIO = 8.0
+LEAST_RATIO = 10.0
 
 
 def _allantools(x: FloatArray, taus: FloatArray | None) -> Deviations:

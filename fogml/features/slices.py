@@ -111,7 +111,8 @@ class Slices:
         empty = np.full((len(of), SLICES), np.inf)
         slices = cls(level, first, width, of, less, empty, -empty)
         place, inputs = slices._placed(values)
-        order = np.argsort(place, kind="stable")
+        # Of small numbers a stable sort is a radix sort.
+        order = np.argsort(place.astype(np.uint8), kind="stable")
         filled, starts = np.unique(place[order], return_index=True)
         for column, value in enumerate(inputs.T):
             slices.low[column, filled] = np.minimum.reduceat(value[order], starts)

@@ -84,13 +84,18 @@ def trained_limits(
     step = rate = 0.0
     for run in runs:
         sensors = dict.fromkeys(s for name in names if is_temperature(name) for s in run.sensors(name))
+        whole: _Averaging | None = None
         for sensor in sensors:
             values, bad = run.temperature(sensor), run.dropouts(sensor)
-            good = slice(None) if bad is None else ~bad
-            fastest = min(_fastest(run.time[good], values[good], settings.averaging_s), RULE.rate_degC_s)
-            apart, moved = np.diff(run.time[good]), np.abs(np.diff(values[good]))
+            if bad is None:
+                whole = whole or _Averaging.of(run.time, settings.averaging_s)
+                averaging = whole
+            else:
+                values, averaging = values[~bad], _Averaging.of(run.time[~bad], settings.averaging_s)
+            fastest = min(averaging.fastest(values), RULE.rate_degC_s)
             rate = max(rate, fastest)
-            step = max(step, float((moved - fastest * apart).max(initial=0.0)))
+            moved = np.abs(np.diff(values)) - fastest * averaging.apart
+            step = max(step, float(moved.max(initial=0.0)))
     # A thermometer that was noisier than any other in training may be so later on.
     most = RULE.jump_degC if step <= RULE.jump_degC else settings.step_margin * step
     return DropoutRule(
@@ -100,11 +105,26 @@ def trained_limits(
     )
 
 
-def _fastest(time: FloatArray, values: FloatArray, averaging_s: float) -> float:
-    """Fastest rate of averages that follow each other [degC/s]."""
-    if len(time) < 2:
-        return 0.0
-    starts = np.flatnonzero(np.diff((time - time[0]) // averaging_s, prepend=-1.0))
-    counts = np.diff(np.append(starts, len(time)))
-    middle, mean = np.add.reduceat(time, starts) / counts, np.add.reduceat(values, starts) / counts
-    return float(np.max(np.abs(np.diff(mean)) / np.diff(middle), initial=0.0))
+@dataclass(frozen=True, eq=False)
+class _Averaging:
+    """Averages of a run's rows: where each begins, how many rows it has, its mean time; time between rows [s]."""
+
+    starts: NDArray[np.intp]
+    counts: NDArray[np.intp]
+    middle_s: FloatArray
+    apart: FloatArray
+
+    @classmethod
+    def of(cls, time: FloatArray, averaging_s: float) -> _Averaging:
+        if len(time) == 0:
+            return cls(np.empty(0, np.intp), np.empty(0, np.intp), np.empty(0), np.empty(0))
+        starts = np.flatnonzero(np.diff((time - time[0]) // averaging_s, prepend=-1.0))
+        counts = np.diff(np.append(starts, len(time)))
+        return cls(starts, counts, np.add.reduceat(time, starts) / counts, np.diff(time))
+
+    def fastest(self, values: FloatArray) -> float:
+        """Fastest rate of averages that follow each other [degC/s]."""
+        if len(values) < 2:
+            return 0.0
+        means = np.add.reduceat(values, self.starts) / self.counts
+        return float(np.max(np.abs(np.diff(means)) / np.diff(self.middle_s), initial=0.0))

@@ -30,8 +30,8 @@ _DIGIT = 16
 _shown: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
-def empty(samples: int, kind: Any = np.float64) -> NDArray[Any]:
-    """An array to fill; of many samples one in a file of no name.
+def empty(samples: int, kind: Any = np.float64, held: int | None = None) -> NDArray[Any]:
+    """An array to fill; of more than `held` samples, or `HELD_VALUES`, one in a file of no name.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def empty(samples: int, kind: Any = np.float64) -> NDArray[Any]:
         If that file does not fit where temporary files lie.
     """
     size = samples * np.dtype(kind).itemsize
-    if samples <= HELD_VALUES:
+    if samples <= (HELD_VALUES if held is None else held):
         return np.empty(samples, kind)
     with tempfile.TemporaryFile(prefix="fogml-") as file:
         _reserve(file, size)
