@@ -55,7 +55,8 @@ def _work(rate: Callable[[FloatArray], FloatArray], samples: int, quick: bool, f
 
     def check(a: FloatArray, b: FloatArray) -> str:
         full = slice(2 * _WINDOW, None)
-        np.testing.assert_allclose(a[full], b[full], atol=1e-7)
+        # The plain way's cumulative sums lose digits as they grow.
+        np.testing.assert_allclose(a[full], b[full], atol=max(1e-7, 1e-13 * len(a)))
         return f"{a.shape[1]} columns to {np.max(np.abs(a[full] - b[full])):.0e}"
 
     return Work(ours, plain, check)

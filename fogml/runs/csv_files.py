@@ -21,8 +21,10 @@ from fogml.runs.stamps import StampClock
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
-_STREAM_BYTES = 1 << 20
-"""Arrow reads tens of these ahead, so that larger ones would hold whole files."""
+_PART_BYTES = 1 << 23
+"""Of a long file, parsed at once and then let go: some 100,000 rows."""
+_BLOCK_BYTES = 1 << 20
+"""What one core parses of it."""
 
 
 def read_csv(path: Path, *, repair: bool) -> RawTable:
@@ -41,7 +43,7 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
     dialect, notes = without_footer(csv_dialect(path))
     try:
         _check_quotes(dialect)
-        table = arrow_csv.read_csv(_opened(dialect), **_options(dialect))
+        table = arrow_csv.read_csv(_opened(dialect), **_options(dialect, dialect.skipped_lines))
         clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
         whole = _raw(path, dialect, table, 0, clock)
     except OSError as error:
@@ -74,7 +76,6 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
         Naming line and column of the first fault.
     """
     import pyarrow as arrow
-    from pyarrow import csv as arrow_csv
 
     dialect, notes = without_footer(csv_dialect(path).only(columns))
     notes = [*_doubts(dialect), *(notes or note_of_end(dialect.source))]
@@ -84,11 +85,10 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
     try:
         _check_quotes(dialect)
-        with arrow_csv.open_csv(_opened(dialect), **_options(dialect, _STREAM_BYTES)) as reader:
-            for table in _regrouped(reader, rows):
-                raw = _raw(path, dialect, table, start, clock)
-                start += table.num_rows
-                yield raw if start > table.num_rows else raw.noting(notes)
+        for table in _regrouped(_batches(dialect), rows):
+            raw = _raw(path, dialect, table, start, clock)
+            start += table.num_rows
+            yield raw if start > table.num_rows else raw.noting(notes)
     except OSError as error:
         raise _unreadable(path, error) from None
     except arrow.ArrowException:
@@ -118,6 +118,33 @@ def _check_quotes(dialect: CsvDialect) -> None:
         raise arrow.ArrowInvalid("quotation marks")
 
 
+def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
+    """A table by parts of whole lines, each parsed on all cores: Arrow's reader of streams has one."""
+    import pyarrow as arrow
+    from pyarrow import csv as arrow_csv
+
+    rest, skipped = b"", dialect.skipped_lines
+
+    def parsed(part: bytes) -> list[RecordBatch]:
+        options = _options(dialect, skipped, _BLOCK_BYTES)
+        return arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
+
+    with (
+        arrow.input_stream(str(dialect.source.path))
+        if dialect.source.is_plain
+        else dialect.source.open() as file
+    ):
+        while read := file.read(_PART_BYTES):
+            rest += read
+            whole = max(rest.rfind(b"\n"), rest.rfind(b"\r")) + 1
+            part, rest = rest[:whole], rest[whole:]
+            if part and not part.isspace():
+                yield from parsed(part)
+                skipped = 0
+    if rest and not rest.isspace():
+        yield from parsed(rest)
+
+
 def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:
     """Batches put together to tables of `rows` rows, the last one shorter."""
     import pyarrow as arrow
@@ -137,7 +164,7 @@ def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:
         yield arrow.Table.from_batches(held)
 
 
-def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, Any]:
+def _options(dialect: CsvDialect, skipped: int, block_bytes: int | None = None) -> dict[str, Any]:
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
@@ -150,9 +177,7 @@ def _options(dialect: CsvDialect, block_bytes: int | None = None) -> dict[str, A
     spellings = {spelling for word in MISSING for spelling in (word, word.upper(), word.capitalize())}
     return {
         # Bytes of other encodings stand in text only, which is not read.
-        "read_options": arrow_csv.ReadOptions(
-            skip_rows=dialect.skipped_lines, column_names=names, block_size=block_bytes
-        ),
+        "read_options": arrow_csv.ReadOptions(skip_rows=skipped, column_names=names, block_size=block_bytes),
         "parse_options": arrow_csv.ParseOptions(delimiter=dialect.separator),
         "convert_options": arrow_csv.ConvertOptions(
             check_utf8=False,

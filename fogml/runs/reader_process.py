@@ -36,6 +36,8 @@ __all__ = [
 
 CHILD = Path(__file__).with_name("reader_child.py")
 _LONGEST_ANSWER = 1 << 26
+_PIPE_BYTES = 1 << 20
+"""Of samples on their way: the most that Linux lets any user have."""
 
 
 @dataclass(frozen=True)
@@ -217,6 +219,7 @@ class ReaderProcess:
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-W", "ignore", str(script), str(os.getpid())],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment,
+            pipesize=_PIPE_BYTES,
         )  # fmt: skip
         self.is_alive = True
         self._timed_out = False

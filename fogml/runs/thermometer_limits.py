@@ -107,7 +107,7 @@ def trained_limits(
 
 @dataclass(frozen=True, eq=False)
 class _Averaging:
-    """Averages of a run's rows: where each begins, how many rows it has, its mean time; time between rows [s]."""
+    """Averages of rows: where each begins, how many rows it has, its mean time; time between rows [s]."""
 
     starts: NDArray[np.intp]
     counts: NDArray[np.intp]

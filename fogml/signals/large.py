@@ -25,8 +25,8 @@ HELD_VALUES = 1 << 20
 """Values up to which an array is kept in memory: 8 MiB of float64, of which a command holds some dozens."""
 PIECE = 1 << 18
 """Values of a longer array that are worked on at once: 2 MiB of float64."""
-_DIGIT = 16
-"""Bits of a number that one pass of a selection tells."""
+_SAMPLE = 1 << 16
+"""Values that a quantile is first sought among: with as many, one look at all keeps some 2 % of them."""
 _shown: weakref.WeakSet[mmap.mmap] = weakref.WeakSet()
 
 
@@ -211,16 +211,18 @@ def parts_of(
 
 def median(parts: Parts) -> float:
     """``numpy.median`` of values that are given part by part, as often as they are asked for."""
-    held, count = _held(parts)
-    if held is not None:
-        return float(np.median(held)) if count else float("nan")
-    return 0.5 * (_ranked(parts, count, (count - 1) // 2) + _ranked(parts, count, count // 2))
+    kept = _Thinned(HELD_VALUES).all_of(parts)
+    if kept.count <= HELD_VALUES:
+        return float(np.median(kept.values())) if kept.count else float("nan")
+    below, above = _neighbours(parts, (kept.count - 1) // 2, kept)
+    return below if kept.count % 2 else 0.5 * (below + above)
 
 
 def quantiles(parts: Parts, shares: Iterable[float]) -> list[float]:
     """``numpy.quantile`` of values that are given part by part, exact, in memory of a part's size.
 
-    Values are told apart 16 bits at a time; once few enough are left about a rank they are sorted.
+    A sample of the values tells between which two a quantile lies; a look at all of them counts those below
+    and keeps those between (R. W. Floyd and R. L. Rivest, Communications of the ACM 18, 165, 1975).
 
     Parameters
     ----------
@@ -229,14 +231,14 @@ def quantiles(parts: Parts, shares: Iterable[float]) -> list[float]:
     shares
         Of the values that lie below each quantile.
     """
-    held, count = _held(parts)
-    if held is not None:
-        return [float(value) for value in np.quantile(held, list(shares))]
+    kept = _Thinned(HELD_VALUES).all_of(parts)
+    if kept.count <= HELD_VALUES:
+        return [float(value) for value in np.quantile(kept.values(), list(shares))]
     found = []
     for share in shares:
-        place = share * (count - 1)
+        place = share * (kept.count - 1)
         low = int(np.floor(place))
-        below, above = _ranked(parts, count, low), _ranked(parts, count, min(low + 1, count - 1))
+        below, above = _neighbours(parts, low, kept)
         weight = place - low
         # As numpy interpolates: from the nearer end.
         step = above - below
@@ -244,51 +246,77 @@ def quantiles(parts: Parts, shares: Iterable[float]) -> list[float]:
     return found
 
 
-def _held(parts: Parts) -> tuple[FloatArray | None, int]:
-    """The values, where they are few, and how many there are."""
-    held: list[FloatArray] = []
-    count = 0
-    for part in parts():
-        count += len(part)
-        if count > HELD_VALUES:
-            held.clear()
-        else:
-            held.append(np.array(part))
-    return (None if count > HELD_VALUES else np.concatenate(held) if held else np.empty(0)), count
+class _Thinned:
+    """Every k-th of the values that are added, no more than so many, and how many there were."""
+
+    def __init__(self, most: int) -> None:
+        self.count = 0
+        self._most, self._stride, self._held = most, 1, 0
+        self._kept: list[FloatArray] = []
+
+    def add(self, values: FloatArray) -> None:
+        self._kept.append(np.array(values[-self.count % self._stride :: self._stride]))
+        self.count += len(values)
+        self._held += len(self._kept[-1])
+        while self._held > self._most:
+            self._stride *= 2
+            self._kept = [self.values()[::2]]
+            self._held = len(self._kept[0])
+
+    def all_of(self, parts: Parts, above: float | None = None, below: float | None = None) -> _Thinned:
+        """With those of some parts added that lie beyond one value and under another."""
+        for part in parts():
+            inside = part if above is None else part[part > above]
+            self.add(inside if below is None else inside[inside < below])
+        return self
+
+    def values(self) -> FloatArray:
+        return np.concatenate(self._kept) if self._kept else np.empty(0)
 
 
-def _ranked(parts: Parts, count: int, rank: int) -> float:
-    """The value of a rank, counted from 0."""
-    prefix, known = np.uint64(0), 0
-    while known < 64 and count > PIECE:
-        tally = np.zeros(1 << _DIGIT, dtype=np.int64)
-        for values in parts():
-            digits = _within(_ordered(values), prefix, known)
-            shifted = digits >> np.uint64(64 - known - _DIGIT)
-            tally += np.bincount(
-                (shifted & np.uint64((1 << _DIGIT) - 1)).astype(np.intp), minlength=len(tally)
+def _neighbours(parts: Parts, rank: int, kept: _Thinned) -> tuple[float, float]:
+    """The value of a rank, counted from 0, and the next one in order; the last is followed by itself."""
+    low: float | None = None
+    high: float | None = None
+    before, inside = 0, kept.count
+    sample = kept.values()
+    while True:
+        sample = np.sort(sample[:: max(len(sample) // _SAMPLE, 1)])
+        # A rank in a random sample is off by half a root of its size; by four times that rarely.
+        middle = (rank - before) / inside * len(sample)
+        margin = 2.0 * np.sqrt(len(sample)) + 1.0
+        first = sample[max(int(middle - margin), 0)]
+        last = sample[min(int(middle + margin), len(sample) - 1)]
+        under = up_to_first = up_to_last = 0
+        between = _Thinned(HELD_VALUES)
+        for part in parts():
+            above = part[part > first]
+            under += int(np.count_nonzero(part < first))
+            up_to_first += len(part) - len(above)
+            between.add(above[above < last])
+            up_to_last += int(np.count_nonzero(part <= last))
+        under_last = up_to_first + between.count
+        if under <= rank < up_to_first:
+            return float(first), float(first) if rank + 1 < up_to_first else _next(parts, first)
+        if under_last <= rank < up_to_last:
+            return float(last), float(last) if rank + 1 < up_to_last else _next(parts, last)
+        if up_to_first <= rank < under_last and between.count <= HELD_VALUES:
+            ordered = np.sort(between.values())
+            at = rank - up_to_first
+            return float(ordered[at]), float(
+                ordered[at + 1] if at + 1 < len(ordered) else _next(parts, ordered[at])
             )
-        digit = int(np.searchsorted(np.cumsum(tally), rank, side="right"))
-        rank -= int(tally[:digit].sum())
-        count, known = int(tally[digit]), known + _DIGIT
-        prefix = np.uint64((int(prefix) << _DIGIT) | digit)
-    if known == 64:
-        return float(_unordered(np.array([prefix]))[0])
-    inside = np.concatenate([_within(_ordered(values), prefix, known) for values in parts()])
-    return float(_unordered(np.sort(inside)[rank : rank + 1])[0])
+        if rank < under:
+            high = first
+        elif rank >= up_to_last:
+            low, before = last, up_to_last
+        else:
+            low, high, before = first, last, up_to_first
+        fresh = _Thinned(_SAMPLE).all_of(parts, low, high)
+        sample, inside = fresh.values(), fresh.count
 
 
-def _within(ordered: NDArray[np.uint64], prefix: np.uint64, known: int) -> NDArray[np.uint64]:
-    return ordered if known == 0 else ordered[ordered >> np.uint64(64 - known) == prefix]
-
-
-def _ordered(values: FloatArray) -> NDArray[np.uint64]:
-    """Whole numbers in the order of values."""
-    bits = np.ascontiguousarray(values, dtype=np.float64).view(np.uint64)
-    sign = np.uint64(1 << 63)
-    return np.where(bits & sign, ~bits, bits | sign)
-
-
-def _unordered(ordered: NDArray[np.uint64]) -> FloatArray:
-    sign = np.uint64(1 << 63)
-    return np.where(ordered & sign, ordered & ~sign, ~ordered).view(np.float64)
+def _next(parts: Parts, value: float) -> float:
+    """The least value beyond one; that one where there is none."""
+    beyond = [float(above.min()) for part in parts() if len(above := part[part > value])]
+    return min(beyond, default=float(value))

@@ -60,9 +60,14 @@ def test_columns_of_choice(files, suffix):
         np.testing.assert_array_equal(block.columns["T_out"], whole.columns["T_out"][rows])
 
 
+_POOLS: list[pa.MemoryPool] = []
+"""Arrow's threads let go of the last buffers after an answer: a pool has to outlive them."""
+
+
 def peak_bytes(path, block_rows: int) -> int:
     """Most memory held at once while a file is read in blocks: by NumPy, Python, Arrow, and by its reader."""
     pool, usual = pa.proxy_memory_pool(pa.default_memory_pool()), pa.default_memory_pool()
+    _POOLS.append(pool)
     pa.set_memory_pool(pool)
     tracemalloc.start()
     reader = reader_process.ReaderProcess()

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 from scipy.fft import dct
 
 from fogml.errors import InputError
@@ -17,6 +19,7 @@ from fogml.signals.cosine import cosine_transform
 def everything_is_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(large, "HELD_VALUES", 100)
     monkeypatch.setattr(large, "PIECE", 64)
+    monkeypatch.setattr(large, "_SAMPLE", 32)
 
 
 def _values() -> np.ndarray:
@@ -35,6 +38,25 @@ def test_quantiles_are_those_of_the_whole(share: float, samples: int) -> None:
 def test_a_quantile_of_one_value_many_times() -> None:
     values = np.repeat([2.5, -1.0, 7.0], 1000)
     assert large.quantiles(large.parts_of(values), [0.3, 0.5, 0.9]) == [-1.0, 2.5, 7.0]
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
+@given(
+    st.lists(st.integers(-3, 3), min_size=101, max_size=400),
+    st.floats(0.0, 1.0),
+    st.booleans(),
+    st.sampled_from([0.0, 1e-3, np.inf]),
+)
+def test_quantiles_of_few_levels_of_sorted_and_of_infinite_values(levels, share, ordered, spread) -> None:
+    values = np.array(levels, dtype=float)
+    values[::7] += np.arange(len(values[::7])) * spread if spread < np.inf else 0.0
+    if spread == np.inf:
+        values[:5], values[-5:] = -np.inf, np.inf
+    values = np.sort(values) if ordered else values
+    parts = large.parts_of(values)
+    with np.errstate(invalid="ignore"):
+        np.testing.assert_array_equal(large.quantiles(parts, [share]), [np.quantile(values, share)])
+        np.testing.assert_array_equal(large.median(parts), np.median(values))
 
 
 @pytest.mark.parametrize("order", [1, 2])
