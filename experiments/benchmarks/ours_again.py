@@ -19,13 +19,17 @@ def main() -> None:
     """Fit, judge, write."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder of the results")
-    out = parser.parse_args().out
+    parser.add_argument(
+        "--only", action="append", choices=tuple(CASES), help="this study; may be given again"
+    )
+    asked = parser.parse_args()
+    out, chosen = asked.out, asked.only or tuple(CASES)
     results = kept_results(out / "results.json", quick=False)
     made = {label: make for label, make in models(FULL).items() if label in OURS}
     today = datetime.date.today().isoformat()
     studies = []
     for study in results["studies"]:
-        if study["name"] in CASES:
+        if study["name"] in chosen:
             study = with_ours_again(study, rows_of(CASES[study["name"]](False), made), today)
         studies.append(study)
     write({**results, "studies": studies}, out)

@@ -64,7 +64,8 @@ def make_model(
     Parameters
     ----------
     name
-        One of `MODEL_NAMES`, or a scikit-learn regressor by its dotted name.
+        One of `MODEL_NAMES`, a scikit-learn regressor by its dotted name, or one that an installed package
+        declares (`fogml.models.regressors`) by its name there.
     features
         Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
         dotted names; for ``joint`` of those that the bias depends on besides its own.
@@ -79,6 +80,13 @@ def make_model(
     InputError
         If the name is not known, or features or parameters are stated for a model that fixes its own.
     """
+    from fogml.models.own import own_regressor, own_regressors
+
+    if name not in MODEL_NAMES and name in own_regressors():
+        regressor = _configured(own_regressor(name), name, parameters or {})
+        from fogml.models.feature_model import FeatureModel
+
+        return FeatureModel(_understood(features or RBF_FEATURES), regressor, kind=name)
     if parameters and "." not in name and name not in PARAMETRIC:
         raise InputError(
             f"model '{name}' takes no parameters (found '{next(iter(parameters))}'); models that do are "
@@ -159,7 +167,10 @@ def _understood(features: str) -> str:
 
 
 def _unknown(name: str) -> str:
+    from fogml.models.own import own_regressors
+
+    known = (*MODEL_NAMES, *own_regressors())
     return (
-        f"model '{name}' is not known; {did_you_mean(name, MODEL_NAMES)}known are {', '.join(MODEL_NAMES)}, "
+        f"model '{name}' is not known; {did_you_mean(name, known)}known are {', '.join(known)}, "
         "or a scikit-learn regressor by its dotted name, e.g. sklearn.svm.SVR"
     )

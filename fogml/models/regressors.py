@@ -16,7 +16,9 @@ A bare regressor has scikit-learn's ``fit(X, y)`` and ``predict(X)``. It may als
 ``parameter_count``
     number of fitted parameters;
 ``to_saved()`` and ``from_saved(values, arrays)``
-    JSON-ready values and arrays, and back.
+    JSON-ready values and arrays, and back, with ``n_features_in_``, the number of columns.
+
+Another package makes one known to the commands as `fogml.models.own` says.
 """
 
 from __future__ import annotations
@@ -34,6 +36,7 @@ from fogml.errors import FogmlError, InputError, first_line, quoted
 from fogml.features.features import Features
 from fogml.models.arrays import expect_arrays
 from fogml.models.folds import FOLDS
+from fogml.models.own import GROUP, own_regressor, own_regressors
 from fogml.models.table import TrainingTable
 from fogml.runs.run import FloatArray
 
@@ -106,6 +109,8 @@ def parameter_count(regressor: Any) -> int:
     count = getattr(regressor, "parameter_count", None)
     if count is not None:
         return int(count() if callable(count) else count)
+    if hasattr(regressor, "to_saved"):
+        return sum(array.size for array in regressor.to_saved()[1].values())
     from fogml.models.sklearn_size import numbers_of
 
     return numbers_of(regressor)
@@ -126,9 +131,9 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
     Raises
     ------
     InputError
-        If it is neither fogml's nor scikit-learn's.
+        If it is neither fogml's, nor scikit-learn's, nor declared by an installed package.
     """
-    for form, home in FORMS.items():
+    for form, home in {**own_regressors(), **FORMS}.items():
         module, name = home.split(":")
         kind = type(regressor)
         if kind.__name__ == name and kind.__module__.startswith(module.rsplit(".", 1)[0]):
@@ -139,7 +144,8 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
 
         return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
     raise InputError(
-        f"{type(regressor).__name__}: cannot be saved; only fogml's and scikit-learn's own regressors can"
+        f"{type(regressor).__name__}: cannot be saved; fogml's and scikit-learn's regressors can, and those "
+        f"that an installed package declares (entry points '{GROUP}')"
     )
 
 
@@ -160,9 +166,12 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
             raise InputError(f"key {quoted('regressor.' + next(iter(values)))} does not belong there")
         expect_arrays(arrays, {"skops": (np.uint8, np.shape(arrays.get("skops", (0,))))})
         return load_sklearn(arrays["skops"])
+    if isinstance(form, str) and form in own_regressors() and form not in FORMS:
+        return own_regressor(form).from_saved(values, arrays)
     if not isinstance(form, str) or form not in FORMS:
         raise InputError(
-            f"regressor form {quoted(form)} is not known; known are {', '.join([*FORMS, SKOPS])}"
+            f"regressor form {quoted(form)} is not known; known are "
+            f"{', '.join([*FORMS, SKOPS, *own_regressors()])}"
         )
     module, name = FORMS[form].split(":")
     return getattr(import_module(module), name).from_saved(values, arrays)

@@ -34,6 +34,7 @@ from fogml.models.base import DriftModel
 from fogml.models.card import TrainingCard
 from fogml.models.intervals import Intervals
 from fogml.models.names import PRESETS
+from fogml.models.own import own_regressors
 from fogml.models.regressors import SKOPS
 from fogml.outputs import whole_folder
 from fogml.strict import Strict, strictly
@@ -217,6 +218,8 @@ def model_of_form(form: str, kind: str) -> type[DriftModel]:
     if form not in FORMS:
         raise InputError(f"form {quoted(form)} is not known; known are {', '.join(FORMS)}")
     home, kinds = FORMS[form]
+    if form == "features" and kinds is not None:
+        kinds = (*kinds, *own_regressors())
     if kinds is not None and kind not in kinds:
         raise InputError(f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}")
     module, name = home.split(":")
