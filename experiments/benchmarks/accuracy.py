@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -23,6 +24,7 @@ from experiments.benchmarks.reasons import winners
 from experiments.benchmarks.study import Study
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
+from fogml.processes import in_processes
 from fogml.runs.run import FloatArray
 from fogml.signals.averages import block_averages
 from fogml.validation.floors import floor_of_run
@@ -93,7 +95,17 @@ def measure(
     """All rows of some cases."""
     budget = QUICK if quick else FULL
     settings = {"settings": budget.settings, "folds": budget.folds, "most_rows": budget.most_rows}
-    return {"rows": rows_of(cases(quick), models(budget, quick)), "budget": settings}
+    trainings: dict[int, list[Case]] = {}
+    for case in cases(quick):
+        trainings.setdefault(id(case.train), []).append(case)
+    rows_of_training = partial(_rows_of_training, budget, quick)
+    workers = 1 if quick else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    found = in_processes(rows_of_training, list(trainings.values()), workers, ordered=True)
+    return {"rows": [row for rows in found for row in rows], "budget": settings}
+
+
+def _rows_of_training(budget: Budget, quick: bool, cases: Sequence[Case]) -> list[Row]:
+    return rows_of(cases, models(budget, quick))
 
 
 def rows_of(cases: Iterable[Case], made: Mapping[str, Callable[[], DriftModel]]) -> list[Row]:
