@@ -101,14 +101,14 @@ Constants are numbers, also computed ones, named in capitals at a module's head.
 class or method without an underscore; typed is one whose arguments and result all state their types, a class
 by its methods.
 
-Four changes after the recipes of CONTRIBUTING.md, each in one module and its test and thrown away again, with a
-stopwatch on 2026-11-27, by people who know the house; a stranger needs longer:
+Four changes after the recipes of CONTRIBUTING.md, each in one module and its test and thrown away again, with
+a stopwatch on 2026-11-27, by people who know the house; a stranger needs longer:
 
 | change | lines beside the test | from reading the recipe to a test that passes |
 |---|---|---:|
 | feature operator `knee(T, 30 degC)` | 1, a declaration | 1 min |
-| effect `rate_rectification` | 27, a class at the end of its subject's file | 4 min, 20 s of them tests |
-| model `trimmed`, of another package | 37, a class and an entry point | 9 min: the recipe promised what did not work, which is mended |
+| effect `rate_rectification` | 27, a class in its subject's file | 4 min, 20 s of them tests |
+| model `trimmed`, of another package | 37, a class and an entry point | 9 min, for the recipe was wrong |
 | option `fogml noise --after S` | 3, a field and its use | 3 min |
 
 | package | files | lines | code | docstrings | named numbers |
