@@ -221,7 +221,10 @@ def model_of_form(form: str, kind: str) -> type[DriftModel]:
     if form == "features" and kinds is not None:
         kinds = (*kinds, *own_regressors())
     if kinds is not None and kind not in kinds:
-        raise InputError(f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}")
+        raise InputError(
+            f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}, "
+            "and models of other packages once they are installed"
+        )
     module, name = home.split(":")
     found: type[DriftModel] = getattr(import_module(module), name)
     return found
