@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
@@ -24,6 +23,7 @@ from experiments.benchmarks.reasons import winners
 from experiments.benchmarks.study import Study
 from fogml.models.base import DriftModel
 from fogml.models.names import make_model
+from fogml.models.threads import available_cores
 from fogml.processes import in_processes
 from fogml.runs.run import FloatArray
 from fogml.signals.averages import block_averages
@@ -99,7 +99,7 @@ def measure(
     for case in cases(quick):
         trainings.setdefault(id(case.train), []).append(case)
     rows_of_training = partial(_rows_of_training, budget, quick)
-    workers = 1 if quick else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else 1
+    workers = 1 if quick else available_cores()
     found = in_processes(rows_of_training, list(trainings.values()), workers, ordered=True)
     return {"rows": [row for rows in found for row in rows], "budget": settings}
 

@@ -17,11 +17,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import entry_points
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fogml.entry_points import loaded
 from fogml.errors import InputError
 from fogml.signals.clock import EXPONENTIAL_SPAN, check_window, longest_gap_s, needed_s
 from fogml.signals.kernel_windows import Kernel
@@ -217,11 +217,5 @@ def _known() -> dict[str, Declared]:
     if not _looked_up:
         _looked_up = True
         for point in entry_points(group=GROUP):
-            try:
-                declared: Any = point.load()
-            except Exception as error:
-                raise InputError(
-                    f"entry point '{point.name}' in group '{GROUP}' does not load: {error}"
-                ) from error
-            declare(declared)
+            declare(loaded(point))
     return _declared

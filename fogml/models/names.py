@@ -65,7 +65,7 @@ def make_model(
     ----------
     name
         One of `MODEL_NAMES`, a scikit-learn regressor by its dotted name, or one that an installed package
-        declares (`fogml.models.regressors`) by its name there.
+        declares (`fogml.models.own`) by its name there.
     features
         Text of the features, for ``auto``, ``polynomial``, ``rbf``, ``rbf-patent``, ``mixed-effects`` and
         dotted names; for ``joint`` of those that the bias depends on besides its own.
@@ -80,13 +80,12 @@ def make_model(
     InputError
         If the name is not known, or features or parameters are stated for a model that fixes its own.
     """
-    from fogml.models.own import own_regressor, own_regressors
+    if "." not in name and name not in MODEL_NAMES:
+        from fogml.models.own import own_regressor, own_regressors
 
-    if name not in MODEL_NAMES and name in own_regressors():
-        regressor = _configured(own_regressor(name), name, parameters or {})
-        from fogml.models.feature_model import FeatureModel
-
-        return FeatureModel(_understood(features or RBF_FEATURES), regressor, kind=name)
+        if name not in own_regressors():
+            raise InputError(_unknown(name))
+        return _of_features(own_regressor(name), name, features or RBF_FEATURES, parameters or {})
     if parameters and "." not in name and name not in PARAMETRIC:
         raise InputError(
             f"model '{name}' takes no parameters (found '{next(iter(parameters))}'); models that do are "
@@ -99,8 +98,6 @@ def make_model(
         model = SklearnModel(name, _understood(features or RBF_FEATURES), options, seed=seed)
         model.check_options()
         return model
-    if name not in MODEL_NAMES:
-        raise InputError(_unknown(name))
     if name == "auto":
         from fogml.models.auto import AutoModel
 
@@ -134,20 +131,24 @@ def make_model(
 
 
 def _linear(kind: str, features: str, parameters: Mapping[str, Any]) -> DriftModel:
-    from fogml.models.feature_model import FeatureModel
     from fogml.models.linear import LinearRegressor
 
-    return FeatureModel(_understood(features), _configured(LinearRegressor, kind, parameters), kind=kind)
+    return _of_features(LinearRegressor, kind, features, parameters)
 
 
 def _rbf(kind: str, features: str | None, parameters: Mapping[str, Any]) -> DriftModel:
-    from fogml.models.feature_model import FeatureModel
     from fogml.models.rbf import PatentRBFRegressor, RBFRegressor
 
-    patent = kind == "rbf-patent"
-    text = _understood(features or (RBF_PATENT_FEATURES if patent else RBF_FEATURES))
-    regressor = _configured(PatentRBFRegressor if patent else RBFRegressor, kind, parameters)
-    return FeatureModel(text, regressor, kind=kind)
+    if kind == "rbf-patent":
+        return _of_features(PatentRBFRegressor, kind, features or RBF_PATENT_FEATURES, parameters)
+    return _of_features(RBFRegressor, kind, features or RBF_FEATURES, parameters)
+
+
+def _of_features(regressor: Any, kind: str, features: str, parameters: Mapping[str, Any]) -> DriftModel:
+    """A model of features with a regressor of a class, once both are known to be allowed."""
+    from fogml.models.feature_model import FeatureModel
+
+    return FeatureModel(_understood(features), _configured(regressor, kind, parameters), kind=kind)
 
 
 def _configured(regressor: Any, kind: str, parameters: Mapping[str, Any]) -> Any:

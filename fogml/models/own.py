@@ -9,19 +9,20 @@ from __future__ import annotations
 
 import inspect
 from functools import cache
-from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
+from fogml.entry_points import loaded, origin
 from fogml.errors import InputError
 
 GROUP = "fogml.regressors"
+_NEEDED = ("fit", "predict", "to_saved", "from_saved")
 
 
 @cache
-def own_regressors() -> dict[str, str]:
-    """Names of the regressors that installed packages declare, and their classes, ``module:Class``."""
-    return {point.name: point.value for point in entry_points(group=GROUP)}
+def own_regressors() -> dict[str, EntryPoint]:
+    """The entry points of regressors that installed packages declare, by name; nothing is loaded yet."""
+    return {point.name: point for point in entry_points(group=GROUP)}
 
 
 def own_regressor(name: str) -> Any:
@@ -32,14 +33,12 @@ def own_regressor(name: str) -> Any:
     InputError
         If it does not load, or is no regressor that can be saved.
     """
-    home = own_regressors()[name]
-    place = f"entry point '{name}' in group '{GROUP}'"
-    module, _, attribute = home.partition(":")
-    try:
-        kind = getattr(import_module(module), attribute)
-    except Exception as error:
-        raise InputError(f"{place} does not load: {error}") from error
-    lacking = [each for each in ("fit", "predict", "to_saved", "from_saved") if not hasattr(kind, each)]
+    point = own_regressors()[name]
+    kind = loaded(point)
+    lacking = [each for each in _NEEDED if not hasattr(kind, each)]
     if not inspect.isclass(kind) or lacking:
-        raise InputError(f"{place}: {home} is no regressor; it lacks {', '.join(lacking) or 'a class'}")
+        place = f"{origin(point)} in group '{GROUP}'"
+        raise InputError(
+            f"{place}: {point.value} is no regressor; it lacks {', '.join(lacking) or 'a class'}"
+        )
     return kind

@@ -24,7 +24,7 @@ Another package makes one known to the commands as `fogml.models.own` says.
 from __future__ import annotations
 
 import inspect
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -133,16 +133,16 @@ def regressor_to_saved(regressor: Any) -> tuple[dict[str, Any], dict[str, NDArra
     InputError
         If it is neither fogml's, nor scikit-learn's, nor declared by an installed package.
     """
-    for form, home in {**own_regressors(), **FORMS}.items():
-        module, name = home.split(":")
-        kind = type(regressor)
-        if kind.__name__ == name and kind.__module__.startswith(module.rsplit(".", 1)[0]):
-            values, arrays = regressor.to_saved()
-            return {"form": form, **values}, arrays
     if _is_sklearn(regressor):
         from fogml.models.sklearn_saving import dump_sklearn
 
         return {"form": SKOPS}, {"skops": dump_sklearn(regressor)}
+    form = _form_among(FORMS, regressor) or _form_among(
+        {name: point.value for name, point in own_regressors().items()}, regressor
+    )
+    if form is not None:
+        values, arrays = regressor.to_saved()
+        return {"form": form, **values}, arrays
     raise InputError(
         f"{type(regressor).__name__}: cannot be saved; fogml's and scikit-learn's regressors can, and those "
         f"that an installed package declares (entry points '{GROUP}')"
@@ -166,7 +166,7 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
             raise InputError(f"key {quoted('regressor.' + next(iter(values)))} does not belong there")
         expect_arrays(arrays, {"skops": (np.uint8, np.shape(arrays.get("skops", (0,))))})
         return load_sklearn(arrays["skops"])
-    if isinstance(form, str) and form in own_regressors() and form not in FORMS:
+    if isinstance(form, str) and form not in FORMS and form in own_regressors():
         return own_regressor(form).from_saved(values, arrays)
     if not isinstance(form, str) or form not in FORMS:
         raise InputError(
@@ -175,6 +175,16 @@ def regressor_from_saved(values: dict[str, Any], arrays: dict[str, NDArray[Any]]
         )
     module, name = FORMS[form].split(":")
     return getattr(import_module(module), name).from_saved(values, arrays)
+
+
+def _form_among(homes: Mapping[str, str], regressor: Any) -> str | None:
+    """The form of a regressor by the place of its class, ``module:Class``; None where it is none of these."""
+    kind = type(regressor)
+    for form, home in homes.items():
+        module, name = home.split(":")
+        if kind.__name__ == name and kind.__module__.startswith(module.rsplit(".", 1)[0]):
+            return form
+    return None
 
 
 def _is_sklearn(regressor: Any) -> bool:

@@ -218,9 +218,8 @@ def model_of_form(form: str, kind: str) -> type[DriftModel]:
     if form not in FORMS:
         raise InputError(f"form {quoted(form)} is not known; known are {', '.join(FORMS)}")
     home, kinds = FORMS[form]
-    if form == "features" and kinds is not None:
-        kinds = (*kinds, *own_regressors())
-    if kinds is not None and kind not in kinds:
+    own = form == "features" and kind not in (kinds or ()) and kind in own_regressors()
+    if kinds is not None and kind not in kinds and not own:
         raise InputError(
             f"kind {quoted(kind)} is no model of form '{form}'; known are {', '.join(kinds)}, "
             "and models of other packages once they are installed"

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 _PART_BYTES = 1 << 23
 """Of a long file, parsed at once and then let go: some 100,000 rows."""
-_BLOCK_BYTES = 1 << 20
-"""What one core parses of it."""
 
 
 def read_csv(path: Path, *, repair: bool) -> RawTable:
@@ -123,26 +121,28 @@ def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
-    rest, skipped = b"", dialect.skipped_lines
-
-    def parsed(part: bytes) -> list[RecordBatch]:
-        options = _options(dialect, skipped, _BLOCK_BYTES)
-        return arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
-
-    with (
-        arrow.input_stream(str(dialect.source.path))
-        if dialect.source.is_plain
-        else dialect.source.open() as file
-    ):
-        while read := file.read(_PART_BYTES):
-            rest += read
-            whole = max(rest.rfind(b"\n"), rest.rfind(b"\r")) + 1
-            part, rest = rest[:whole], rest[whole:]
+    source, skipped = dialect.source, dialect.skipped_lines
+    with arrow.input_stream(str(source.path)) if source.is_plain else source.open() as file:
+        for part in _whole_lines(file):
             if part and not part.isspace():
-                yield from parsed(part)
+                options = _options(dialect, skipped)
+                yield from arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
                 skipped = 0
-    if rest and not rest.isspace():
-        yield from parsed(rest)
+
+
+def _whole_lines(file: Any) -> Iterator[bytes]:
+    """A file's bytes in parts that end where a line does."""
+    import pyarrow as arrow
+
+    rest = b""
+    while read := file.read(_PART_BYTES):
+        rest += read
+        end = max(rest.rfind(b"\n"), rest.rfind(b"\r")) + 1
+        if end == 0 and len(rest) > _PART_BYTES:
+            raise arrow.ArrowInvalid("a line longer than a part")
+        yield rest[:end]
+        rest = rest[end:]
+    yield rest
 
 
 def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:
@@ -164,7 +164,7 @@ def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:
         yield arrow.Table.from_batches(held)
 
 
-def _options(dialect: CsvDialect, skipped: int, block_bytes: int | None = None) -> dict[str, Any]:
+def _options(dialect: CsvDialect, skipped: int) -> dict[str, Any]:
     import pyarrow as arrow
     from pyarrow import csv as arrow_csv
 
@@ -177,7 +177,7 @@ def _options(dialect: CsvDialect, skipped: int, block_bytes: int | None = None) 
     spellings = {spelling for word in MISSING for spelling in (word, word.upper(), word.capitalize())}
     return {
         # Bytes of other encodings stand in text only, which is not read.
-        "read_options": arrow_csv.ReadOptions(skip_rows=skipped, column_names=names, block_size=block_bytes),
+        "read_options": arrow_csv.ReadOptions(skip_rows=skipped, column_names=names),
         "parse_options": arrow_csv.ParseOptions(delimiter=dialect.separator),
         "convert_options": arrow_csv.ConvertOptions(
             check_utf8=False,

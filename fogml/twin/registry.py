@@ -15,6 +15,7 @@ from importlib.metadata import entry_points
 from inspect import isabstract
 from typing import Any, TypeVar
 
+from fogml.entry_points import loaded, origin
 from fogml.errors import InputError, did_you_mean
 from fogml.twin.effect import STAGES, Effect
 from fogml.twin.quantities import Quantity
@@ -102,12 +103,7 @@ def _discover() -> None:
         for declared in _built_in():
             _add(declared, declared.__module__)
         for point in entry_points(group=GROUP):
-            origin = f"entry point '{point.name}' of {point.dist.name if point.dist else 'a package'}"
-            try:
-                declared = point.load()
-            except Exception as error:
-                raise InputError(f"{origin} in group '{GROUP}' does not load: {error}") from error
-            _add(declared, origin)
+            _add(loaded(point), origin(point))
     except InputError:
         _catalogue.clear()
         _catalogue.update(found)

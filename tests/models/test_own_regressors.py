@@ -51,7 +51,7 @@ def test_spikes_do_not_move_it(monkeypatch: pytest.MonkeyPatch) -> None:
     [
         (
             "trimmed = fogml_trimmed:Nothing",
-            "entry point 'trimmed' in group 'fogml.regressors' does not load",
+            "entry point 'trimmed' of fogml-trimmed in group 'fogml.regressors' does not load",
         ),
         ("trimmed = fogml.runs.run:Run", "is no regressor; it lacks fit, predict, to_saved, from_saved"),
         ("other = fogml_trimmed:TrimmedRegressor", "model 'trimmed' is not known"),
