@@ -127,7 +127,7 @@ NUMERIC_JOBS = (
         "multipoint-5-3 fitted to a run, with errors of coefficients, an interval and trained limits",
         "numpy: cumulative sums, column_stack, lstsq",
         _polynomial,
-        limit_s=1.0,
+        limit_s=0.4,
         memory=True,
     ),
     Job(
