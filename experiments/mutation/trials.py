@@ -30,7 +30,7 @@ def copied(root: Path, work: Path) -> Path:
     if not tree.exists():
         partial = work / "partial"
         shutil.rmtree(partial, ignore_errors=True)
-        without = shutil.ignore_patterns(".git", ".venv*", "*.html", "__pycache__", "_build")
+        without = shutil.ignore_patterns(".git", ".venv*", "__pycache__", "_build")
         shutil.copytree(root, partial, symlinks=True, ignore=without)
         partial.rename(tree)
     return tree
