@@ -14,39 +14,48 @@ from numpy.typing import NDArray
 from fogml.signals.compiled import kernel
 
 FloatArray = NDArray[np.float64]
+_ROUNDED = 2.0 * float(np.finfo(np.float64).eps)
+"""What rounding may make of a difference of two times, of the time."""
 
 
 @kernel()
 def lag_kernel(
-    time: FloatArray, x: FloatArray, tau: FloatArray, last_time: float, last_x: float, state: float
-) -> tuple[FloatArray, float]:
-    """First-order lag of x, exact for x linear between samples.
+    time: FloatArray,
+    x: FloatArray,
+    tau: FloatArray,
+    last_time: float,
+    last_x: float,
+    state: float,
+    last_step: float = -1.0,
+) -> tuple[FloatArray, float, float]:
+    """First-order lag of x, exact for x linear between samples; the last state and step [s] as well.
 
-    ``tau dy/dt = x - y``; `tau` [s] has shape (n,) or (1,) for a constant. `last_time`, `last_x`
-    and `state` belong to the sample before the first one; a NaN `last_time` starts at rest.
+    ``tau dy/dt = x - y``; `tau` [s] has shape (n,) or (1,) for a constant. `last_time`, `last_x`, `state`
+    and `last_step` belong to the sample before the first one; a NaN `last_time` starts at rest.
     """
     n = len(x)
     out = np.empty(n)
     constant = len(tau) == 1
     before_t, before_x, y = last_time, last_x, state
-    step_known, decay, weight = -1.0, 0.0, 0.0
+    step_known, decay, weight = last_step, math.nan, 0.0
     for i in range(n):
         if math.isnan(before_t):
             y = x[i]
         else:
             step = time[i] - before_t
-            if not constant or step != step_known:
-                tau_i = tau[0] if constant else tau[i]
-                ratio = step / tau_i
+            # Steps that differ by the rounding of their times are one.
+            if abs(step - step_known) > _ROUNDED * abs(time[i]):
+                step_known, decay = step, math.nan
+            if not constant or math.isnan(decay):
+                ratio = step_known / (tau[0] if constant else tau[i])
                 decay = math.exp(-ratio)
                 # Share of the newest input in the ramp-invariant step.
                 weight = 1.0 + math.expm1(-ratio) / ratio if ratio > 1e-9 else 0.5 * ratio
-                step_known = step
             # In differences, so that a constant x at rest stays exactly that.
             y = before_x + decay * (y - before_x) + weight * (x[i] - before_x)
         out[i] = y
         before_t, before_x = time[i], x[i]
-    return out, y
+    return out, y, step_known
 
 
 @kernel()

@@ -134,10 +134,11 @@ def earth_field(
     held = attitude(facts)
     field = np.array([horizontal, 0.0, -math.copysign(1.0, latitude_of(facts)) * vertical])
     theta = held.sense * np.radians(angle_deg)
+    cosine, sine = np.cos(theta), np.sin(theta)
     columns = {}
     for name, axis in (("B_x", held.x), ("B_y", held.y), ("B_z", held.z)):
         a, b, c = turned(field, axis, held.table)
-        columns[name] = a + b * np.cos(theta) + c * np.sin(theta)
+        columns[name] = a + b * cosine + c * sine
     return columns
 
 

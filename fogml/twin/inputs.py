@@ -249,7 +249,10 @@ class Inputs:
 
     def table_cosine(self, phase_deg: float, harmonic: float = 1.0) -> FloatArray:
         """cos(harmonic * table angle + phase), as the mean since the sample before; shape (n,)."""
-        after = np.radians(harmonic * self.angle_deg + phase_deg)
+        moves = self.turned_deg.any()
+        after = np.radians(harmonic * (self.angle_deg if moves else self.angle_deg[:1]) + phase_deg)
+        if not moves:
+            return np.repeat(np.cos(after), len(self))
         return mean_cosine(after - np.radians(harmonic * self.turned_deg), after)
 
     def carried(self, fixed: FloatArray, vector: FloatArray, *, mean: bool = True) -> FloatArray | float:

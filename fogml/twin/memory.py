@@ -31,9 +31,9 @@ class Memory:
         if len(x) == 0:
             return np.empty(0)
         tau = np.atleast_1d(np.asarray(time_constant, dtype=np.float64))
-        last_time, last_x, state = self._states.get(key, (_NAN, _NAN, _NAN))
-        out, state = lag_kernel(time, np.asarray(x, dtype=np.float64), tau, last_time, last_x, state)
-        self._states[key] = (float(time[-1]), float(x[-1]), float(state))
+        before = self._states.get(key, (_NAN, _NAN, _NAN, -1.0))
+        out, state, step = lag_kernel(time, np.asarray(x, dtype=np.float64), tau, *before)
+        self._states[key] = (float(time[-1]), float(x[-1]), float(state), float(step))
         return np.asarray(out)
 
     def play(self, key: str, x: FloatArray, half_width: float) -> FloatArray:
@@ -150,4 +150,6 @@ class Memory:
 
 
 def _neighbours(time: FloatArray, x: FloatArray, first: int) -> tuple[FloatArray, FloatArray]:
-    return np.diff(x, prepend=x[:1])[first:], np.diff(time, prepend=time[:1])[first:]
+    before = slice(max(first - 1, 0), -1)
+    steps = (x[max(first, 1) :] - x[before], time[max(first, 1) :] - time[before])
+    return steps if first else (np.concatenate([[0.0], steps[0]]), np.concatenate([[0.0], steps[1]]))

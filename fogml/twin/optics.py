@@ -233,4 +233,6 @@ class Light:
         """
         if self.power_loss is not None:
             power_loss, power_slope = self.power_loss, self.power_slope
-        return np.asarray(np.power(10.0, 1e-3 * power_slope * u - 0.1 * power_loss * np.abs(u)))
+        decades = 1e-3 * power_slope * u - 0.1 * power_loss * np.abs(u)
+        # Half the time of a power of 10.
+        return np.exp(math.log(10.0) * decades)
