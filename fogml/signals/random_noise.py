@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fogml.signals.compiled import kernel
 from fogml.signals.modes import phi_functions
-from fogml.signals.sample_means import mean_cosine
+from fogml.signals.waves import sine
 
 FloatArray = NDArray[np.float64]
 Float32Array = NDArray[np.float32]
@@ -136,8 +136,12 @@ def sinusoid(
     count: int, sample_s: float, amplitude: float, frequency_hz: float, phase_rad: float
 ) -> FloatArray:
     """A line as means over the samples hold it, sinc and alias included, shape (count,)."""
-    angle = 2.0 * math.pi * frequency_hz * sample_s * np.arange(count + 1.0) + (phase_rad - 0.5 * math.pi)
-    return amplitude * mean_cosine(angle[:-1], angle[1:])
+    turned = frequency_hz * sample_s
+    turns = np.arange(0.5, count) * turned
+    turns += phase_rad / (2.0 * math.pi)
+    line = sine(turns)
+    line *= amplitude * float(np.sinc(turned))
+    return line
 
 
 def bursts(

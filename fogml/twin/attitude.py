@@ -131,14 +131,16 @@ def earth_field(
     vertical
         Part that points down in the northern hemisphere and up in the southern.
     """
+    from fogml.signals.waves import sine
+
     held = attitude(facts)
     field = np.array([horizontal, 0.0, -math.copysign(1.0, latitude_of(facts)) * vertical])
-    theta = held.sense * np.radians(angle_deg)
-    cosine, sine = np.cos(theta), np.sin(theta)
+    turns = held.sense / 360.0 * angle_deg
+    along, across = sine(turns + 0.25), sine(turns)
     columns = {}
     for name, axis in (("B_x", held.x), ("B_y", held.y), ("B_z", held.z)):
         a, b, c = turned(field, axis, held.table)
-        columns[name] = a + b * cosine + c * sine
+        columns[name] = a + b * along + c * across
     return columns
 
 

@@ -250,19 +250,21 @@ def world_of(
 def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]]:
     """Recorded columns, and the truth, block by block."""
     blocks = world.samples(BLOCK_ROWS)
-    # A thread takes longer to start than a single block to work out.
-    for samples in _ahead(blocks) if len(world.timeline) > BLOCK_ROWS else blocks:
-        chain = world.output(samples)
-        yield _recorded(world, samples, chain)
-
-
-def _ahead(blocks: Iterator[Samples]) -> Iterator[Samples]:
-    """The same blocks, each worked out beside what is done with the one before."""
-    with ThreadPoolExecutor(max_workers=1) as beside:
-        pending = beside.submit(next, blocks, None)
-        while (samples := pending.result()) is not None:
-            pending = beside.submit(next, blocks, None)
-            yield samples
+    if len(world.timeline) <= BLOCK_ROWS:
+        # A thread takes longer to start than a single block to work out.
+        yield from (_recorded(world, samples, world.output(samples)) for samples in blocks)
+        return
+    # Beside a block's output, the longest part: what acts on the next, and what is recorded of the one before.
+    with ThreadPoolExecutor(max_workers=2) as beside:
+        ahead, behind = beside.submit(next, blocks, None), None
+        while (samples := ahead.result()) is not None:
+            ahead = beside.submit(next, blocks, None)
+            chain = world.output(samples)
+            if behind is not None:
+                yield behind.result()
+            behind = beside.submit(_recorded, world, samples, chain)
+        if behind is not None:
+            yield behind.result()
 
 
 def _whole(counts: FloatArray) -> FloatArray:

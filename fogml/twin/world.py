@@ -185,10 +185,10 @@ class World:
             yield self._samples(block)
 
     def output(self, samples: Samples) -> ChainOutput:
-        """The chain's output for the next block."""
+        """The chain's output for the next block, with contributions where they are asked for."""
         given = through_chain(self.twin, samples.inputs, samples.inputs, contributions=True)
         self._note(given.contributions)
-        return given
+        return given if self.truth else ChainOutput(given.output, {})
 
     def logged(self, samples: Samples, output: FloatArray) -> FloatArray:
         """The output as recorded."""
