@@ -21,8 +21,8 @@ from fogml.runs.stamps import StampClock
 if TYPE_CHECKING:
     from pyarrow import RecordBatch, Table
 
-_PART_BYTES = 1 << 23
-"""Of a long file, parsed at once and then let go: some 100,000 rows."""
+_BLANK_BYTES = 64
+"""Of a part that are looked at first for anything but blanks."""
 
 
 def read_csv(path: Path, *, repair: bool) -> RawTable:
@@ -40,7 +40,8 @@ def read_csv(path: Path, *, repair: bool) -> RawTable:
 
     dialect, notes = without_footer(csv_dialect(path))
     try:
-        _check_quotes(dialect)
+        if not all(quotes_are_plain(part, dialect.separator) for part in dialect.source.whole_lines()):
+            raise _other_quotes()
         table = arrow_csv.read_csv(_opened(dialect), **_options(dialect, dialect.skipped_lines))
         clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
         whole = _raw(path, dialect, table, 0, clock)
@@ -82,7 +83,6 @@ def csv_blocks(path: Path, rows: int, columns: Collection[str] | None = None) ->
     start = 0
     clock = StampClock(dialect.stamps, path.name) if dialect.stamps else None
     try:
-        _check_quotes(dialect)
         for table in _regrouped(_batches(dialect), rows):
             raw = _raw(path, dialect, table, start, clock)
             start += table.num_rows
@@ -108,12 +108,12 @@ def _opened(dialect: CsvDialect) -> Any:
     return dialect.source.path if dialect.source.is_plain else dialect.source.open()
 
 
-def _check_quotes(dialect: CsvDialect) -> None:
-    """Leave a file to the exact reader where the fast one would read its quotation marks otherwise."""
+def _other_quotes() -> Exception:
+    """Leaves a file to the exact reader where the fast one would read its quotation marks otherwise."""
     import pyarrow as arrow
 
-    if not quotes_are_plain(dialect.source, dialect.separator):
-        raise arrow.ArrowInvalid("quotation marks")
+    error: Exception = arrow.ArrowInvalid("quotation marks")
+    return error
 
 
 def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
@@ -122,27 +122,13 @@ def _batches(dialect: CsvDialect) -> Iterator[RecordBatch]:
     from pyarrow import csv as arrow_csv
 
     source, skipped = dialect.source, dialect.skipped_lines
-    with arrow.input_stream(str(source.path)) if source.is_plain else source.open() as file:
-        for part in _whole_lines(file):
-            if part and not part.isspace():
-                options = _options(dialect, skipped)
-                yield from arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
-                skipped = 0
-
-
-def _whole_lines(file: Any) -> Iterator[bytes]:
-    """A file's bytes in parts that end where a line does."""
-    import pyarrow as arrow
-
-    rest = b""
-    while read := file.read(_PART_BYTES):
-        rest += read
-        end = max(rest.rfind(b"\n"), rest.rfind(b"\r")) + 1
-        if end == 0 and len(rest) > _PART_BYTES:
-            raise arrow.ArrowInvalid("a line longer than a part")
-        yield rest[:end]
-        rest = rest[end:]
-    yield rest
+    for part in source.whole_lines():
+        if not quotes_are_plain(part, dialect.separator):
+            raise _other_quotes()
+        if len(part) and not (bytes(part[:_BLANK_BYTES]).isspace() and bytes(part).isspace()):
+            options = _options(dialect, skipped)
+            yield from arrow_csv.read_csv(arrow.BufferReader(part), **options).to_batches()
+            skipped = 0
 
 
 def _regrouped(batches: Iterable[RecordBatch], rows: int) -> Iterator[Table]:

@@ -8,34 +8,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from fogml.runs.csv_source import CsvSource
-
-_PART_BYTES = 1 << 24
 _MARK, _NEWLINE, _RETURN = b'"\n\r'
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 
 
-def quotes_are_plain(source: CsvSource, separator: str) -> bool:
-    """Whether every quoted field is closed on its line and stands between separators (RFC 4180)."""
-    rest = b"\n"
-    with source.open() as file:
-        begin = file.read(_PART_BYTES).removeprefix(_BYTE_ORDER_MARK)
-        while part := begin or file.read(_PART_BYTES):
-            begin = b""
-            part = rest + part
-            if b'"' not in part:
-                rest = part[-1:]
-                continue
-            cut = max(part.rfind(b"\n"), part.rfind(b"\r"))
-            if cut > 0 and not _plain(part[: cut + 1], separator):
-                return False
-            # The line's end stays, as what stands before the next field.
-            rest = part[max(cut, 0) :]
-    return _plain(rest + b"\n", separator)
-
-
-def _plain(text: bytes, separator: str) -> bool:
-    """The same of whole lines, with a byte before and after every mark."""
+def quotes_are_plain(lines: memoryview, separator: str) -> bool:
+    """Whether every quoted field of whole lines is closed on its line and between separators (RFC 4180)."""
+    content = np.frombuffer(lines, dtype=np.uint8)
+    if not (content == _MARK).any():
+        return True
+    # A byte before and after every mark.
+    text = b"\n" + bytes(lines).removeprefix(_BYTE_ORDER_MARK) + b"\n"
     content = np.frombuffer(text, dtype=np.uint8)
     marks = np.flatnonzero(content == _MARK)
     if len(marks) % 2:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import codecs
 import io
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
 _PART_BYTES = 1 << 20
+LINES_BYTES = 1 << 23
+"""Of a long file, parsed at once and then let go: some 100,000 rows."""
 _BYTE_ORDER_MARKS = {b"\xff\xfe": "utf-16-le", b"\xfe\xff": "utf-16-be"}
 
 
@@ -43,6 +46,29 @@ class CsvSource:
         if self.is_plain:
             return self.path.open("rb")
         return cast(BinaryIO, io.BufferedReader(_Converted(self), _PART_BYTES))
+
+    def whole_lines(self) -> Iterator[memoryview]:
+        """The table's bytes in parts that end where a line does, each to be used before the next is asked for.
+
+        Raises
+        ------
+        pyarrow.ArrowInvalid
+            Where a line is longer than a part, which is none for the fast parser.
+        """
+        import pyarrow as arrow
+
+        buffer, rest = bytearray(LINES_BYTES), b""
+        view = memoryview(buffer)
+        with self.open() as file:
+            while read := file.readinto(view[len(rest) :]):  # type: ignore[attr-defined]
+                filled = len(rest) + read
+                end = max(buffer.rfind(b"\n", 0, filled), buffer.rfind(b"\r", 0, filled)) + 1
+                if end == 0 and filled == LINES_BYTES:
+                    raise arrow.ArrowInvalid("a line longer than a part")
+                yield view[:end]
+                rest = bytes(view[end:filled])
+                buffer[: len(rest)] = rest
+        yield view[: len(rest)]
 
     def tail(self, size: int) -> bytes:
         """The last bytes of the table, as `open` would give them, of so many in the file or one more."""
