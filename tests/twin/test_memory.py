@@ -20,6 +20,9 @@ GAPS = REGULAR + np.where(REGULAR > 1000, 90.0, 0.0) + np.where(REGULAR > 2000, 
 COARSE = 10.0 * np.arange(3000.0)
 CLOCKS = {"regular": REGULAR, "uneven": UNEVEN, "gaps": GAPS, "coarse": COARSE, "late": REGULAR + 1.7e9}
 
+# Steps that differ by the rounding of their times.
+FINE = 0.018 * np.arange(3000.0) + 3e4
+
 
 def temperature(time: FloatArray) -> FloatArray:
     t = time - time[0]
@@ -114,9 +117,16 @@ def test_blocks_give_the_whole(kind: str, clock: str, cuts: list[int]) -> None:
     assert np.abs(found - whole).max() <= slack
 
 
+def test_blocks_of_fine_steps_give_the_whole_to_the_last_digit() -> None:
+    whole = in_blocks("lag", FINE, [0, 3000])
+    assert np.array_equal(in_blocks("lag", FINE, [0, 1, 700, 701, 2999, 3000]), whole)
+
+
 def test_lag_of_a_ramp_in_closed_form() -> None:
-    for time in (REGULAR, UNEVEN - UNEVEN[0], COARSE):
-        found = Memory().lag("a", time, 2.0 * time, 300.0)
+    assert len(np.unique(np.diff(FINE))) > 1
+    for clock in (REGULAR, UNEVEN, COARSE, FINE):
+        time = clock - clock[0]
+        found = Memory().lag("a", clock, 2.0 * time, 300.0)
         wanted = 2.0 * (time - 300.0 * (1.0 - np.exp(-time / 300.0)))
         assert found == pytest.approx(wanted, rel=1e-10, abs=1e-9)
 
