@@ -48,7 +48,7 @@ class CsvSource:
         return cast(BinaryIO, io.BufferedReader(_Converted(self), _PART_BYTES))
 
     def whole_lines(self) -> Iterator[memoryview]:
-        """The table's bytes in parts that end where a line does, each to be used before the next is asked for.
+        """The table's bytes in parts that end where a line does, used before the next is asked for.
 
         Raises
         ------

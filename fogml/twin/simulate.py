@@ -254,7 +254,7 @@ def _blocks(world: World) -> Iterator[tuple[dict[str, FloatArray], Truth | None]
         # A thread takes longer to start than a single block to work out.
         yield from (_recorded(world, samples, world.output(samples)) for samples in blocks)
         return
-    # Beside a block's output, the longest part: what acts on the next, and what is recorded of the one before.
+    # Beside a block's output, the longest part: what acts on the next, what is recorded of the one before.
     with ThreadPoolExecutor(max_workers=2) as beside:
         ahead, behind = beside.submit(next, blocks, None), None
         while (samples := ahead.result()) is not None:
