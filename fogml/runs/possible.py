@@ -52,7 +52,40 @@ def clock_fault(time: FloatArray) -> str | None:
     step = float(time[-1] - time[0]) / (len(time) - 1)
     if step < SHORTEST_STEP_S:
         return f"samples {step:.3g} s apart are no gyro's; state the clock's unit, e.g. 'time [s]'"
+    if digits_of_clock(time):
+        return (
+            f"times such as {np.floor(time[-1]):06.0f} are hours, minutes and seconds in digits, as they jump"
+            " where a minute ends; write them with colons, as in 09:59:59, or in seconds"
+        )
     return None
+
+
+def digits_of_clock(time: FloatArray) -> bool:
+    """Whether strictly increasing times are written as HHMMSS: they jump where a minute ends.
+
+    That is told from two ends on, at intervals up to 40 s: then one step in three does not cross one.
+    """
+    if not 0.0 <= time[0] < time[-1] < 240_000.0 or _beyond_59(time[:: max(len(time) // 1000, 1)]):
+        return False
+    if any(_beyond_59(time[part]) for part in large.pieces(time)):
+        return False
+    found: list[tuple[FloatArray, ...]] = []
+    for part in large.pieces(time, overlap=1):
+        minute, steps = np.floor(time[part] / 100.0), np.diff(time[part])
+        ends = np.diff(minute) > 0.0
+        seconds = time[part] - 40.0 * minute - 2400.0 * np.floor(minute / 100.0)
+        found.append((steps[~ends], steps[ends], np.diff(seconds)[ends]))
+    within, ending, true = (np.concatenate(parts) for parts in zip(*found))
+    if len(ending) < 2 or 3 * len(within) < len(ending):
+        return False
+    usual = float(np.median(within))
+    return bool(np.median(true) < 1.5 * usual < np.median(ending))
+
+
+def _beyond_59(time: FloatArray) -> bool:
+    """Whether some times, read as HHMMSS, have a second or minute of 60 or more."""
+    whole = np.floor(time)
+    return bool(np.any((whole % 100.0 >= 60.0) | (whole // 100.0 % 100.0 >= 60.0)))
 
 
 def float32_reason(time: FloatArray) -> str | None:
