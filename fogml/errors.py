@@ -62,6 +62,12 @@ def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     return f"did you mean {' or '.join(repr(one) for one in near)}? " if near else ""
 
 
+def known_are(name: str, known: Iterable[str], what: str = "known") -> str:
+    """``did you mean 'x'? known are x, y``: how a message on a name that is none of these ends."""
+    known = list(known)
+    return f"{did_you_mean(name, known)}{what} are {', '.join(known)}"
+
+
 def counted(count: int, word: str, words: str | None = None) -> str:
     """``1 row``, ``3 rows``; `words` where the plural is no mere s."""
     return f"{count} {word if count == 1 else words or word + 's'}"

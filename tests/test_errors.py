@@ -5,9 +5,14 @@ from __future__ import annotations
 import pytest
 
 from fogml.errors import LONGEST_MESSAGE, LONGEST_QUOTED, InputError, did_you_mean, listed, quoted
+from fogml.export.noise_parameters import noise_text
+from fogml.runs.columns import conversion
+from fogml.runs.facts import facts_from
+from fogml.runs.profile_schema import load_profile
 from fogml.runs.shipped import shipped_run
 from fogml.twin.programme import load_programme
 from fogml.twin.twin_file import load_twin
+from fogml.validation.limits import check_limits
 
 NESTED: list = [1]
 for _ in range(50):
@@ -62,6 +67,11 @@ def test_names_that_look_alike_are_offered(name: str, most: int, told: str) -> N
 @pytest.mark.parametrize(
     ("ask", "name", "meant"),
     [
+        (lambda name: check_limits({name: 1.0}), "bias_stabilty", "bias_stability"),
+        (lambda name: facts_from({name: 40.0}, "a.yaml"), "latitud", "latitude"),
+        (load_profile, "thermal-cycle-mem", "thermal-cycle-mems"),
+        (lambda name: conversion("gyro", name, "a.csv"), "dge/h", "deg/h"),
+        (lambda name: noise_text({}, name), "kalib", "kalibr"),
         (load_programme, "four-position", "four-positions"),
         (load_twin, "tactcal", "tactical"),
         (shipped_run, "ring-laser-zz", "ring-laser-z"),

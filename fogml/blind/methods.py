@@ -10,7 +10,7 @@ from typing import Any
 
 import fogml
 from fogml.blind.folders import DIAGNOSIS, CaseFiles
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.json_files import write_json
 
 Method = Callable[..., Any]
@@ -47,8 +47,7 @@ def load_method(text: str) -> Method:
     if not colon:
         if text == "families":
             raise InputError(f"no method 'families': it is what '{DIAGNOSIS}' does")
-        known = ", ".join(METHODS)
-        raise InputError(f"no method '{text}'; known are {known}, or name one as module:function")
+        raise InputError(f"no method '{text}'; {known_are(text, METHODS)}, or name one as module:function")
     try:
         method: Method = getattr(import_module(module), name)
     except (ImportError, AttributeError) as error:

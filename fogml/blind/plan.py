@@ -10,7 +10,7 @@ import numpy as np
 
 from fogml.blind.frame.reality import Reality
 from fogml.blind.truth import KINDS, Kind
-from fogml.errors import InputError, did_you_mean
+from fogml.errors import InputError, known_are
 
 FIRST = "first"
 """What is drawn from unless another one is chosen, so that a seed goes on giving the same files."""
@@ -40,8 +40,7 @@ def chosen(name: str) -> tuple[str, ...]:
         return REALITIES
     if name not in (*REALITIES, SAME_TWIN):
         choices = (*REALITIES, MIX, SAME_TWIN)
-        hint = did_you_mean(name, choices)
-        raise InputError(f"there is no reality '{name}'; {hint}choose one of {', '.join(choices)}")
+        raise InputError(f"there is no reality '{name}'; {known_are(name, choices, 'choices')}")
     return (name,)
 
 
@@ -155,7 +154,7 @@ def plans(
     strata = d_prime or strata_from(least_d_prime)
     for kind in kinds or ():
         if kind not in KINDS:
-            raise InputError(f"there is no kind of case '{kind}'; kinds are {', '.join(KINDS)}")
+            raise InputError(f"there is no kind of case '{kind}'; {known_are(kind, KINDS, 'kinds')}")
     names = chosen(of)
     own = [_of_one(-(-count // len(names)), seed, kinds, strata, name) for name in names]
     found = [own[place % len(own)][place // len(own)] for place in range(count)]

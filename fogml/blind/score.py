@@ -18,7 +18,7 @@ from fogml.blind.scoring.table import BY_KEY
 from fogml.blind.scoring.values import score_values
 from fogml.blind.seeds import check_use
 from fogml.blind.truth import Truth, read_truth
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.processes import in_processes
 
 
@@ -125,7 +125,7 @@ def gate(values: dict[str, Any], gates: Mapping[str, float], method: str) -> lis
     found = []
     for key, limit in gates.items():
         if key not in BY_KEY:
-            raise InputError(f"--gate: no figure '{key}'; figures are {', '.join(BY_KEY)}")
+            raise InputError(f"--gate: no figure '{key}'; {known_are(key, BY_KEY, 'figures')}")
         value, more = reached[key], _more_is_better(key)
         met = value is not None and (value >= limit if more else value <= limit)
         found.append({"key": key, "limit": limit, "at_least": more, "value": value, "met": met})

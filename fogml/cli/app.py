@@ -19,9 +19,7 @@ class AppSettings(Settings):
     """
 
     job: ClassVar[str] = "fogml.cli.app_job:serve"
-    folder: Annotated[str, argument("FOLDER", "Where files and jobs lie (fogml-app).", writes=True)] = (
-        "fogml-app"
-    )
+    folder: Annotated[str, argument("[FOLDER]", "Where files and jobs lie.", writes=True)] = "fogml-app"
     port: Annotated[int, option("Port of the address; 0 for any that is free.")] = Field(8765, ge=0, le=65535)
     jobs: Annotated[int, option("Jobs that run at a time; others wait.")] = Field(1, ge=1)
     upload_limit: Annotated[float, option("Greatest size of a file.", metavar="MB")] = Field(2000.0, gt=0.0)

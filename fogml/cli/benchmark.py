@@ -59,6 +59,7 @@ class RunSettings(RoundSettings):
             "Drift: a model's name; diagnosis: a method of 'blind run'; or module:function. Repeatable.",
             "--method",
             metavar="NAME",
+            known="fogml.models.names:MODEL_NAMES",
         ),
     ] = []
     features: options.Features = None

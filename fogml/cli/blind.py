@@ -64,7 +64,13 @@ class MakeSettings(SuiteSettings):
     first: Annotated[int, option("Number of the first one.")] = 1
     sample: Annotated[float, option("Interval.", metavar="SECONDS")] = 10.0
     kinds: Annotated[
-        list[str], option("Only cases of this kind; may be repeated.", "--kind", metavar="KIND")
+        list[str],
+        option(
+            "Only cases of this kind; may be repeated.",
+            "--kind",
+            metavar="KIND",
+            known="fogml.blind.truth:KINDS",
+        ),
     ] = []
     least_d_prime: Annotated[float, option("Only strata of d' that begin there or above.", metavar="D")] = 0.0
     d_prime: Annotated[
@@ -74,7 +80,9 @@ class MakeSettings(SuiteSettings):
     reality: Annotated[
         str,
         option(
-            "first, second, third, mix for all in turn, or same-twin for a twin's own runs.", metavar="NAME"
+            "first, second, third, mix for all in turn, or same-twin for a twin's own runs.",
+            metavar="NAME",
+            known=("first", "second", "third", "mix", "same-twin"),
         ),
     ] = "first"
     leave_one_out: Annotated[
@@ -113,6 +121,7 @@ class RunSettings(SuiteSettings):
             "diagnosis, a baseline, 'baselines', or module:function; repeatable.",
             "--method",
             metavar="NAME",
+            known="fogml.blind.methods:METHODS",
         ),
     ] = [DIAGNOSIS]
     code: Annotated[str | None, option("Where module:function lies.", metavar="FOLDER", reads=True)] = None

@@ -14,14 +14,30 @@ from pydantic.fields import FieldInfo
 
 from fogml.cli.each_axis import do_job
 from fogml.cli.given import HELP_NAMES, Given
+from fogml.cli.help import HelpContext
 from fogml.cli.settings import Settings, given_settings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, quoted
 from fogml.json_files import json_text
 
+
+class _Number(click.ParamType):
+    """A number, or a whole one; errors say so rather than name a type of Python."""
+
+    def __init__(self, kind: type, name: str) -> None:
+        self.kind = kind
+        self.name = name
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            return self.kind(value)
+        except ValueError:
+            self.fail(f"{quoted(value)} is no {self.name}", param, ctx)
+
+
 _KINDS: tuple[tuple[type, click.ParamType, str], ...] = (
-    (int, click.INT, "N"),
-    (float, click.FLOAT, "NUMBER"),
+    (int, _Number(int, "whole number"), "N"),
+    (float, _Number(float, "number"), "NUMBER"),
     (str, click.STRING, "TEXT"),
     (dict, click.STRING, "NAME=VALUE"),
     (list, click.STRING, "TEXT"),
@@ -42,6 +58,8 @@ class SettingsCommand(click.Command):
         Their class; its docstring is the help.
     """
 
+    context_class = HelpContext
+
     def __init__(self, name: str, settings: type[Settings]) -> None:
         self.settings = settings
         self.given = given_settings(settings)
@@ -50,7 +68,7 @@ class SettingsCommand(click.Command):
             place = click.Argument(
                 ["config" + _OWN],
                 type=Place(None),
-                metavar="CONFIG",
+                metavar="CONFIG" if _needs_file(settings) else "[CONFIG]",
                 help=settings.config_argument,
                 required=False,
             )
@@ -136,7 +154,7 @@ def _params(settings: type[Settings], key: str, given: Given) -> list[click.Para
     types = _types(field.annotation)
     if bool in types:
         names = _names(key, given)
-        text = _told(given.help, field, names[0].partition("/")[0])
+        text = _told(given.help, field, names[0])
         switch = click.Option([key, *names], is_flag=True, default=None, help=text)
         others = given.values.items()
         return [switch, *(click.Option([key + _OWN + v, o], is_flag=True, help=h) for o, (v, h) in others)]
@@ -170,15 +188,22 @@ def _names(key: str, given: Given) -> tuple[str, ...]:
 
 
 def _told(text: str, field: FieldInfo, switch: str = "") -> str:
-    """The help, with the default where one is stated; of a switch that is on, its option."""
+    """The help, with the default where one is stated; of a switch with two ways, the one that holds."""
     value = field.default
-    if value is True:
-        shown = switch.lstrip("-")
-    elif value is False or not isinstance(value, (str, int, float, list)):
+    if isinstance(value, bool):
+        on, _, off = switch.partition("/")
+        shown = (on if value else off).lstrip("-")
+    elif not isinstance(value, (str, int, float, list)):
         shown = ""
     else:
         shown = ",".join(map(_short, value if isinstance(value, list) else [value]))
     return f"{text.removesuffix('.')} ({shown})." if shown else text
+
+
+def _needs_file(settings: type[Settings]) -> bool:
+    """Whether a setting that no option gives has to be stated."""
+    given = given_settings(settings)
+    return any(field.is_required() and key not in given for key, field in settings.model_fields.items())
 
 
 def _short(value: Any) -> str:
@@ -186,7 +211,9 @@ def _short(value: Any) -> str:
 
 
 def _beginning(names: Any, begun: str) -> list[CompletionItem]:
-    return [CompletionItem(name) for name in names if name.startswith(begun)]
+    # Of a list with commas the last name is the one that is being typed.
+    first = begun[: begun.rfind(",") + 1]
+    return [CompletionItem(first + name) for name in names if name.startswith(begun[len(first) :])]
 
 
 def _common(settings: type[Settings]) -> list[click.Parameter]:

@@ -28,7 +28,12 @@ class CompareSettings(options.LimitSettings):
     models: Annotated[
         list[str],
         BeforeValidator(options.names_list),
-        option('Names with commas between, or "all".', as_text=True),
+        option(
+            'Names with commas between, or "all".',
+            metavar="NAME,...",
+            as_text=True,
+            known="fogml.models.names:MODEL_NAMES",
+        ),
     ] = ["all"]
     features: options.Features = None
     axis: options.Axis = None

@@ -22,7 +22,9 @@ class CompensateSettings(Settings):
         str | None,
         argument("RUN", "The run to compensate.", reads=True, known=options.SHIPPED_RUNS),
     ] = None
-    model: Annotated[str | None, option("Folder of the model: DIR/model.", metavar="DIR", reads=True)] = None
+    model: Annotated[
+        str | None, option("Folder of the model, or of the results that hold it.", metavar="DIR", reads=True)
+    ] = None
     any_unit: options.AnyUnit = False
     axis: options.Axis = None
     repair: options.Repair = False

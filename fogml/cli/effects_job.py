@@ -13,7 +13,6 @@ from fogml.outputs import whole_folder
 from fogml.twin.effect import Effect
 from fogml.twin.registry import effect, effects
 
-_WIDTH = 100
 _TERMINAL_PROGRAMMES = ("multi-point-cycle", "joint-staircase", "separating")
 
 
@@ -42,10 +41,8 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
                     cards.append((card_values(declared), *drawn))
                     work.advance()
             (folder / "catalogue.html").write_text(catalogue_page(cards), encoding="utf-8")
-    terminal.say(f"{len(found)} effects: letter code, id, stage, title\n")
-    for declared in found.values():
-        stage = declared.stage.replace("_", " ")
-        terminal.say(f"{declared.code:4} {declared.id:28} {stage:13} {declared.title}")
+    rows = [[each.code, each.id, each.stage.replace("_", " "), each.title] for each in found.values()]
+    terminal.table(f"{len(found)} effects", ["code", "id", "stage", "title"], rows)
     terminal.result(
         {
             "schema": "fogml.effects/1",
@@ -65,7 +62,7 @@ def _catalogue(out: str | None, terminal: Terminal) -> None:
     if out is not None:
         terminal.say(f"Written to {out}: open {Path(out) / 'catalogue.html'}")
     else:
-        terminal.say("\n`fogml effects ID` prints the card of one.")
+        terminal.say("`fogml effects ID` prints the card of one.")
 
 
 def _card(id: str, out: str | None, terminal: Terminal) -> None:
@@ -90,11 +87,10 @@ def _card(id: str, out: str | None, terminal: Terminal) -> None:
 
 
 def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
-    terminal.say(f"{card['code']}  {card['id']}: {card['title']}  ({card['stage'].replace('_', ' ')})\n")
-    terminal.say(f"{_filled(card['summary'])}\n")
-    terminal.say(textwrap.indent(card["equation"], "    "))
-    for remark in card["remarks"]:
-        terminal.say(f"\n{_filled(remark)}")
+    terminal.say(f"{card['code']}  {card['id']}: {card['title']}  ({card['stage'].replace('_', ' ')})")
+    for paragraph in (card["summary"], textwrap.indent(card["equation"], "    "), *card["remarks"]):
+        terminal.say("")
+        terminal.say(paragraph)
     rows = [
         [
             quantity["name"],
@@ -105,12 +101,12 @@ def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
         for quantity in (card["amplitude"], *card["shape"])
     ]
     terminal.table("", ["parameter", "unit", "tactical", "navigation", "meaning"], rows)
-    terminal.say(_filled(f"Shows: {card['shows']}."))
+    terminal.say(f"Shows: {card['shows']}.")
     if card["confused_with"]:
         terminal.say("Confused with, and told apart by")
     for other, what in card["confused_with"].items():
-        terminal.say(_filled(f"{other}: {what}", "  "))
-    terminal.say(_filled(f"Source: {card['source']}"))
+        terminal.say(f"  {other}: {what}")
+    terminal.say(f"Source: {card['source']}")
 
 
 def _print_pictures(id: str, terminal: Terminal) -> None:
@@ -122,7 +118,8 @@ def _print_pictures(id: str, terminal: Terminal) -> None:
         low, high = float(picture.values.min()), float(picture.values.max())
         what = f" in {next(iter(picture.places))}" if picture.places else ""
         span = f"{number(low)} to {number(high)} {picture.unit}{what}, {picture.hours[-1]:.3g} h"
-        terminal.say(f"\n{picture.programme}: {span}")
+        terminal.say("")
+        terminal.say(f"{picture.programme}: {span}")
         if low != high:
             terminal.say("\n".join(braille(picture.values)))
 
@@ -130,7 +127,3 @@ def _print_pictures(id: str, terminal: Terminal) -> None:
 def _best_first(declared: Effect, names: Sequence[str]) -> list[str]:
     """Names of scenes, first that which shows the effect best."""
     return [declared.shown_on, *(name for name in names if name != declared.shown_on)]
-
-
-def _filled(text: str, indent: str = "") -> str:
-    return textwrap.fill(text, _WIDTH, initial_indent=indent, subsequent_indent=indent)

@@ -37,10 +37,22 @@ class ExportJobSettings(Settings):
         PlainSerializer(_one_as_text),
         argument("MODEL...", "Folder of the model, or of the results of three axes.", reads=True),
     ] = []
-    to: Annotated[str, option("c, onnx, json, mat; segments, px4 or ardupilot.", metavar="FORMAT")] = "c"
-    dtype: Annotated[str | None, option("float64, float32, float16, int8, q15 or q31.", metavar="TYPE")] = (
-        None
-    )
+    to: Annotated[
+        str,
+        option(
+            "c, onnx, json, mat; segments, px4 or ardupilot.",
+            metavar="FORMAT",
+            known=("c", "onnx", "json", "mat", "segments", "px4", "ardupilot"),
+        ),
+    ] = "c"
+    dtype: Annotated[
+        str | None,
+        option(
+            "float64, float32, float16, int8, q15 or q31.",
+            metavar="TYPE",
+            known=("float64", "float32", "float16", "int8", "q15", "q31"),
+        ),
+    ] = None
     bytes: Annotated[int | None, option("Leave out centres until the weights fit N bytes.")] = None
     with_pipeline: Annotated[
         bool, option("ONNX from the temperatures' window.", "--with-pipeline/--features-only")

@@ -50,7 +50,12 @@ class FleetSettings(options.LimitSettings):
     workers: options.Workers = 1
     cluster: Annotated[str | None, option("Scheduler of a Dask cluster.", metavar="tcp://HOST:PORT")] = None
     device: Annotated[
-        str | None, option("Train the units' RBF networks in batches there: cpu, cuda.", metavar="DEVICE")
+        str | None,
+        option(
+            "Train the units' RBF networks in batches there: cpu, cuda.",
+            metavar="DEVICE",
+            known=("cpu", "cuda"),
+        ),
     ] = None
     batch: Annotated[int, option("Units in one batch.")] = 64
     track: options.Track = None

@@ -34,7 +34,8 @@ class Given:
     reads, writes
         It names a file or folder that is read, or written.
     known
-        ``module:names`` of what ships or is built in, listed or given by a function; such a name is no file.
+        Names of what ships or is built in, or ``module:names``, listed or given by a function; such a name
+        is no file.
     """
 
     help: str
@@ -46,11 +47,11 @@ class Given:
     as_text: bool = False
     reads: bool = False
     writes: bool = False
-    known: str | None = None
+    known: str | tuple[str, ...] = ()
 
     def known_names(self) -> Sequence[str]:
         """Names of what ships or is built in."""
-        names = load(self.known) if self.known else ()
+        names = load(self.known) if isinstance(self.known, str) else self.known
         return names() if callable(names) else names
 
     def __get_pydantic_json_schema__(self, core_schema: Any, handler: Any) -> dict[str, Any]:

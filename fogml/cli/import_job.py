@@ -8,7 +8,7 @@ from tempfile import TemporaryDirectory
 
 from fogml.cli.import_ import ImportSettings
 from fogml.cli.runs import most_dropped
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, span
 from fogml.errors import InputError
 from fogml.outputs import whole_file, whole_folder
 from fogml.runs.columns import header
@@ -61,8 +61,8 @@ def import_and_write(settings: ImportSettings, terminal: Terminal) -> None:
                 }
             )
         settings.write_into(folder, "import")
-    rows = [[run.name, str(len(run)), f"{run.span_s:.6g}"] for run in runs]
-    terminal.table(f"Written to {settings.out}", ["run", "rows", "span [s]"], rows)
+    rows = [[run.name, str(len(run)), span(run.span_s)] for run in runs]
+    terminal.table(f"Written to {settings.out}", ["run", "rows", "span"], rows)
     terminal.result({"schema": "fogml.import/1", "runs": written})
 
 

@@ -10,6 +10,9 @@ from fogml.cli import options
 from fogml.cli.given import argument, option
 from fogml.cli.settings import Settings
 
+WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
+"""Ways to spend the time of a seek, by name."""
+
 
 def _transients(value: Any) -> Any:
     """``["0.2,600", ...]`` as flags give them, or pairs as YAML does."""
@@ -68,7 +71,7 @@ class RateSettings(Settings):
     job: ClassVar[str] = "fogml.cli.lab_rate_job:rate_and_write"
     runs: Annotated[
         list[str],
-        argument("RUN...", "Runs on a rate table, with the column rate as commanded.", reads=True),
+        argument("[RUN...]", "Runs on a rate table, with the column rate as commanded.", reads=True),
     ] = []
     twin: Annotated[
         str | None,
@@ -83,7 +86,7 @@ class RateSettings(Settings):
         bool, option("With --twin: its noise too; else its effects alone.", "--noise/--no-noise")
     ] = False
     settle: Annotated[
-        float | None, option("Left out at the begin of each rate (2 samples).", metavar="S")
+        float | None, option("Left out at the begin of each rate (2 samples).", metavar="SECONDS")
     ] = Field(None, ge=0.0)
     answers: Annotated[float, option("Share of the expected output that counts.", metavar="SHARE")] = Field(
         0.5, gt=0.0, lt=1.0
@@ -115,26 +118,42 @@ class NorthSettings(Settings):
     ] = None
     azimuth: Annotated[float | None, option("Simulate a seek at this azimuth.", metavar="DEG")] = None
     latitude: Annotated[float | None, option("Latitude.", metavar="DEG")] = None
-    dwell: Annotated[float, option("In a position.", metavar="S")] = 60.0
-    transfer: Annotated[float, option("Time to the next position.", metavar="S")] = 0.0
+    dwell: Annotated[float, option("In a position.", metavar="SECONDS")] = 60.0
+    transfer: Annotated[float, option("Time to the next position.", metavar="SECONDS")] = 0.0
     drift: Annotated[float, option("Linear drift of the bias.", metavar="DEG/H/H")] = 0.0
     transients: Annotated[
         list[Annotated[tuple[float, float], Field(strict=False)]],
         BeforeValidator(_transients),
-        option("Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,S"),
+        option("Exponential from power-on; may be repeated.", "--transient", metavar="DEG/H,SECONDS"),
     ] = []
-    start: Annotated[float, option("Begin of the seek after power-on.", metavar="S")] = 0.0
+    start: Annotated[float, option("Begin of the seek after power-on.", metavar="SECONDS")] = 0.0
     noise: Annotated[float, option("Angle random walk, for se.", metavar="DEG/SQRT(H)")] = 0.0
-    sense: Annotated[str, option("Way the positions are taken.", metavar="cw|ccw")] = "cw"
+    sense: Annotated[str, option("Way the positions are taken.", metavar="cw|ccw", known=("cw", "ccw"))] = (
+        "cw"
+    )
     order: Annotated[
         list[float],
         options.numbers("0,90,180,270"),
         option("Angles of the positions.", metavar="DEG,...", as_text=True),
     ] = [0.0, 90.0, 180.0, 270.0]
-    way: Annotated[str, option("plain, drift-observing, palindrome, coarse-fine.", metavar="NAME")] = "plain"
-    method: Annotated[str, option("With --positions: auto, plain, drift-observing.", metavar="NAME")] = "auto"
-    settle: Annotated[float, option("With --positions: left out at each begin.", metavar="S")] = 0.0
-    coarse: Annotated[float, option("Time in a coarse position.", metavar="S")] = 6.0
+    way: Annotated[
+        str,
+        option(
+            "plain, drift-observing, palindrome, coarse-fine.",
+            metavar="NAME",
+            known=WAYS,
+        ),
+    ] = "plain"
+    method: Annotated[
+        str,
+        option(
+            "With --positions: auto, plain, drift-observing.",
+            metavar="NAME",
+            known="fogml.lab.north_positions:METHODS",
+        ),
+    ] = "auto"
+    settle: Annotated[float, option("With --positions: left out at each begin.", metavar="SECONDS")] = 0.0
+    coarse: Annotated[float, option("Time in a coarse position.", metavar="SECONDS")] = 6.0
     repair: options.Repair = False
     out: options.FolderIfNamed = None
 

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from fogml.cli.lab import NorthSettings
+from fogml.cli.lab import WAYS, NorthSettings
 from fogml.cli.lab_outputs import say_where, tell
 from fogml.cli.runs import open_run
 from fogml.cli.terminal import Terminal, number
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.json_files import finite_json
 from fogml.lab.north import Drift, Scheme, check_sense, horizontal_rate
 from fogml.lab.north_json import recorded_north_json, simulated_north_json
 from fogml.report.words import duration
-
-WAYS = ("plain", "drift-observing", "palindrome", "coarse-fine")
 
 
 def north_and_write(settings: NorthSettings, terminal: Terminal) -> None:
@@ -50,7 +48,7 @@ def _check(settings: NorthSettings) -> None:
     if not 0.0 <= settings.noise < float("inf"):
         raise InputError(f"noise {settings.noise:g} deg/sqrt(h): a finite number, not negative, is needed")
     if settings.way not in WAYS:
-        raise InputError(f"way '{settings.way}': one of {', '.join(WAYS)} was expected")
+        raise InputError(f"no way '{settings.way}'; {known_are(settings.way, WAYS)}")
 
 
 def _recorded(settings: NorthSettings, terminal: Terminal) -> dict[str, Any]:

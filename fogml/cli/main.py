@@ -15,8 +15,8 @@ import click
 
 from fogml import __version__
 from fogml.cli.given import HELP_NAMES, load
+from fogml.cli.help import HelpContext
 from fogml.errors import FogmlError, did_you_mean, printable
-from fogml.escaping import terminal_text
 from fogml.outputs import NO_ROOM
 from fogml.processes import end_as_interrupted, quiet_libraries
 
@@ -105,6 +105,8 @@ class Group(click.Group):
         By name: where a command's settings are, or those of a group's commands, and its help in one line.
     """
 
+    context_class = HelpContext
+
     def __init__(self, commands: Mapping[str, tuple[str, str]], **more: Any) -> None:
         super().__init__(**more, no_args_is_help=True, context_settings=HELP_NAMES)
         self.known = commands
@@ -152,12 +154,21 @@ class Program(Group):
         except Exception as error:
             from fogml.cli.unexpected import report_unexpected
 
-            click.echo(report_unexpected(error, sys.argv[1:] if args is None else args), err=True)
+            _tell(report_unexpected(error, sys.argv[1:] if args is None else args))
             sys.exit(UNEXPECTED)
+
+    def make_context(self, *words: Any, **more: Any) -> Any:
+        """As click's, its complaints told as all others are."""
+        try:
+            return super().make_context(*words, **more)
+        except click.UsageError as error:
+            _fail_usage(error)
 
     def invoke(self, ctx: Any) -> Any:
         try:
             return super().invoke(ctx)
+        except click.UsageError as error:
+            _fail_usage(error)
         except FogmlError as error:
             fail(str(error))
         except BrokenPipeError:
@@ -179,17 +190,34 @@ class Program(Group):
             raise click.exceptions.Exit(_interrupted(interrupt)) from None
 
 
+def _tell(message: str) -> None:
+    from fogml.cli.terminal import fitted
+
+    click.echo(fitted(message, sys.stderr), err=True)
+
+
 def fail(message: str) -> None:
     """Print one message on stderr and end with exit status 2."""
-    click.echo(f"fogml: {terminal_text(message)}", err=True)
+    _tell(f"fogml: {message}")
     raise click.exceptions.Exit(BAD_INPUT) from None
+
+
+def _fail_usage(error: click.UsageError) -> None:
+    if isinstance(error, click.exceptions.NoArgsIsHelpError):
+        raise error
+    text = error.format_message().rstrip(".")
+    if isinstance(error, click.NoSuchOption):
+        near = did_you_mean(error.option_name, error.possibilities or (), most=2)
+        text = f"no such option '{error.option_name}'; {near}".rstrip("; ")
+    command = error.ctx.command_path if error.ctx else "fogml"
+    fail(f"{text[:1].lower()}{text[1:]} ('{command} --help' lists what there is)")
 
 
 def _interrupted(interrupt: KeyboardInterrupt) -> int:
     """Say what an interrupt leaves behind; the exit status."""
     # Jobs of many units keep those that were finished, and go on from there.
     told = "what is finished is kept, nothing is half written; run the same command again"
-    click.echo(f"fogml: interrupted: {told}", err=True)
+    _tell(f"fogml: interrupted: {told}")
     return getattr(interrupt, "status", INTERRUPTED)
 
 
@@ -211,7 +239,9 @@ def _print_completion(ctx: click.Context, _: click.Parameter, shell: str | None)
 
         maker = get_completion_class(shell)
         assert maker is not None
-        click.echo(maker(ctx.command, {}, "fogml", "_FOGML_COMPLETE").source())
+        script = maker(ctx.command, {}, "fogml", "_FOGML_COMPLETE").source()
+        # In fish click cuts a list of names at its commas.
+        click.echo(script.replace('string split "," ', 'string split -m 1 "," '))
         if shell == "bash":  # names such as shipped:ring-laser-x are one word
             click.echo("COMP_WORDBREAKS=${COMP_WORDBREAKS//:}")
         ctx.exit()

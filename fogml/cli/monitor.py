@@ -26,7 +26,7 @@ class MonitorSettings(Settings):
     ] = None
     runs: Annotated[
         list[str],
-        argument("RUN...", "Runs that are new; none for those of the store.", reads=True),
+        argument("[RUN...]", "Runs that are new; none for those of the store.", reads=True),
     ] = []
     store: Annotated[
         str | None,

@@ -21,6 +21,10 @@ def noise_and_write(settings: NoiseSettings, terminal: Terminal) -> None:
     """Tell the noise of a run, write it where an output folder is named, and print it."""
     if not settings.run:
         raise InputError("no run is given; name one")
+    if settings.to is not None:
+        from fogml.export.noise_parameters import check_target
+
+        check_target(settings.to)
     text = None
     if settings.out is None:
         values = _noise(settings, terminal)

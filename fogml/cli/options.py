@@ -105,7 +105,7 @@ Tests = Annotated[
     ),
 ]
 Model = Annotated[str, option("Name of the model.", metavar="NAME", known="fogml.models.names:MODEL_NAMES")]
-Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".')]
+Features = Annotated[str | None, option('Feature text, e.g. "T, dT, T*dT".', metavar="FEATURES")]
 Parameters = Annotated[
     dict[str, Any], option("Parameter of the model; may be repeated.", "--set"), BeforeValidator(_by_name)
 ]
@@ -117,7 +117,12 @@ AnyUnit = Annotated[
     bool, option("Allow a run of another unit or axis than the model's.", "--any-unit/--same-unit")
 ]
 Axis = Annotated[
-    str | None, option("Of files with gyro_x, gyro_y, gyro_z this one alone; all if none.", metavar="x|y|z")
+    str | None,
+    option(
+        "Of files with gyro_x, gyro_y, gyro_z this one alone; all if none.",
+        metavar="x|y|z",
+        known=("x", "y", "z"),
+    ),
 ]
 Workers = Annotated[int, option("Processes on this machine.")]
 Track = Annotated[

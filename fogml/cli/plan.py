@@ -56,7 +56,9 @@ class PlanSettings(Settings):
         str,
         BeforeValidator(_capital),
         option(
-            "D: volume of the confidence ellipsoid; A: mean square of the standard errors.", metavar="D|A"
+            "D: volume of the confidence ellipsoid; A: mean square of the standard errors.",
+            metavar="D|A",
+            known=("D", "A"),
         ),
     ] = "D"
     runs: Annotated[int, option("How many runs, planned in turn.")] = 1

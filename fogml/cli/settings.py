@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, ValidationIn
 
 from fogml import __version__
 from fogml.cli.given import Given, option
-from fogml.errors import InputError, did_you_mean, listed, quoted
+from fogml.errors import InputError, known_are, listed, quoted
 from fogml.outputs import check_is_no_folder, sole_writer, whole_file
 from fogml.yaml_text import read_yaml, yaml_text
 
@@ -182,8 +182,7 @@ def _message(settings: type[Settings], error: ValidationError, source: str, stat
         return f"{source}: unknown key {quoted(within)}"
     if first["type"] == "extra_forbidden":
         known = [field.alias or name for name, field in settings.model_fields.items()]
-        hint = did_you_mean(key, known)
-        return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
+        return f"{source}: unknown key {quoted(key)}; {known_are(key, known, 'known keys')}"
     place = f"{source}: " if key in stated else ""
     if first["type"] == "missing":
         lacking = [quoted(".".join(map(str, e["loc"]))) for e in error.errors() if e["type"] == "missing"]

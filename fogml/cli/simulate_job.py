@@ -6,7 +6,7 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from fogml.cli.simulate import SimulateSettings
-from fogml.cli.terminal import Terminal
+from fogml.cli.terminal import Terminal, span
 from fogml.errors import InputError
 from fogml.runs.facts import facts_from
 from fogml.twin.between_runs import Storage
@@ -158,7 +158,7 @@ def _print(settings: SimulateSettings, world: World, rows: int, terminal: Termin
         "notes": list(twin.notes),
     }
     terminal.say(
-        f"{rows} samples every {settings.sample_s:g} s, {programme.total_hours:.3g} h of {programme.name}, "
+        f"{rows} samples every {settings.sample_s:g} s, {span(programme.total_s)} of {programme.name}, "
         f"written to {settings.out}"
     )
     on = ", ".join(twin.settings) or "none"

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
 import sys
+import textwrap
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from datetime import timedelta
+from typing import Any, Protocol, TextIO
 
 import click
 
@@ -48,12 +53,12 @@ class Terminal:
     def note(self, text: str) -> None:
         """A line on stderr."""
         if not self.quiet:
-            click.echo(terminal_text(text), err=True)
+            click.echo(fitted(text, sys.stderr), err=True)
 
     def say(self, text: str) -> None:
         """A line on stdout for people."""
         if not (self.quiet or self.as_json):
-            click.echo(terminal_text(text))
+            click.echo(fitted(text, sys.stdout))
 
     def markdown(self, text: str) -> None:
         """Markdown on stdout for people, as headings, lists and tables."""
@@ -70,22 +75,27 @@ class Terminal:
             click.echo(json_text(values, "result", ascii_only=True))
 
     def table(self, title: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-        """A table on stdout for people: the first column left, the others right; no head if it names none."""
+        """A table on stdout for people: figures right, all else left; no head if it names none."""
         if self.quiet or self.as_json:
             return
         from rich import box
         from rich.console import Console
         from rich.table import Table
 
-        table = Table(title=terminal_text(title), title_justify="left", box=box.SIMPLE_HEAD, pad_edge=False)
+        if title:
+            self.say(title)
+        table = Table(box=box.SIMPLE_HEAD, pad_edge=False)
         table.show_header = any(header)
-        console = Console(highlight=False, markup=False)
+        # In a file or a pipe a row is a line.
+        bounded = sys.stdout.isatty() or "COLUMNS" in os.environ
+        console = Console(highlight=False, markup=False, width=None if bounded else _UNBOUNDED)
         columns = [[terminal_text(cell) for cell in cells] for cells in zip(header, *rows, strict=True)]
         widths = _column_widths(columns, console.width)
         for number, name in enumerate(header):
             # Where whole words don't fit they break anywhere rather than be cut: a figure is never lost.
             width = widths[number] if widths else None
-            table.add_column(name, justify="right" if number else "left", overflow="fold", width=width)
+            side = "right" if number and _holds_figures(columns[number][1:]) else "left"
+            table.add_column(name, justify=side, overflow="fold", width=width)
         for row in rows:
             table.add_row(*map(terminal_text, row))
         console.print(table)
@@ -102,8 +112,35 @@ class Terminal:
             yield _Lines(what, total)
 
 
+def fitted(text: str, stream: TextIO) -> str:
+    """Text for a stream: in a terminal a sentence breaks between words, and no name or figure in the middle.
+
+    Blocks of lines and commands stay as they are, to be copied.
+    """
+    text = terminal_text(text)
+    if "\n" in text or text.startswith("fogml ") or not stream.isatty():
+        return text
+    width = shutil.get_terminal_size().columns
+    below = " " * (len(text) - len(text.lstrip()) + 2)
+    return textwrap.fill(text, width, subsequent_indent=below, break_long_words=False, break_on_hyphens=False)
+
+
+def span(seconds: float) -> str:
+    """A span of time for people: in hours, below one in minutes."""
+    return f"{number(seconds / 3600)} h" if seconds >= 3600.0 else f"{number(seconds / 60)} min"
+
+
+_UNBOUNDED = 10_000
+"""Width of a table that nobody sees in a terminal [characters]."""
+_FIGURE = re.compile("[-−+]?[0-9]")
 _BETWEEN = 3
 """Characters between two columns of a table."""
+
+
+def _holds_figures(cells: Sequence[str]) -> bool:
+    """Whether most of the cells that hold anything begin with a figure."""
+    held = [cell for cell in cells if cell not in ("", "–")]
+    return 2 * sum(map(bool, map(_FIGURE.match, held))) >= len(held)
 
 
 def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | None:
@@ -114,11 +151,16 @@ def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | 
     if room < 0:
         return None
     for _ in range(room):
-        short = [most - held for most, held in zip(whole, widths, strict=True)]
-        if max(short) <= 0:
+        folds = [most / held for most, held in zip(whole, widths, strict=True)]
+        if max(folds) <= 1.0:
             break
-        widths[short.index(max(short))] += 1
+        widths[folds.index(max(folds))] += 1
     return widths
+
+
+def _clock(seconds: float) -> str:
+    """A time as the bar shows it: hours, minutes, seconds."""
+    return str(timedelta(seconds=round(seconds)))
 
 
 class _Silent:
@@ -156,10 +198,10 @@ class _Lines:
             return
         self._shown = now
         spent = now - self._began
-        text = f"{what}: {spent:.0f} s"
+        text = f"{what}: {_clock(spent)}"
         if self._total and self._done:
             left = spent * (self._total - self._done) / self._done
-            text = f"{what}: {self._done / self._total:.0%}, about {left:.0f} s left"
+            text = f"{what}: {self._done / self._total:.0%}, about {_clock(left)} left"
         click.echo(terminal_text(text), err=True)
 
 
@@ -174,16 +216,18 @@ def _bar(what: str, total: float | None) -> Iterator[Work]:
         TimeElapsedColumn,
         TimeRemainingColumn,
     )
+    from rich.table import Column
 
     columns = [
         SpinnerColumn(),
-        TextColumn("{task.description}", markup=False),
-        BarColumn(),
+        TextColumn("{task.description}", markup=False, table_column=Column(no_wrap=True, ratio=3)),
+        BarColumn(bar_width=None, table_column=Column(ratio=2)),
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
     ]
-    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+    # Of a line that is too long the description is cut, not the times.
+    with Progress(*columns, console=Console(stderr=True), transient=True, expand=True) as progress:
         task = progress.add_task(visible(what), total=total)
 
         class Bar:

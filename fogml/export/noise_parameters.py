@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from fogml import __version__
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.json_files import json_text
 
 KALMAN_SCHEMA = "fogml.kalman/1"
@@ -153,6 +153,18 @@ TARGETS: dict[str, tuple[str, Callable[[NoiseParameters], str]]] = {
 """Name of what reads it: the file's name, and its writer."""
 
 
+def check_target(to: str) -> None:
+    """Check that something reads the terms under this name.
+
+    Raises
+    ------
+    InputError
+        If not, listing what does.
+    """
+    if to not in TARGETS:
+        raise InputError(f"--to '{to}' is not known; {known_are(to, TARGETS)}")
+
+
 def noise_text(noise: Mapping[str, Any], to: str) -> tuple[str, str]:
     """File name and text of a ``noise.json`` for another program.
 
@@ -161,7 +173,6 @@ def noise_text(noise: Mapping[str, Any], to: str) -> tuple[str, str]:
     InputError
         For an unknown target, and as `noise_parameters`.
     """
-    if to not in TARGETS:
-        raise InputError(f"--to {to}: known are {', '.join(TARGETS)}")
+    check_target(to)
     name, write = TARGETS[to]
     return name, write(noise_parameters(noise))

@@ -9,7 +9,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from fogml import __version__
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.export.c_source import C_DTYPES
 from fogml.export.check import Difference
 from fogml.export.plan import Plan
@@ -20,6 +20,7 @@ SCHEMA = "fogml.export/1"
 Target = Literal["c", "onnx", "json", "mat"]
 TARGETS: tuple[str, ...] = get_args(Target)
 TABLE_TARGETS = ("segments", "px4", "ardupilot")
+ALL_TARGETS = (*TARGETS, *TABLE_TARGETS)
 """What `fogml.export.tables` writes."""
 DTYPES = ("float64", "float32", "float16", "int8", "q15", "q31")
 TOLERANCE_SHARE = {"float64": 1e-4, "float32": 0.01, "q31": 0.02, "q15": 0.05, "float16": 0.05, "int8": 0.5}
@@ -71,11 +72,10 @@ def tolerance_of(model: DriftModel, settings: ExportSettings, dtype: str, binned
 
 def check_settings(settings: ExportSettings, dtype: str) -> None:
     if settings.to not in TARGETS:
-        raise InputError(
-            f"--to '{settings.to}' is not known; known are {', '.join((*TARGETS, *TABLE_TARGETS))}"
-        )
+        known = known_are(settings.to, ALL_TARGETS)
+        raise InputError(f"--to '{settings.to}' is not known; {known}")
     if dtype not in DTYPES:
-        raise InputError(f"--dtype '{dtype}' is not known; known are {', '.join(DTYPES)}")
+        raise InputError(f"--dtype '{dtype}' is not known; {known_are(dtype, DTYPES)}")
     allowed = C_DTYPES if settings.to == "c" else FILE_DTYPES
     if dtype not in allowed:
         other = "for --to onnx, json and mat" if settings.to == "c" else "for --to c"

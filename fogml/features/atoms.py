@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.features import curves as curves  # declares the curves that ship
 from fogml.features.memories import MEMORY_OPERATORS
 from fogml.features.own import Function, Recursion, own_operator
@@ -70,7 +70,7 @@ class Atom:
     def __post_init__(self) -> None:
         own = self.own
         if self.operator not in OPERATORS and own is None:
-            raise InputError(f"atom: no operator '{self.operator}'; known are {', '.join(OPERATORS)}")
+            raise InputError(f"atom: no operator '{self.operator}'; {known_are(self.operator, OPERATORS)}")
         if self.operator not in WINDOWED:
             object.__setattr__(self, "window", None)
         elif self.window is None:

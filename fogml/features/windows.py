@@ -8,7 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.features.own import own_window
 from fogml.features.signal import number_text
 from fogml.signals import windows
@@ -42,7 +42,7 @@ class Window:
 
     def __post_init__(self) -> None:
         if self.method not in METHODS and self.own is None:
-            raise InputError(f"window: no method '{self.method}'; known are {', '.join(METHODS)}")
+            raise InputError(f"window: no method '{self.method}'; {known_are(self.method, METHODS)}")
         if self.method == "first":
             object.__setattr__(self, "length_s", 0.0)
         elif not (np.isfinite(self.length_s) and self.length_s > 0.0):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, did_you_mean, quoted
+from fogml.errors import InputError, known_are, quoted
 from fogml.yaml_text import read_yaml
 
 MANIFEST_SCHEMA = "fogml.manifest/1"
@@ -126,8 +126,8 @@ def _check_keys(keys: Iterable[str], place: str) -> None:
     for key in keys:
         if key not in COLUMNS and not (key.startswith(COVARIATE) and _COVARIATE_NAME.fullmatch(key)):
             raise InputError(
-                f"{place}: unknown column {quoted(key)}; {did_you_mean(key, COLUMNS)}known are "
-                f"{', '.join(COLUMNS)}, and those of production such as {COVARIATE}coil_lot"
+                f"{place}: unknown column {quoted(key)}; {known_are(key, COLUMNS)}, "
+                f"and those of production such as {COVARIATE}coil_lot"
             )
     for key in ("unit", "train"):
         if key not in keys:

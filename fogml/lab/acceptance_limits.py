@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, listed, quoted
+from fogml.errors import InputError, known_are, quoted
 from fogml.lab.acceptance_rows import BY_KEY
 from fogml.yaml_text import read_yaml
 
@@ -66,13 +66,12 @@ def read_limits(path: str | Path) -> Limits:
     if not isinstance(values, dict) or not isinstance(values.get("limits"), dict):
         raise InputError(f"{path.name}: a mapping 'limits' was expected, e.g. {_EXAMPLE}")
     if unknown := [key for key in values if key not in _KEYS]:
-        raise InputError(f"{path.name}: unknown key {quoted(unknown[0])}; known keys are {', '.join(_KEYS)}")
+        known = known_are(str(unknown[0]), _KEYS, "known keys")
+        raise InputError(f"{path.name}: unknown key {quoted(unknown[0])}; {known}")
     found = {}
     for key, stated in values["limits"].items():
         if key not in BY_KEY:
-            raise InputError(
-                f"{path.name}: no quantity {quoted(key)}; known are {listed(BY_KEY, len(BY_KEY))}"
-            )
+            raise InputError(f"{path.name}: no quantity {quoted(key)}; {known_are(str(key), BY_KEY)}")
         found[key] = _limit(stated, f"{path.name}: limit of '{key}'")
     names = {key: None if values.get(key) is None else str(values[key]) for key in ("customer", "document")}
     return Limits(

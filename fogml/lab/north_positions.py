@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.lab.north import (
     DEFAULT_ORDER,
     Drift,
@@ -118,7 +118,7 @@ def north_from_positions(
         If positions are missing or are none, or the settings are not accepted.
     """
     if method not in METHODS:
-        raise InputError(f"method '{method}': one of {', '.join(METHODS)} was expected")
+        raise InputError(f"no method '{method}'; {known_are(method, METHODS)}")
     stays = _stays(run, order_deg, sense, settle_s, angle_tolerance_deg)
     angles = np.asarray(order_deg, dtype=np.float64)[stays.positions.astype(int) - 1]
     plain_design = design_matrix(angles, sense, None)

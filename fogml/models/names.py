@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from fogml.errors import InputError, did_you_mean
+from fogml.errors import InputError, known_are
 
 if TYPE_CHECKING:
     from fogml.models.base import DriftModel
@@ -172,6 +172,6 @@ def _unknown(name: str) -> str:
 
     known = (*MODEL_NAMES, *own_regressors())
     return (
-        f"model '{name}' is not known; {did_you_mean(name, known)}known are {', '.join(known)}, "
+        f"model '{name}' is not known; {known_are(name, known)}, "
         "or a scikit-learn regressor by its dotted name, e.g. sklearn.svm.SVR"
     )

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from sklearn.utils._param_validation import make_constraint
 
-from fogml.errors import InputError, did_you_mean, quoted
+from fogml.errors import InputError, known_are, quoted
 
 
 class WholeNumbers:
@@ -82,7 +82,7 @@ def check_parameters(kind: type, given: Mapping[str, Any], name: str | None = No
     constraints: Mapping[str, Any] = getattr(kind, "_parameter_constraints", {})
     for parameter, value in given.items():
         if parameter not in known:
-            told = f"{did_you_mean(str(parameter), known)}parameters are {', '.join(known)}"
+            told = known_are(str(parameter), known, "parameters")
             raise InputError(f"{name}: no parameter {quoted(str(parameter))}; {told}")
         allowed = constraints.get(parameter, "no_validation")
         accepted = [] if isinstance(allowed, str) else [_constraint(one) for one in allowed]

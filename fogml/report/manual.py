@@ -12,7 +12,7 @@ from typing import Any
 from markupsafe import Markup
 
 import fogml
-from fogml.errors import InputError, did_you_mean
+from fogml.errors import InputError, known_are
 from fogml.escaping import markup
 from fogml.report.page import render
 
@@ -72,7 +72,7 @@ def page_text(folder: Path, name: str, made: Mapping[str, str] | None = None) ->
     """
     names = page_names(folder)
     if name not in names:
-        raise InputError(f"no page '{name}'; {did_you_mean(name, names)}pages are {', '.join(names)}")
+        raise InputError(f"no page '{name}'; {known_are(name, names, 'pages')}")
     written = (folder / f"{name}.md").read_text(encoding="utf-8")
     plain = re.sub(r"^```\{[a-z-]+\}.*?^```\n", "", written, flags=re.MULTILINE | re.DOTALL)
     return plain + (made or {}).get(name, "")

@@ -78,7 +78,7 @@ def _dropouts(run: Run) -> Iterator[Finding]:
             readings = "1 reading" if count == 1 else f"{count} readings"
             message = (
                 f"{readings} of '{name}' {'is' if count == 1 else 'are'} none, the first "
-                f"{run.columns[name][row]:.6g} at {run.time[row]:.6g} s: out of range, or a jump that no "
+                f"{run.columns[name][row]:.6g} at {run.time[row]:.10g} s: out of range, or a jump that no "
                 "heat makes; the last good one is held, the rows are flagged and left out of fit and score"
             )
             yield Finding("temperature_dropouts", message, column=name, row=row + 1, count=count)
@@ -92,7 +92,7 @@ def _gaps(run: Run) -> Iterator[Finding]:
         gaps = "1 gap" if len(starts) == 1 else f"{len(starts)} gaps"
         message = (
             f"{gaps} longer than 3 sample intervals, the longest {lengths[longest]:.4g} s at "
-            f"{run.time[starts[longest] - 1]:.6g} s; the run is cut into {len(starts) + 1} stretches"
+            f"{run.time[starts[longest] - 1]:.10g} s; the run is cut into {len(starts) + 1} stretches"
         )
         yield Finding("gap", message, column="time", row=int(starts[0]) + 1, count=len(starts))
 
@@ -141,8 +141,8 @@ def _stuck(run: Run) -> Iterator[Finding]:
             first, last = int(starts[found[0]]), int(stops[found[0]]) - 1
             times = "" if len(found) == 1 else f", and {len(found) - 1} times more,"
             message = (
-                f"'{name}' stays at {values[first]:.6g} from {run.time[first]:.6g} s to "
-                f"{run.time[last]:.6g} s{times} while a temperature moves; the sensor may be stuck"
+                f"'{name}' stays at {values[first]:.6g} from {run.time[first]:.10g} s to "
+                f"{run.time[last]:.10g} s{times} while a temperature moves; the sensor may be stuck"
             )
             count = int((stops - starts)[found].sum())
             yield Finding("stuck_sensor", message, column=name, row=first + 1, count=count)
@@ -238,7 +238,7 @@ def _outliers(run: Run) -> Iterator[Finding]:
         samples = "1 sample" if len(found) == 1 else f"{len(found)} samples"
         message = (
             f"{samples} of 'gyro' over {OUTLIER_SIGMA:g} robust sigma ({sigma[0]:.4g}) off their "
-            f"neighbours, the first {run.gyro[row]:.6g} at {run.time[row]:.6g} s; kept"
+            f"neighbours, the first {run.gyro[row]:.6g} at {run.time[row]:.10g} s; kept"
         )
         yield Finding("outliers", message, column="gyro", row=row + 1, count=len(found))
 

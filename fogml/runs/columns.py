@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, known_are, quoted
 from fogml.runs.units import canonical_unit, converted
 
 
@@ -146,7 +146,8 @@ def conversion(name: str, unit: str | None, file: str) -> tuple[float, float]:
     found = spec.units.get(unit) or converted(unit, spec.internal)
     if found is None:
         raise InputError(
-            f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; use one of {accepted}"
+            f"{file}: column '{name}' has unit {quoted(unit)}, not accepted here; "
+            f"{known_are(unit, spec.units, 'accepted units')}"
         )
     return found
 

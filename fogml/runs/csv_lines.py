@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, counted, quoted
 from fogml.runs.csv_dialect import CsvDialect
 from fogml.runs.findings import Finding
 from fogml.runs.raw_table import RawTable, no_samples, text_column
@@ -181,7 +181,8 @@ class LineReader:
             kind = "cut short" if len(fields) < width else "too long"
             is_split = dialect.separator == "," and any(text.strip().isdigit() for text in fields[width:])
             hint = "; is the comma a decimal mark too? Export it with semicolons between" if is_split else ""
-            raise _Fault(f"line {line}: {len(fields)} fields where the header has {width} (row {kind}){hint}")
+            held = counted(len(fields), "field")
+            raise _Fault(f"line {line}: {held} where the header has {width} (row {kind}){hint}")
         for place, form in dialect.stamps.columns if dialect.stamps else ():
             if not form.matches(fields[place]):
                 raise _Fault(

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, known_are, quoted
 from fogml.yaml_text import read_yaml, yaml_text
 
 EARTH_RATE_DEG_H = 15.041067
@@ -193,8 +193,8 @@ def facts_from(values: Any, source: str) -> Facts:
         first = error.errors()[0]
         key = str(first["loc"][0]) if first["loc"] else "?"
         if first["type"] == "extra_forbidden":
-            known = ", ".join(Facts.model_fields)
-            raise InputError(f"{source}: unknown key {quoted(key)}; known keys are {known}") from None
+            known = known_are(key, Facts.model_fields, "known keys")
+            raise InputError(f"{source}: unknown key {quoted(key)}; {known}") from None
         reason = f"{first['msg'].removeprefix('Value error, ')} (found {quoted(first['input'])})"
         example = f"; write e.g. {key}: {_EXAMPLES[key]}" if key in _EXAMPLES else ""
         raise InputError(f"{source}: key '{key}': {reason}{example}") from None

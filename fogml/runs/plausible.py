@@ -164,8 +164,8 @@ def _scale_factor(run: Run, gyro: FloatArray) -> Iterator[Finding]:
     spread = large.median(large.parts_of(ratios, lambda part: np.abs(part - middle)))
     if abs(middle - 1.0) <= FAR_SCALE_FACTOR or spread > abs(middle) / LEAST_TURN_SIGMA:
         return
-    told = f"the output follows the table rate {middle:.4g} times, {1e6 * (middle - 1.0):.3g} ppm off: "
-    yield Finding("implausible_scale_factor", told + _why(middle), column="gyro", count=len(ratios))
+    told = f"the output follows the table rate {middle:.6g} times: {_why(middle)}"
+    yield Finding("implausible_scale_factor", told, column="gyro", count=len(ratios))
 
 
 def _why(ratio: float) -> str:

@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
-from fogml.errors import InputError, quoted
+from fogml.errors import InputError, known_are, quoted
 from fogml.runs.columns import KNOWN, column_spec, is_accepted
 from fogml.runs.facts import NAMES, Facts
 from fogml.runs.profile_parts import (
@@ -192,14 +192,15 @@ def _check_units(columns: dict[str, ImportColumn]) -> None:
     for name, column in columns.items():
         spec = column_spec(name)
         if spec is None:
-            known = ", ".join([*KNOWN, "T1, T2 ..."])
-            raise ValueError(f"key 'columns.{name}': not a column of the run format; use one of {known}")
+            known = known_are(name, [*KNOWN, "T1, T2 ..."], "those")
+            raise ValueError(f"key 'columns.{name}': not a column of the run format; {known}")
         is_stamp = name == "time" and column.unit == STAMP
         if isinstance(column.source, list) and not is_stamp:
             raise ValueError(f"key 'columns.{name}.source': one column was expected")
         if not is_stamp and not is_accepted(name, column.unit):
-            accepted = ", ".join([*spec.units, *([STAMP] if name == "time" else [])])
-            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not one of {accepted}")
+            units = [*spec.units, *([STAMP] if name == "time" else [])]
+            told = known_are(str(column.unit), units, "accepted units")
+            raise ValueError(f"key 'columns.{name}.unit': {quoted(column.unit)} is not accepted; {told}")
 
 
 def _check_clock(profile: ImportProfile) -> None:
@@ -223,9 +224,8 @@ def load_profile(name_or_path: str | Path) -> ImportProfile:
     text = str(name_or_path)
     path = PROFILE_FOLDER / f"{text}.yaml" if text in profile_names() else Path(text)
     if not path.is_file():
-        raise InputError(
-            f"{text}: no such import profile; give a YAML file or one of {', '.join(profile_names())}"
-        )
+        known = known_are(text, profile_names(), "those that ship")
+        raise InputError(f"{text}: no such import profile; {known}; or give a YAML file")
     values = read_yaml(path, NAMES)
     if not isinstance(values, dict):
         raise InputError(f"{path.name}: an import profile must be 'key: value' lines")
@@ -250,8 +250,8 @@ def _first_fault(error: ValidationError) -> str:
             home = _HOMES.get(str(part), home)
         # What a profile begins with comes first, whichever class states it.
         fields = sorted(home.model_fields.items(), key=lambda item: item[0] not in ("schema_", "description"))
-        known = ", ".join(field.alias or name for name, field in fields)
-        return f"unknown key {quoted(key)}; known keys are {known}"
+        known = [field.alias or name for name, field in fields]
+        return f"unknown key {quoted(key)}; {known_are(str(first['loc'][-1]), known, 'known keys')}"
     if first["type"] == "missing":
         return f"key '{key}' is missing"
     message = str(first["msg"]).removeprefix("Value error, ")

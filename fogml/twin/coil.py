@@ -23,7 +23,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.runs.run import FloatArray
 from fogml.twin.optics import DEG_H, REFERENCE_COIL, WINDINGS, Coil, Winding
 from fogml.twin.plant.network import PlantState, ThermalNetwork
@@ -81,7 +81,7 @@ def winding_order(winding: Winding, layers: int = 32) -> NDArray[np.int64]:
         For an unknown winding, or a number of layers that is no multiple of its pattern.
     """
     if winding not in WINDINGS:
-        raise InputError(f"winding '{winding}' is not known; windings are {', '.join(WINDINGS)}")
+        raise InputError(f"winding '{winding}' is not known; {known_are(winding, WINDINGS, 'windings')}")
     number = np.arange(layers)
     if winding == "cylinder":
         return number

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.runs.run import FloatArray
 from fogml.twin.inputs import Inputs
 from fogml.twin.quantities import Grade, Quantity
@@ -132,7 +132,7 @@ class Effect(ABC):
         known = {"amplitude": self.amplitude, **{p.name: p for p in self.shape}}
         for key in values:
             if key not in known:
-                raise InputError(f"{owner}: unknown key '{key}'; known keys are {', '.join(known)}")
+                raise InputError(f"{owner}: unknown key '{key}'; {known_are(key, known, 'known keys')}")
         if "amplitude" not in values:
             raise InputError(f"{owner}: 'amplitude' [{self.amplitude.unit}] is missing")
         shape = self.default_shape() | {

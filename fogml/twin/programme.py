@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from fogml.errors import InputError, did_you_mean, quoted
+from fogml.errors import InputError, did_you_mean, known_are, quoted
 from fogml.runs.facts import Facts, facts_from
 from fogml.twin.schedule import Schedule, schedule
 from fogml.twin.sentences import parse_action, parse_quantity, parse_step
@@ -161,7 +161,8 @@ def programme_from(values: Any, source: str = "programme") -> Programme:
         raise InputError(f"{source}: a programme is a list of steps, or 'key: value' lines")
     for key in values:
         if key not in _KEYS:
-            raise InputError(f"{source}: unknown key {quoted(key)}; known keys are {', '.join(_KEYS)}")
+            known = known_are(str(key), _KEYS, "known keys")
+            raise InputError(f"{source}: unknown key {quoted(key)}; {known}")
     if values.get("schema", SCHEMA) != SCHEMA:
         raise InputError(f"{source}: 'schema' is {quoted(values['schema'])}; {SCHEMA} is understood")
     settings: dict[str, Any] = {}

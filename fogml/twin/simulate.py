@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.runs.columns import KNOWN, REPLAYED, coil_sensor_number, header, is_temperature
 from fogml.runs.facts import Facts, ScaleFactor
 from fogml.runs.run import FloatArray, Run
@@ -239,8 +239,7 @@ def world_of(
         if name in _NO_SENSOR or (name not in KNOWN and coil_sensor_number(name) is None):
             known = [key for key in KNOWN if key not in _NO_SENSOR]
             raise InputError(
-                f"columns: '{name}' can't be recorded; known are {', '.join(known)} "
-                "and coil sensors T1, T2 ..."
+                f"columns: '{name}' can't be recorded; {known_are(name, known)} and coil sensors T1, T2 ..."
             )
     if len(set(names)) < len(names):
         raise InputError("columns: one is named twice")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydantic import ValidationError
 
-from fogml.errors import InputError, did_you_mean
+from fogml.errors import InputError, did_you_mean, known_are
 from fogml.outputs import whole_file
 from fogml.runs.columns import KNOWN, is_temperature
 from fogml.twin.draws import moved
@@ -260,10 +260,8 @@ def _setting(source: str, id: str, entry: Mapping[str, Stated], section: str = "
     values = {}
     for name, held in entry.items():
         if name not in known:
-            raise InputError(
-                f"unknown key '{section}.{id}.{name}'; {did_you_mean(name, known)}known keys are "
-                f"{', '.join(known)}"
-            )
+            told = known_are(name, known, "known keys")
+            raise InputError(f"unknown key '{section}.{id}.{name}'; {told}")
         values[name] = _value(source, f"{section}.{id}.{name}", held, known[name])
     amplitude, shape = declared.checked(values)
     return EffectSetting(amplitude, shape)

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
-from fogml.errors import did_you_mean, quoted
+from fogml.errors import known_are, quoted
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.optics import Winding
@@ -149,8 +149,7 @@ def message(error: ValidationError, source: str) -> str:
     key = ".".join(words) or "?"
     if first["type"] == "extra_forbidden":
         known = _known_keys(words[:-1])
-        hint = did_you_mean(words[-1], known)
-        return f"{source}: unknown key {quoted(key)}; {hint}known keys are {', '.join(known)}"
+        return f"{source}: unknown key {quoted(key)}; {known_are(words[-1], known, 'known keys')}"
     if first["type"] == "missing":
         return f"{source}: nothing is given for '{key}'"
     reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]

@@ -6,7 +6,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
-from fogml.errors import InputError
+from fogml.errors import InputError, known_are
 from fogml.validation.repeatability import LEAST_RUNS, repeatability_of
 from fogml.validation.results import LimitOutcome, Metrics, RunJudgement
 
@@ -26,7 +26,7 @@ def check_limits(limits: Mapping[str, float]) -> dict[str, float]:
     checked = {}
     for name, limit in limits.items():
         if name not in QUANTITIES:
-            raise InputError(f"limit on '{name}': no such figure; known are {', '.join(QUANTITIES)}")
+            raise InputError(f"limit on '{name}': no such figure; {known_are(name, QUANTITIES)}")
         checked[name] = _positive(limit, f"limit {name}")
     return checked
 

@@ -56,6 +56,7 @@ def test_training_runs_prune_and_judge(invoke_json, model, run_files, tmp_path):
     [
         (("--tolerance", "0"), "differs by up to"),
         (("--to", "pdf"), "known are"),
+        (("--to", "segmets"), "did you mean 'segments'"),
         (("--bytes", "3"), "too few"),
         (("--sample-s", "200"), "too short"),
     ],

@@ -21,6 +21,8 @@ from fogml.cli import each_axis, main
 from fogml.cli.options_page import commands_of
 from fogml.cli.settings import given_settings
 from fogml.errors import InputError
+from fogml.export.noise_parameters import TARGETS
+from fogml.export.settings import ALL_TARGETS, DTYPES
 from fogml.processes import Terminated
 
 runner = CliRunner()
@@ -83,6 +85,32 @@ def test_every_option_is_a_setting_with_help_and_in_the_schema(words, found):
         assert param.name.partition("__")[0] in settings | {"config", "as_json", "quiet", "schema"}
 
 
+@pytest.mark.parametrize("columns", [60, 80])
+def test_help_breaks_between_words(columns, monkeypatch, capsys):
+    """Names of files, options and values stay whole, in every command's help."""
+    monkeypatch.setenv("COLUMNS", str(columns))
+    for words, found in every_command():
+        with pytest.raises(SystemExit):
+            main.app([*words, "--help"], prog_name="fogml")
+        told = capsys.readouterr().out
+        assert max(map(len, told.splitlines())) <= columns
+        texts = [found.help, *(param.help for param in found.params)]
+        held = {word for text in texts for word in text.split() if len(word) <= columns // 3}
+        assert held <= set(told.split())
+
+
+def test_a_switch_tells_which_way_holds():
+    told = " ".join(runner.invoke(main.app, ["train", "--help"]).stdout.split())
+    assert "is in every result (no-repair)." in told and "met there (train-once)." in told
+    assert "(next-run)." in " ".join(runner.invoke(main.app, ["diagnose", "--help"]).stdout.split())
+
+
+@pytest.mark.parametrize(("name", "needed"), [("sweep", True), ("simulate", False)])
+def test_what_may_be_left_out_stands_in_brackets(name, needed):
+    usage = runner.invoke(main.app, [name, "--help"]).stdout.splitlines()[0]
+    assert usage.endswith("[OPTIONS] CONFIG" if needed else "[OPTIONS] [CONFIG]")
+
+
 def completions(words, begun):
     context = main.app.make_context("fogml", [*words, "--help"], resilient_parsing=True)
     found = main.app
@@ -102,16 +130,29 @@ def completions(words, begun):
         (["diagnose", "--without"], "shupe_m", "shupe_mohr"),
         (["import", "--profile"], "therm", "thermal-cycle-mems"),
         (["lab", "rate", "--twin"], "tac", "tactical"),
+        (["lab", "north", "--way"], "drift", "drift-observing"),
+        (["compare", "--models"], "mean,poly", "mean,polynomial"),
+        (["plan", "--separate"], "shupe_trim,shupe_m", "shupe_trim,shupe_mohr"),
+        (["blind", "run", "--method"], "ran", "random-forest"),
+        (["train", "--axis"], "", "y"),
+        (["docs", "[PAGE]"], "fir", "firmware"),
     ],
 )
 def test_names_complete_in_a_shell(words, begun, name):
     assert name in completions(words, begun)
 
 
+def test_formats_that_complete_are_those_that_are_known():
+    assert completions(["export", "--to"], "") == set(ALL_TARGETS)
+    assert completions(["export", "--dtype"], "") == set(DTYPES)
+    assert completions(["noise", "--to"], "") == set(TARGETS)
+
+
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_shell_gets_its_script(shell):
     script = runner.invoke(main.app, ["--completion", shell]).stdout
     assert f"_FOGML_COMPLETE={shell}_complete" in script
+    assert ('string split -m 1 "," ' in script) == (shell == "fish")
 
 
 def test_bash_completes_names_and_files(tmp_path):
@@ -132,6 +173,7 @@ def test_bash_completes_names_and_files(tmp_path):
         (b"fogml lab rate --twin tac\t", b"tical "),
         (b"\x15fogml inspect shipped:r\t", b"ing-laser-"),
         (b"x own-r\t", b"un.csv "),
+        (b"\x15fogml compare --models mean,pol\t", b"ynomial "),
     ]
     try:
         for typed, answer in steps:
@@ -169,7 +211,20 @@ def test_an_unknown_command_names_the_nearest():
 def test_an_unknown_option_is_a_usage_error():
     result = runner.invoke(main.app, ["train", "--modle", "rbf"])
     assert result.exit_code == 2
-    assert "--modle" in result.stderr
+    assert result.stderr.startswith("fogml: no such option '--modle'; did you mean '--model'")
+    result = runner.invoke(main.app, ["--versoin"])
+    assert (result.exit_code, len(result.stderr.splitlines())) == (2, 1)
+    assert "did you mean '--version'?" in result.stderr
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "told"),
+    [("--averaging", "ten", "'ten' is no number"), ("--seed", "1.5", "'1.5' is no whole number")],
+)
+def test_what_is_no_number_is_told_without_a_type_of_python(option, value, told):
+    result = runner.invoke(main.app, ["train", "a.csv", option, value])
+    assert result.exit_code == 2
+    assert f"invalid value for '{option}': {told}" in result.stderr
 
 
 @pytest.mark.parametrize(

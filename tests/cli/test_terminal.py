@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import io
+import re
+import sys
+
 import pytest
 
-from fogml.cli.terminal import Terminal, number
+from fogml.cli.terminal import Terminal, fitted, number, span
 
 WAYS = [
     ["drift-observing", "26.25", "-1.234e-07", "1.909e-06", "1.348e-07", "0.5363"],
@@ -40,6 +44,66 @@ def test_a_table_without_names_has_no_head(capsys) -> None:
         ["weights", "72", "bytes"],
         [],
     ]
+
+
+def test_figures_stand_right_and_words_left(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    rows = [["a", "–", "1", "rises"], ["b", "12.5", "deg/h", "of the coil"], ["c", "–", "deg/h", "falls"]]
+    Terminal().table("", ["name", "value", "unit", "meaning"], rows)
+    lines = capsys.readouterr().out.splitlines()
+    assert [lines[i].index(w) for i, w in ((3, "1"), (4, "deg"))] == [lines[1].index("unit")] * 2
+    assert [lines[i].index(w) for i, w in ((3, "rises"), (4, "of the"))] == [lines[1].index("meaning")] * 2
+    assert lines[4].index("12.5") + 4 == lines[1].index("value") + 5
+
+
+def test_a_long_remark_leaves_the_other_columns_room(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    remark = "neither levelled off nor flagged: limit the features to the trained box first, or export anew"
+    Terminal().table("", ["", ""], [["largest difference in the box", "72 bytes"], ["beyond", remark]])
+    assert "largest difference" in capsys.readouterr().out
+
+
+def test_where_nobody_looks_a_row_is_a_line(monkeypatch, capsys) -> None:
+    monkeypatch.delenv("COLUMNS", raising=False)
+    Terminal().table("Ways", ["id", "title"], [["a", "word " * 60]])
+    assert "word " * 59 in capsys.readouterr().out
+
+
+class _Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_in_a_terminal_sentences_break_between_words(monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "40")
+    text = (
+        "  - The run-in of /some/long/folder/that/no/terminal/holds/in/forty.csv leaves 0.1234 deg/h, ±0.02."
+    )
+    lines = fitted(text, _Screen()).split("\n")
+    assert " ".join(lines).split() == text.split()
+    assert all(len(line) <= 40 or len(line.split()) == 1 for line in lines)
+    assert all(line.startswith("    ") for line in lines[1:])
+    for kept in ("fogml " + text, text + "\n" + text):
+        assert fitted(kept, _Screen()) == kept
+    assert fitted(text, io.StringIO()) == text
+
+
+def test_a_bar_cuts_the_description_and_not_the_times(monkeypatch) -> None:
+    monkeypatch.setenv("COLUMNS", "60")
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", screen := _Screen())
+    with Terminal().work("searching for programmes that tell the causes apart, run 3 of 12", total=2) as work:
+        work.advance()
+        work.advance()
+    shown = re.sub("\x1b\\[[0-9;?]*[a-zA-Z]", "", screen.getvalue()).split("\r")
+    last = next(line for line in reversed(shown) if "searching" in line).splitlines()[0]
+    assert len(last) <= 60 and "…" in last
+    assert re.search(r"0:00:0\d left: 0:00:00", last)
+
+
+@pytest.mark.parametrize(("seconds", "told"), [(270, "4.5 min"), (24300, "6.75 h"), (2.15797e6, "599.4 h")])
+def test_spans_are_hours_and_minutes(seconds: float, told: str) -> None:
+    assert span(seconds) == told
 
 
 @pytest.mark.parametrize(

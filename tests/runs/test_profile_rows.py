@@ -152,7 +152,10 @@ def test_fields_of_a_container_by_group(read, tmp_path):
         ("legs: {a: {from_s: 4, to_s: 4}}\n", "'to_s' must be later"),
         ("join: [{file: ../x, columns: {}}]\n", "a name in the recording's folder"),
         ("join: [{file: x, columns: {T: {source: a, unit: degC}}}]\n", "'time' and columns"),
-        ("where: [{source: State, equal: up}]\n", "unknown key 'where.0.equal'; known keys are source"),
+        (
+            "where: [{source: State, equal: up}]\n",
+            "unknown key 'where.0.equal'; did you mean 'equals'. known keys are source",
+        ),
     ],
 )
 def test_faults_of_a_profile(tmp_path, more, told):

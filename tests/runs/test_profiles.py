@@ -244,7 +244,10 @@ def test_counts_stay_counts(write):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ("colums: {}\n", r"unknown key 'colums'; known keys are schema, description"),
+        (
+            "colums: {}\n",
+            r"unknown key 'colums'; did you mean 'columns'\? known keys are schema, description",
+        ),
         ("reject: {short: true}\n", r"unknown key 'reject.short'; known keys are wrong_field_count"),
         ("facts: {serial: 3}\n", r"unknown key 'facts.serial'; known keys are unit, axis"),
         ("sample_s: 0.1\n", r"either a column 'time' or 'sample_s'"),
@@ -268,7 +271,7 @@ def test_a_faulty_profile_names_file_and_key(write, change, message):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("unit: deg/s", "unit: rpm", r"columns.gyro.unit': 'rpm' is not one of deg/h"),
+        ("unit: deg/s", "unit: rpm", r"columns.gyro.unit': 'rpm' is not accepted; accepted units are deg/h"),
         ("unit: deg/s", "unit: deg/s, scale: 1/0", r"columns.gyro.scale"),
         (
             "unit: deg/s",
