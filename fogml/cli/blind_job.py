@@ -66,7 +66,8 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
         partial.write_text(config, encoding="utf-8")
     terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})
     terminal.say(
-        f"{settings.count} cases in {folder.cases}, {made} of them new; answer them: fogml blind run"
+        f"{settings.count} cases in {folder.cases}, {made} of them new; answer them: "
+        f"fogml blind run {settings.directory}"
     )
 
 

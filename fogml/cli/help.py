@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 
 import click
 
@@ -14,7 +14,7 @@ class _Formatter(click.HelpFormatter):
     def write_text(self, text: str) -> None:
         super().write_text(text.replace("-", _HYPHEN))
 
-    def write_dl(self, rows: Sequence[tuple[str, str]], *args: int, **more: int) -> None:
+    def write_dl(self, rows: Iterable[tuple[str, str]], *args: int, **more: int) -> None:
         super().write_dl([(name, text.replace("-", _HYPHEN)) for name, text in rows], *args, **more)
 
     def getvalue(self) -> str:

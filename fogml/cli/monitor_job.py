@@ -11,7 +11,7 @@ from typing import Any
 from fogml.cli.monitor import MonitorSettings
 from fogml.cli.runs import check_named_once, open_blocks
 from fogml.cli.terminal import Terminal, number
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.json_files import finite_json, write_json
 from fogml.models.base import DriftModel
 from fogml.monitor.evidence import ChangePrior
@@ -149,4 +149,4 @@ def _print(values: dict[str, Any], terminal: Terminal) -> None:
             if text:
                 terminal.say(f"{label}: {text}")
     told = values["runs"]
-    terminal.say(f"{told['added']} new runs kept, {told['repeated']} were there before")
+    terminal.say(f"{counted(told['added'], 'new run')} kept, {told['repeated']} there before")

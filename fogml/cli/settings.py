@@ -173,8 +173,13 @@ def absolute(path: str) -> str:
     return str(Path(path).absolute())
 
 
+def first_fault(error: ValidationError) -> Any:
+    """The fault to tell: an unknown key before what is missing, as it may be its name mistyped."""
+    return min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
+
+
 def _message(settings: type[Settings], error: ValidationError, source: str, stated: Mapping[str, Any]) -> str:
-    first = error.errors()[0]
+    first = first_fault(error)
     key = str(first["loc"][0]) if first["loc"] else "?"
     # A key within an entry of a list, such as runs.0.started.
     within = ".".join(str(part) for part in first["loc"])

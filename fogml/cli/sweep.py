@@ -8,7 +8,8 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from fogml.cli import options
 from fogml.cli.given import option
-from fogml.cli.settings import Settings
+from fogml.cli.settings import Settings, first_fault
+from fogml.errors import known_are, quoted
 from fogml.tracking import shown_tracker
 from fogml.tuning.space import Space
 
@@ -18,7 +19,13 @@ def _understood(value: Any) -> Space:
     try:
         return value if isinstance(value, Space) else Space.model_validate(value)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = first_fault(error)
+        if first["type"] == "missing":
+            raise ValueError(f"nothing is given for '{first['loc'][-1]}'") from None
+        if first["type"] == "extra_forbidden" and len(first["loc"]) == 1:
+            key = str(first["loc"][0])
+            known = known_are(key, Space.model_fields, "known keys")
+            raise ValueError(f"unknown key {quoted(key)}; {known}") from None
         place = ".".join(str(part) for part in first["loc"] if str(part) not in ("Range", "list[float]"))
         reason = str(first["ctx"]["error"]) if "error" in first.get("ctx", {}) else first["msg"]
         raise ValueError(f"{place}: {reason}" if place else reason) from None

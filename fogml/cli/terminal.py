@@ -53,7 +53,8 @@ class Terminal:
     def note(self, text: str) -> None:
         """A line on stderr."""
         if not self.quiet:
-            click.echo(fitted(text, sys.stderr), err=True)
+            # Not by click, which passes over the bar's hold on stderr and writes into its line.
+            print(fitted(text, sys.stderr), file=sys.stderr)
 
     def say(self, text: str) -> None:
         """A line on stdout for people."""
@@ -94,8 +95,8 @@ class Terminal:
         for number, name in enumerate(header):
             # Where whole words don't fit they break anywhere rather than be cut: a figure is never lost.
             width = widths[number] if widths else None
-            side = "right" if number and _holds_figures(columns[number][1:]) else "left"
-            table.add_column(name, justify=side, overflow="fold", width=width)
+            right = number > 0 and _holds_figures(columns[number][1:])
+            table.add_column(name, justify="right" if right else "left", overflow="fold", width=width)
         for row in rows:
             table.add_row(*map(terminal_text, row))
         console.print(table)

@@ -16,6 +16,7 @@ from fogml.cli.lab import NorthSettings
 from fogml.cli.replay import ReplaySettings
 from fogml.cli.settings import Settings
 from fogml.cli.simulate import SimulateSettings
+from fogml.cli.sweep import SweepSettings
 from fogml.cli.train import TrainSettings
 from fogml.errors import InputError
 from fogml.yaml_text import parse_yaml
@@ -156,6 +157,19 @@ def test_settings_that_are_written_are_read_back():
 def test_a_value_of_another_type_is_told(tmp_path, values, told):
     with pytest.raises(InputError, match=told):
         TrainSettings.gather(config(tmp_path, values), {})
+
+
+@pytest.mark.parametrize(
+    ("values", "told"),
+    [
+        ("spce: {}", "unknown key 'spce'; did you mean 'space'"),
+        ("space: {features: [T], modles: [M1]}", "unknown key 'modles'; did you mean 'models'"),
+        ("space: {models: [M1]}", "nothing is given for 'features'"),
+    ],
+)
+def test_a_mistyped_key_is_told_before_what_is_missing_for_it(tmp_path, values, told):
+    with pytest.raises(InputError, match=told):
+        SweepSettings.gather(config(tmp_path, values), {})
 
 
 @pytest.mark.parametrize(

@@ -101,6 +101,16 @@ def test_a_bar_cuts_the_description_and_not_the_times(monkeypatch) -> None:
     assert re.search(r"0:00:0\d left: 0:00:00", last)
 
 
+def test_a_note_stands_on_a_line_of_its_own_above_the_bar(monkeypatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(sys, "stderr", screen := _Screen())
+    terminal = Terminal()
+    with terminal.work("fitting"):
+        terminal.note("unit A failed")
+    before, _, after = screen.getvalue().partition("unit A failed")
+    assert before.endswith("\x1b[2K") and after.startswith("\n")
+
+
 @pytest.mark.parametrize(("seconds", "told"), [(270, "4.5 min"), (24300, "6.75 h"), (2.15797e6, "599.4 h")])
 def test_spans_are_hours_and_minutes(seconds: float, told: str) -> None:
     assert span(seconds) == told
