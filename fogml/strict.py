@@ -20,6 +20,11 @@ class Strict(BaseModel):
     )
 
 
+def first_fault(error: ValidationError) -> Any:
+    """The fault to tell: an unknown key before what is missing, as it may be its name mistyped."""
+    return min(error.errors(include_url=False), key=lambda fault: fault["type"] != "extra_forbidden")
+
+
 Content = TypeVar("Content", bound=Strict)
 
 
@@ -43,7 +48,7 @@ def strictly(kind: type[Content], values: Any, key: str = "") -> Content:
     try:
         return kind.model_validate(values)
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
+        first = first_fault(error)
         place = ".".join(str(part) for part in ((key,) if key else ()) + first["loc"]) or "content"
         found = "" if first["type"] == "missing" else f" (found {quoted(first['input'])})"
         raise InputError(f"key '{place}': {first['msg']}{found}") from None

@@ -14,6 +14,7 @@ from fogml import __version__
 from fogml.cli.given import Given, option
 from fogml.errors import InputError, known_are, listed, quoted
 from fogml.outputs import check_is_no_folder, sole_writer, whole_file
+from fogml.strict import first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 
 SHIPPED = "shipped:"
@@ -171,11 +172,6 @@ def _beside(value: Any, folder: Path) -> Any:
 def absolute(path: str) -> str:
     """The path in full."""
     return str(Path(path).absolute())
-
-
-def first_fault(error: ValidationError) -> Any:
-    """The fault to tell: an unknown key before what is missing, as it may be its name mistyped."""
-    return min(error.errors(), key=lambda fault: fault["type"] != "extra_forbidden")
 
 
 def _message(settings: type[Settings], error: ValidationError, source: str, stated: Mapping[str, Any]) -> str:

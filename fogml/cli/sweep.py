@@ -8,8 +8,9 @@ from pydantic import BeforeValidator, Field, ValidationError
 
 from fogml.cli import options
 from fogml.cli.given import option
-from fogml.cli.settings import Settings, first_fault
+from fogml.cli.settings import Settings
 from fogml.errors import known_are, quoted
+from fogml.strict import first_fault
 from fogml.tracking import shown_tracker
 from fogml.tuning.space import Space
 

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, field_validator
 
 from fogml.errors import InputError, known_are, quoted
+from fogml.strict import first_fault
 from fogml.yaml_text import read_yaml, yaml_text
 
 EARTH_RATE_DEG_H = 15.041067
@@ -190,7 +191,7 @@ def facts_from(values: Any, source: str) -> Facts:
     try:
         return Facts.model_validate(values)
     except ValidationError as error:
-        first = error.errors()[0]
+        first = first_fault(error)
         key = str(first["loc"][0]) if first["loc"] else "?"
         if first["type"] == "extra_forbidden":
             known = known_are(key, Facts.model_fields, "known keys")

@@ -29,6 +29,7 @@ from fogml.runs.profile_parts import (
     Source,
     TextLayout,
 )
+from fogml.strict import first_fault
 from fogml.yaml_text import read_yaml
 
 PROFILE_FOLDER = Path(__file__).parent / "import_profiles"
@@ -242,7 +243,7 @@ _HOMES: dict[str, Any] = {
 
 
 def _first_fault(error: ValidationError) -> str:
-    first = error.errors()[0]
+    first = first_fault(error)
     key = ".".join(str(part) for part in first["loc"])
     if first["type"] == "extra_forbidden":
         home: Any = ImportProfile

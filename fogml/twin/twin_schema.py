@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, create_model
 
 from fogml.errors import known_are, quoted
+from fogml.strict import first_fault
 from fogml.twin.noise import QUANTITIES as NOISE
 from fogml.twin.nominal import UNITS
 from fogml.twin.optics import Winding
@@ -143,7 +144,7 @@ TWIN_FILE: Any = create_model(
 
 def message(error: ValidationError, source: str) -> str:
     """The first fault that pydantic found, in one sentence that names source and key."""
-    first = error.errors()[0]
+    first = first_fault(error)
     # Names of alternatives that pydantic adds to the place are no keys.
     words = [str(part) for part in first["loc"] if not str(part).startswith(("_", "function-"))]
     key = ".".join(words) or "?"

@@ -144,6 +144,8 @@ def test_other_faults(tmp_path):
         load_twin(path)
     with pytest.raises(InputError, match="nothing is given for 'schema'"):
         twin_from({"name": "x"})
+    with pytest.raises(InputError, match="unknown key 'effcts'; did you mean 'effects'"):
+        twin_from({"effcts": {}})
 
 
 def test_effects_that_exclude_each_other():
