@@ -91,7 +91,11 @@ class Terminal:
         bounded = sys.stdout.isatty() or "COLUMNS" in os.environ
         console = Console(highlight=False, markup=False, width=None if bounded else _UNBOUNDED)
         columns = [[terminal_text(cell) for cell in cells] for cells in zip(header, *rows, strict=True)]
-        widths = _column_widths(columns, console.width)
+        # Columns move together before a word breaks.
+        widths = _column_widths(columns, console.width - _BETWEEN * len(columns))
+        if widths is None:
+            widths = _column_widths(columns, console.width - len(columns) - 1)
+            table.padding = (0, 0, 0, 0)
         for number, name in enumerate(header):
             # Where whole words don't fit they break anywhere rather than be cut: a figure is never lost.
             width = widths[number] if widths else None
@@ -148,7 +152,7 @@ def _column_widths(columns: Sequence[Sequence[str]], width: int) -> list[int] | 
     """Widths in which no word is broken, wider where there is room; None where words alone don't fit."""
     whole = [max(map(len, cells)) for cells in columns]
     widths = [max((len(word) for cell in cells for word in cell.split()), default=1) for cells in columns]
-    room = width - _BETWEEN * len(columns) - sum(widths)
+    room = width - sum(widths)
     if room < 0:
         return None
     for _ in range(room):

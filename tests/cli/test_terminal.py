@@ -17,7 +17,7 @@ WAYS = [
 HEADER = ["way", "dwell [s]", "error here [deg]", "greatest [deg]", "rms [deg]", "se of noise, rms [deg]"]
 
 
-@pytest.mark.parametrize("columns", [72, 80, 200])
+@pytest.mark.parametrize("columns", [62, 72, 80, 200])
 def test_words_stay_whole_where_they_fit(columns: int, monkeypatch, capsys) -> None:
     monkeypatch.setenv("COLUMNS", str(columns))
     Terminal().table("Ways", HEADER, WAYS)
