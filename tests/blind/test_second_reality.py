@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -14,6 +16,7 @@ from fogml.blind.frame.noise import Whitening
 from fogml.blind.frame.operators import faded, late
 from fogml.blind.frame.unit import Unit
 from fogml.blind.plan import REALITIES, reality
+from fogml.blind.second.effects.lasting import LoopOfSlips
 from fogml.blind.second.memory import (
     backlash,
     bouc_wen_general,
@@ -88,6 +91,19 @@ def test_springs_that_slip_are_plays_while_their_reach_is_constant() -> None:
     found = maxwell_slip(x, stiffness, lambda _: reach)
     assert found == pytest.approx(stiffness @ (x - play(x, reach)))
     assert backlash(x, 4.0) == pytest.approx(play(x, np.array([4.0]))[0])
+
+
+@pytest.mark.parametrize("shape", [0.8, 3.0])
+def test_loops_of_springs_that_soften_are_smaller_the_hotter_it_is(shape: float) -> None:
+    settings = {"reach": 5.0, "shape": shape, "softening": 60.0}
+
+    def midway_down(centre: float) -> float:
+        swing = zigzag(centre, centre + 60.0, centre - 60.0, points=3001)
+        world = SimpleNamespace(nodes={"T_coil": swing}, past=())
+        found = LoopOfSlips().response(world, settings, np.random.default_rng(0))  # type: ignore[arg-type]
+        return float(found[np.flatnonzero(np.isclose(swing, centre))[-1]])
+
+    assert midway_down(50.0) == pytest.approx(np.exp(-1.0) * midway_down(-10.0), rel=0.02)
 
 
 def test_fading_memories_against_a_lag_and_a_slab_in_a_ramp() -> None:
