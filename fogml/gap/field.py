@@ -113,7 +113,7 @@ class Field:
             raw = tuple(values[:, places] for values in raw[: setting.scene.fitted])
         self.white = self.whitening.stacked(raw)
         edges = np.cumsum([0, *(stop - start for start, stop in spans)])
-        whole = np.sum(self.white**2, axis=0)
+        whole = np.einsum("ij,ij->j", self.white, self.white)
         kept = whole - np.sum((self.base.basis.T @ self.white) ** 2, axis=0)
         whole, kept = (np.add.reduceat(v, edges[:-1]) if picked else v for v in (whole, kept))
         shown = kept > np.maximum(setting.priors.noise.in_constants * whole, 1e-18)

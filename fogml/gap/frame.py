@@ -78,8 +78,9 @@ class Whitening:
         """Series of each fit run, shape (m_r, ...), whitened and one after the other; others left out."""
         parts = []
         for values, whitener, weight in zip(series, self._whiteners, self._weights):
-            white = whitener.whiten(np.ascontiguousarray(values))
-            parts.append(white * (weight if white.ndim == 1 else weight[:, None]))
+            white = whitener.whiten(values)
+            white *= weight if white.ndim == 1 else weight[:, None]
+            parts.append(white)
         return np.concatenate(parts)
 
     @cached_property

@@ -67,7 +67,7 @@ def rows_of(
     samples = BySample(replace(replayer.recorded, coil=twin.coil), row, usable, counts, spread)
     time = run.time[0] + row_s * np.arange(count) + 0.5 * (width - 1) * step
     even, readings, noise = _even(samples, time, twin, replayer, exact)
-    smooth = {name: at_points(time, even.temperatures[name], run.time, spread) for name in readings}
+    smooth = at_points(time, {name: even.temperatures[name] for name in readings}, run.time, spread)
     own = None
     if model is not None:
         recorded = {n: v for n, v in smooth.items() if n in run.columns}
@@ -125,9 +125,7 @@ def _replay_errors(
     late = {n: even.temperatures[n] + np.gradient(even.temperatures[n], even.time) for n in readings}
     rougher = {n: smoothed(values, share)[0] for n, values in readings.items()}
     for moved in (late, rougher):
-        other = replayer.with_temperatures(
-            {n: at_points(even.time, v, run.time, samples.spread) for n, v in moved.items()}
-        )
+        other = replayer.with_temperatures(at_points(even.time, moved, run.time, samples.spread))
         columns.append(samples.means(other.output(twin) - replayed))
     return np.column_stack(columns)
 

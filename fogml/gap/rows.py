@@ -228,14 +228,11 @@ class BySample:
     def inputs(self, even: Inputs, temperatures: Mapping[str, FloatArray] | None) -> Inputs:
         """Inputs at the samples, with the even rows' temperatures."""
         held = {**even.temperatures, **(temperatures or {})}
-        smooth = {name: self._at_samples(even.time, values) for name, values in held.items()}
+        new = {name: values for name, values in held.items() if id(values) not in self.cache}
+        for name, course in at_points(even.time, new, self.recorded.time, self.spread).items():
+            self.cache[id(new[name])] = new[name], course
+        smooth = {name: self.cache[id(values)][1] for name, values in held.items()}
         return replace(self.recorded.afresh(), temperatures=smooth, sensors={}, cache={}, coil=even.coil)
-
-    def _at_samples(self, time: FloatArray, values: FloatArray) -> FloatArray:
-        """A course on the even rows at the samples, worked out once."""
-        if id(values) not in self.cache:
-            self.cache[id(values)] = values, at_points(time, values, self.recorded.time, self.spread)
-        return self.cache[id(values)][1]
 
 
 def slopes(rows: Rows, constants: Mapping[str, float]) -> dict[str, FloatArray]:

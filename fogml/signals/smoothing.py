@@ -8,6 +8,7 @@ A reading is a smooth course and white noise. The smooth course minimises
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,11 +105,16 @@ def window_difference(
     return np.asarray((here - 2.0 * before + integral(end - 2.0 * window_s)) / window_s)
 
 
-def at_points(time: FloatArray, means: FloatArray, at: FloatArray, spread: float) -> FloatArray:
-    """A smooth course at points, from its means over spans about `time`.
+def at_points(
+    time: FloatArray, means: Mapping[str, FloatArray], at: FloatArray, spread: float
+) -> dict[str, FloatArray]:
+    """Smooth courses at points, from their means over spans about `time`.
 
     A mean over a span exceeds the middle's value by half the second derivative times `spread`, the mean
     square of the span's samples about its middle [s^2].
     """
-    course = CubicSpline(time, means)
-    return np.asarray(course(at) - 0.5 * spread * course(at, 2))
+    if not means or (spread == 0.0 and np.array_equal(time, at)):
+        return {name: values.copy() for name, values in means.items()}
+    # One spline of all: building one costs far more than a column more.
+    course = CubicSpline(time, np.column_stack(list(means.values())))
+    return dict(zip(means, np.ascontiguousarray((course(at) - 0.5 * spread * course(at, 2)).T)))
