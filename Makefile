@@ -18,6 +18,10 @@ $(READY): pyproject.toml constraints.txt
 	$(PIP) install --quiet -c constraints.txt -e '.[$(EXTRAS)]'
 	touch $(READY)
 
+$(VENV)/.docs: $(READY)
+	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
+	touch $@
+
 ## Train on one leg of a real thermal cycle, judge on another, and say which page to open.
 demo: $(READY)
 	$(BIN)/fogml demo --out demo-results
@@ -35,8 +39,7 @@ oldest newest:
 	$(TESTED) .venv-$@/bin/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 
 ## The documentation as a site and as a zip, warnings as errors; both work without a network.
-docs: $(READY)
-	$(PIP) install --quiet -c constraints.txt -e '.[docs]'
+docs: $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -j auto -d docs/_build/doctrees docs docs/_build/fogml-docs
 	cd docs/_build && ../../$(BIN)/python -m zipfile -c fogml-docs.zip fogml-docs
 	@echo "Open docs/_build/fogml-docs/index.html in a browser; docs/_build/fogml-docs.zip holds the same."
