@@ -7,7 +7,7 @@ from typing import Any
 
 from fogml.cli.benchmark import MakeSettings, RunSettings, ScoreSettings
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.json_files import write_json
 from fogml.outputs import whole_file, whole_folder
 
@@ -35,8 +35,8 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
     counts = {track: len(cases) for track, cases in told["tracks"].items()}
     terminal.result({"directory": str(home), "round": round_hash(home), **counts})
     terminal.say(
-        f"{counts['drift']} drift cases, {counts['diagnosis']} diagnosis cases. Hand out {home / 'handout'}, "
-        f"keep {home / 'kept'}; answer: fogml benchmark run {home} --method auto"
+        f"{counted(counts['drift'], 'drift case')}, {counted(counts['diagnosis'], 'diagnosis case')}. "
+        f"Hand out {home / 'handout'}, keep {home / 'kept'}; answer: fogml benchmark run {home} --method auto"
     )
 
 
@@ -74,7 +74,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
         with whole_file(plan.answers / "run.yaml") as partial:
             partial.write_text(config, encoding="utf-8")
         told[str(plan.name)] = {"answered": answered, "failed": failed}
-        terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
+        terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")
     terminal.result(told)
 
 

@@ -10,7 +10,7 @@ from fogml.blind.folders import DIAGNOSIS
 from fogml.cli.blind import MakeSettings, MergeSettings, RunSettings, ScoreSettings
 from fogml.cli.blind_reports import draw_reports, link_reports
 from fogml.cli.terminal import Terminal
-from fogml.errors import InputError
+from fogml.errors import InputError, counted
 from fogml.json_files import write_json
 from fogml.outputs import whole_file, whole_folder
 
@@ -66,7 +66,7 @@ def make_and_tell(settings: MakeSettings, terminal: Terminal) -> None:
         partial.write_text(config, encoding="utf-8")
     terminal.result({"directory": str(folder.path), "cases": settings.count, "made": made})
     terminal.say(
-        f"{settings.count} cases in {folder.cases}, {made} of them new; answer them: "
+        f"{counted(settings.count, 'case')} in {folder.cases}, {made} of them new; answer them: "
         f"fogml blind run {settings.directory}"
     )
 
@@ -107,7 +107,7 @@ def run_and_tell(settings: RunSettings, terminal: Terminal) -> None:
         with whole_file(plan.answers / "run.yaml") as partial:
             partial.write_text(config, encoding="utf-8")
         told[plan.name] = {"answered": answered, "failed": failed}
-        terminal.say(f"{method}: {answered} cases answered in {plan.answers}, {failed} failed")
+        terminal.say(f"{method}: {counted(answered, 'case')} answered in {plan.answers}, {failed} failed")
     terminal.result(told)
 
 

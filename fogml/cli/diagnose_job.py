@@ -118,18 +118,15 @@ def write_gap(folder: Path, found: Diagnosis) -> None:
 
 def rehearsal_rows(rehearsal: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[str]]]:
     """Head and rows of a table of what runs would name."""
-    head = ["if this acted", "shape", "size", "whitened length", "it would be", "as"]
-    return head, [
-        [
-            r["effect"],
-            r["form"],
-            r["size"],
-            number(r["length"]),
-            r["outcome"],
-            ", ".join(r["named_as"]) or "–",
-        ]
-        for r in rehearsal
-    ]
+    head = ["if this acted", "shape", "size", "whitened length", "it would be"]
+    return head, [[r["effect"], r["form"], r["size"], number(r["length"]), _outcome(r)] for r in rehearsal]
+
+
+def _outcome(rehearsed: Mapping[str, Any]) -> str:
+    """``named``, or what with, where more than the effect itself would be named."""
+    names = list(rehearsed["named_as"])
+    others = "" if names in ([], [rehearsed["effect"]]) else f" as {', '.join(names)}"
+    return rehearsed["outcome"] + others
 
 
 def _print(found: Diagnosis, terminal: Terminal) -> None:

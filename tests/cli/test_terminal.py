@@ -8,7 +8,9 @@ import sys
 
 import pytest
 
+from fogml.cli.diagnose_job import rehearsal_rows
 from fogml.cli.terminal import Terminal, fitted, number, span
+from fogml.twin.registry import effects
 
 WAYS = [
     ["drift-observing", "26.25", "-1.234e-07", "1.909e-06", "1.348e-07", "0.5363"],
@@ -24,6 +26,23 @@ def test_words_stay_whole_where_they_fit(columns: int, monkeypatch, capsys) -> N
     told = capsys.readouterr().out
     assert max(map(len, told.splitlines())) <= columns
     assert {word for row in [HEADER, *WAYS] for cell in row for word in cell.split()} <= set(told.split())
+
+
+def test_the_longest_names_of_effects_stay_whole_at_80(monkeypatch, capsys) -> None:
+    monkeypatch.setenv("COLUMNS", "80")
+    longest = sorted(effects(), key=len)[-2:]
+    rehearsed = {"form": "usual", "size": "usual", "length": 1.5e7, "outcome": "named"}
+    head, rows = rehearsal_rows(
+        [
+            {**rehearsed, "effect": longest[1], "named_as": longest[::-1]},
+            {**rehearsed, "effect": longest[0], "named_as": [longest[0]]},
+        ]
+    )
+    assert [row[-1] for row in rows] == [f"named as {longest[1]}, {longest[0]}", "named"]
+    Terminal().table("What these runs would name", head, rows)
+    told = capsys.readouterr().out
+    assert max(map(len, told.splitlines())) <= 80
+    assert {longest[0], longest[1], longest[1] + ","} <= set(told.split())
 
 
 def test_no_figure_is_lost_where_they_do_not_fit(monkeypatch, capsys) -> None:
