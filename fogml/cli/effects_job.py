@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import textwrap
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -88,9 +88,16 @@ def _card(id: str, out: str | None, terminal: Terminal) -> None:
 
 def _print_card(card: Mapping[str, Any], terminal: Terminal) -> None:
     terminal.say(f"{card['code']}  {card['id']}: {card['title']}  ({card['stage'].replace('_', ' ')})")
-    for paragraph in (card["summary"], textwrap.indent(card["equation"], "    "), *card["remarks"]):
+    # Formulas that stand beside each other go below each other: two are often wider than a terminal.
+    formulas = re.sub(r",\s{3,}", ",\n", card["equation"]).splitlines()
+    for paragraph in (
+        [card["summary"]],
+        [f"    {line}" for line in formulas],
+        *([r] for r in card["remarks"]),
+    ):
         terminal.say("")
-        terminal.say(paragraph)
+        for line in paragraph:
+            terminal.say(line)
     rows = [
         [
             quantity["name"],

@@ -174,6 +174,13 @@ def test_effects_lists_the_catalogue(invoke_json, invoke):
     assert any(line.split() == row.split() for line in lines)
 
 
+def test_formulas_of_a_card_stand_below_each_other(invoke):
+    lines = invoke("effects", "thermal_shock").stdout.splitlines()
+    first = lines.index("    b = J q,")
+    assert lines[first + 1] == "    dq/dt = -q / tau + ds/dt," and lines[first + 2].startswith("    E[ds/dt]")
+    assert max(map(len, lines[first : first + 3])) <= 80
+
+
 def test_a_card(invoke_json, invoke, tmp_path):
     card = invoke_json("effects", "shupe_trim")
     assert card["schema"] == "fogml.effect/1" and "delta" in card["equation"]
